@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -12,26 +13,29 @@ from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.storms.interference import PassingMessage
 
-ANSWERED_WITHIN = 60.0  # a full queue of a robot that takes 3 s for a message is cut by then [s]
+ANSWERED_WITHIN = 60.0  # unless it still waits in a queue [s]
+QUEUED_WITHIN = 300.0  # of a robot that takes 3 s for a message, and was driven meanwhile [s]
 
 
 @dataclass(eq=False, slots=True)
 class _Open:
-    """A request that a node has not answered yet."""
+    """A request that a node has not answered yet, and from when on that is expected of it."""
 
     node: str
     arrived: float
-    refused: int
+    since: float
+    data: bytes
 
 
 class AnswerWatch:
-    """Sees what reaches the DVA and the robots, and what they answer.
+    """Sees what reaches the DVA, robots and people, and what they answer.
 
     Args:
         recorder: Counts what is refused, and is told what breaks the rule.
         now: Gives the time [s].
-        nodes: Ids of the DVA and the robots, with their labels.
+        nodes: Ids of those who have to answer, with their labels.
         heard: Called with each answer: of whom, to whom, its bytes; whether it gets there or not.
+        waits: Returns True for a request that is still in the queue of a node.
     """
 
     def __init__(
@@ -40,11 +44,13 @@ class AnswerWatch:
         now: Callable[[], float],
         nodes: dict[str, str],
         heard: Callable[[str, str, bytes], object],
+        waits: Callable[[str, bytes], bool] = lambda node, data: False,
     ) -> None:
         self._recorder, self._now, self._nodes, self._heard = recorder, now, nodes, heard
+        self._waits = waits
         self._open: dict[_Open, None] = {}
         self._answers, self._excused = 0, set[str]()
-        self._counted_for = 0
+        self._silently: dict[str, deque[float]] = {node: deque() for node in nodes}
 
     def excuse(self, node: str, excused: bool) -> None:
         """Expect nothing of a node that is down, nor of what it had not answered by then."""
@@ -52,15 +58,21 @@ class AnswerWatch:
         self._open = {each: None for each in self._open if each.node != node}
 
     def watch(self, passing: PassingMessage) -> None:
-        """Let a message reach its receiver; one that is none has to be answered or counted."""
-        is_judged = passing.to in self._nodes and passing.to not in self._excused
-        if not is_judged or not isinstance(passing.payload, bytes) or is_message(passing.payload):
+        """Let a message reach its receiver; one that is none has to be answered or counted.
+
+        Of each one that is refused while this one is taken, and is not answered, the time is noted.
+        """
+        node = passing.to
+        if node not in self._nodes:
             passing.take(passing.payload)
             return
-        before = self._refused(), self._answers
+        refused, answers = self._refused(), self._answers
         passing.take(passing.payload)
-        if before == (self._refused(), self._answers) and passing.to not in self._excused:
-            self._breach(passing.to, "neither answers nor counts what is no message")
+        refused, answers = self._refused() - refused, self._answers - answers
+        self._silently[node].extend([self._now()] * (refused - answers))
+        is_judged = node not in self._excused and isinstance(passing.payload, bytes)
+        if is_judged and not (refused or answers) and not is_message(passing.payload):
+            self._breach(node, "neither answers nor counts what is no message")
 
     def tap(self, node: str) -> _Tap:
         """Return what sees the requests to a node."""
@@ -68,7 +80,7 @@ class AnswerWatch:
 
     def opened(self, node: str, request: Request) -> Request:
         """Note a request; return it with an answer that is seen."""
-        each = _Open(node, self._now(), self._refused())
+        each = _Open(node, self._now(), self._now(), request.data)
         if node not in self._excused:
             self._open[each] = None
 
@@ -83,22 +95,31 @@ class AnswerWatch:
     def look(self) -> None:
         """Judge the requests that should have been answered by now.
 
-        What nobody answers has to be counted: each refusal counts for one of them.
+        What nobody answers has to be counted: each refusal without an answer counts for one of
+        them, at the same node.
         """
-        now, refused = self._now(), self._refused()
+        now = self._now()
         while self._open:
             each = next(iter(self._open))
-            if now - each.arrived < ANSWERED_WITHIN:
+            if now - each.since < ANSWERED_WITHIN:
                 return
             del self._open[each]
-            if refused - max(each.refused, self._counted_for) > 0:
-                self._counted_for = max(each.refused, self._counted_for) + 1
+            if now - each.arrived < QUEUED_WITHIN and self._waits(each.node, each.data):
+                each.since = now
+                self._open[each] = None
+                continue
+            silently = self._silently[each.node]
+            while silently and silently[0] < each.arrived:
+                silently.popleft()
+            if silently:
+                silently.popleft()
             else:
                 self._breach(each.node, "has neither answered nor counted a request")
 
     def _refused(self) -> int:
+        """What a robot refuses to do is counted once more, under a name of its own."""
         counters = self._recorder.counters
-        return sum(count for name, count in counters.items() if "refused" in name)
+        return sum(count for name, count in counters.items() if name.startswith("refused"))
 
     def _breach(self, node: str, what: str) -> None:
         self._recorder.violated("S11", self._now(), self._nodes[node], what)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Final
 
 from dva_sim.agents.operator.operator import BY_DVA
@@ -33,7 +34,9 @@ def _keeps_mission(original: Original, bug: Bug) -> Original:
     """Who has lost the robot has its mission carried out to the end."""
 
     def wrong(self: Any, grant: m.PermissionGrant | None) -> Any:
-        if self.mode is not Mode.MISSION:
+        held = self.grant
+        same = grant is not None and held is not None and grant.session == held.session
+        if self.mode is not Mode.MISSION or same:
             return original(self, grant)
         bug.act(f"{self.id_tag} goes on with the mission of {self.owner}")
         self.grant = grant
@@ -135,6 +138,30 @@ def _quiet_to_the_unknown(original: Original, bug: Bug) -> Original:
     return wrong
 
 
+def _never_over(original: Original, bug: Bug) -> Original:
+    """An operator goes on, whatever the robot says."""
+
+    def wrong(self: Any, code: int | None, why: str = "") -> str:
+        bug.act(f"{self.me} goes on, though {original(self, code, why)}")
+        return ""
+
+    return wrong
+
+
+def _confirms_more(original: Original, bug: Bug) -> Original:
+    """The DVA confirms to robots that whoever may drive may send them out, too."""
+
+    def wrong(self: Any, message: m.Message, asker: Any, body: m.GetGrant) -> Any:
+        reply, sends = original(self, message, asker, body)
+        told = reply.content
+        if isinstance(told, m.Permission) and told.level == "teleoperation":
+            bug.act(f"{told.device} may drive, and is said to be allowed more")
+            reply = replace(reply, content=replace(told, level="both"))
+        return reply, sends
+
+    return wrong
+
+
 WRITTEN_BLIND: Final[dict[str, Mutant]] = {
     "future-tick-obeyed": Mutant(
         "S1",
@@ -178,6 +205,18 @@ WRITTEN_BLIND: Final[dict[str, Mutant]] = {
         "dva_sim.agents.robot.sensors:SensorSubscriptions.end",
         skipped(lambda self, subscriber: any(k[1] == subscriber for k in self._subscribed)),
     ),
+    "refusals-ignored": Mutant(
+        "S5",
+        "an operator who is refused drives on",
+        "dva_sim.agents.operator.refusals:Refusals._over",
+        _never_over,
+    ),
+    "confirms-more": Mutant(
+        "S5",
+        "the DVA confirms more than it has given",
+        "dva_sim.core.dva:Dva._grant_of",
+        _confirms_more,
+    ),
     "promises-forgotten": Mutant(
         "S6",
         "who says OK to an order need never set out",
@@ -211,7 +250,7 @@ WRITTEN_BLIND: Final[dict[str, Mutant]] = {
     "wishes-kept": Mutant(
         "S10",
         "the DVA keeps each wish for a robot",
-        "dva_sim.core.sessions:Sessions.grant",
+        "dva_sim.core.dva:Dva._permitted",
         _remembers_wishes,
     ),
     "unknown-unanswered": Mutant(

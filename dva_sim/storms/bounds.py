@@ -7,16 +7,25 @@ from collections.abc import Iterable, Iterator
 from types import FunctionType, MethodType, ModuleType
 from typing import Any, Final
 
+from dva_sim.agents.robot.command_queue import OTHERS, CommandQueue
+from dva_sim.agents.robot.controller import MOST_OBSERVERS
+from dva_sim.agents.robot.inquiry import MOST_READERS
+from dva_sim.agents.robot.sensors import MOST as MOST_SUBSCRIBED
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 
-MOST: Final = 2_500
-"""Elements of a container without a bound of its own: twice a full queue, and some."""
+MOST: Final = 200
+"""Elements of a container without a bound of its own, beside one for each event there ever was: a
+team of fifteen devices needs 72 at most."""
 BOUNDS: Final[dict[str, int]] = {
     "Registry.entries": 20_000,
     "EventBook.open": 10_000,
     "EventBook.closed": 10_000,
     "EventBook.waiting": 10_000,
+    "Confirmations._waiting": OTHERS,
+    "Inquiry._readers": MOST_READERS,
+    "RobotController.observers": MOST_OBSERVERS,
+    "SensorSubscriptions._subscribed": MOST_SUBSCRIBED,
     "Requester.round_trips": 100_000,
     "DvaAgent._told": 20_000,
     "ReplyCache._replies": 64 * 1024,
@@ -32,11 +41,24 @@ _ATOMS: Final = (str, bytes, int, float, complex, bool, type(None), type, Module
 _NOT_THEIRS: Final = (Recorder, Clock)
 
 
-def oversized(roots: Iterable[object]) -> Iterator[tuple[str, int, int]]:
+def waiting_of(inbox: CommandQueue, peer: str) -> int:
+    """Return how many messages of one connection wait in a robot's queue."""
+    lines = inbox._waiting._lines.items()
+    return sum(len(line) for (whose, _), line in lines if whose == peer)
+
+
+def is_waiting(inbox: CommandQueue, data: bytes) -> bool:
+    """Return True for a message that is in a robot's queue."""
+    lines = inbox._waiting._lines.values()
+    return any(letter.data == data for line in lines for letter in line)
+
+
+def oversized(roots: Iterable[object], events: int = 0) -> Iterator[tuple[str, int, int]]:
     """Yield each container that holds more than it may, of all that can be reached from objects.
 
     Args:
         roots: Agents; what they share with the whole run is left out.
+        events: How many the DVA has ever known.
 
     Yields:
         Class and attribute, number of elements, bound.
@@ -50,14 +72,14 @@ def oversized(roots: Iterable[object]) -> Iterator[tuple[str, int, int]]:
         if isinstance(each, (dict, list, tuple, set, frozenset, deque)):
             if name in KEPT_FOR_MEASURES:
                 continue
-            bound = BOUNDS.get(name, MOST)
+            bound = BOUNDS.get(name, MOST + events)
             if len(each) > bound:
                 yield name, len(each), bound
             inner = each.values() if isinstance(each, dict) else each
             todo += [(f"{name}[]", value) for value in inner if not isinstance(value, _ATOMS)]
         elif isinstance(each, MethodType):
             continue
-        elif type(each).__module__.startswith("dva_sim."):
+        elif type(each).__module__.startswith("dva_sim.") and not _is_ours(each):
             todo += [(f"{type(each).__name__}.{key}", v) for key, v in _attributes(each)]
 
 
@@ -67,3 +89,7 @@ def _attributes(each: object) -> Iterator[tuple[str, Any]]:
         for slot in getattr(kind, "__slots__", ()):
             if hasattr(each, slot):
                 yield slot, getattr(each, slot)
+
+
+def _is_ours(each: object) -> bool:
+    return type(each).__module__.startswith("dva_sim.storms.")

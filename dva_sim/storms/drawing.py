@@ -9,6 +9,8 @@ from dva_sim.core.dispatch import POLICIES
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.network.patterns import PATTERNS
+from dva_sim.simulation.full.stage import id_of
+from dva_sim.storms.drivers import FIRST_NUMBER
 from dva_sim.storms.faults import DEADLINES, FAULTS, FaultKind
 from dva_sim.storms.plan import Fault, StormPlan
 
@@ -27,7 +29,7 @@ PROFILES: Final[dict[str, tuple[str, ...]]] = {
     "people": (
         *("revocation", "take-over", "emergency", "asks-twice", "old-session", "held-tilt"),
         *("second-driver", "flood", "taken-by-hand", "vanishes", "replay-by-another"),
-        *("guard-idle", "app-restarts"),
+        *("guard-idle", "app-restarts", "order-again", "emergency-button"),
     ),
     "none": (),
 }
@@ -60,8 +62,12 @@ def _scenario(chance: random.Random) -> dict[str, Any]:
     robots, guards = chance.choice((2, 2, 3, 4, 6)), chance.choice((0, 0, 1, 2))
     return {
         "site": _site(chance),
-        "robot": {"count": robots, "watchdog_s": chance.choice((1.0, 3.0, 3.0))},
-        "guard": {"count": guards, "mobilisation_s": chance.choice((15.0, 60.0))},
+        "robot": {
+            "count": robots,
+            "watchdog_s": chance.choice((1.0, 3.0, 3.0)),
+            "sensors": [{"name": name} for name in chance.choice(((), ("smoke", "temperature")))],
+        },
+        "guard": {"count": guards, "mobilisation_s": chance.choice((15.0, 25.0))},
         "operator": {
             "count": chance.randint(min(2, robots), min(4, robots)),
             "strategy": chance.choice(("adaptive", "pursuit", "move_and_wait")),
@@ -74,13 +80,17 @@ def _scenario(chance: random.Random) -> dict[str, Any]:
         "camera": {"rate_hz": chance.choice((2, 5)), "frame_bytes": 4000},
         "request": {"timeout_s": 9.0, "attempts": 3},
         "link": _link(chance),
-        "dva": {"sensors": chance.choice(([], [], [], ["temperature", "smoke"]))},
+        "dva": {
+            "sensors": chance.choice(([], [], [], ["temperature", "smoke"])),
+            "supervisors": [id_of("operator", FIRST_NUMBER + 1)],
+        },
         "dispatch": {
             "policy": chance.choice(sorted(POLICIES.keys() - {"oracle"})),
             "containment": guards > 0 and chance.random() < 0.5,
             "escalate_after_s": chance.choice((10.0, 30.0, 120.0)),
-            "order_limit_s": chance.choice((60.0, 300.0)),
-            "depart_within_s": 60.0,
+            "order_limit_s": chance.choice((90.0, 300.0)),
+            "depart_within_s": chance.choice((30.0, 60.0)),
+            "still_within_s": chance.choice((None, 45.0)),
             "mode": chance.choice(("automatic", "automatic", "ask_first")),
             "decide_within_s": 10.0,
         },

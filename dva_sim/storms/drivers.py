@@ -1,7 +1,9 @@
 """Drivers who are never idle: they keep robots moving, so that faults meet robots in motion.
 
 A driver keeps to the protocol, and is careless as people are: it falls silent at the wheel, stops
-late or not at all, gives a robot back while it moves, keeps one without driving it.
+late or not at all, gives a robot back while it moves, keeps one without driving it, wants more than
+a robot can, claims to see what is still to come, and asks for what its permission is not for. It
+takes robots from others, too.
 """
 
 from __future__ import annotations
@@ -10,8 +12,9 @@ import random
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from dva_sim.agents.device import command_topic
+from dva_sim.agents.device import command_topic, do_nothing
 from dva_sim.agents.observation import FRAME, CameraFrame
+from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
@@ -23,6 +26,9 @@ RATES: Final = 2.0, 5.0, 8.0  # commands in a second
 LONGEST_WAIT = 20.0  # for a robot that was granted, and does not start [s]
 KEPT = 40.0  # a robot that is held and not driven: longer than a lease lasts [s]
 LOST: Final = m.NOT_PERMITTED, m.BAD_SESSION
+LEVELS: Final = "teleoperation", "teleoperation", "both", "both", "missions"
+TAKEOVERS: Final[tuple[str | None, ...]] = (None, None, "ask", "force")
+INSISTS: Final = 40.0  # on a robot that somebody else has: longer than it is stopped and kept [s]
 
 
 class BusyDriver:
@@ -32,6 +38,7 @@ class BusyDriver:
         stage: Where.
         number: From 1.
         robots: Ids of the robots.
+        sensors: Names of the sensors that robots have.
         chance: Everything that it decides.
         place: Draws a place to send a robot to.
 
@@ -45,20 +52,24 @@ class BusyDriver:
         number: int,
         robots: Sequence[str],
         *,
+        sensors: tuple[str, ...],
         chance: random.Random,
         place: Callable[[], m.Position],
     ) -> None:
         self._hand = Intruder(stage, FIRST_NUMBER + number, f"driver-{number}")
         self.device = self._hand.device
-        self._robots, self._chance, self._place = robots, chance, place
+        self._robots, self._sensors = robots, sensors
+        self._chance, self._place = chance, place
         self._publishes, self._clock = stage.pattern().published, stage.clock
-        self._robot, self._session, self._level = "", 0, ""
+        self._robot, self._session, self._level = "", 0, LEVELS[0]
         self._does: Callable[[], object] = self._look_for_robot
         self._until = self._hushed = 0.0
         self._wish = m.SetTeleOp(0.0, 0.0)
         self._tick: int | None = None
+        self._wanted, self._takeover = robots[0], TAKEOVERS[0]
         self._frames: Subscription | None = None
-        self._life = 0
+        self._life, self._insists = 0, 0.0
+        self._listening: list[Subscription] = []
         self.device.serve(self._on_request)
 
     def start(self, until: float) -> None:
@@ -88,12 +99,17 @@ class BusyDriver:
     def _look_for_robot(self) -> None:
         if self._clock.now < self._until:
             return
-        robot = self._chance.choice(self._robots)
-        level = self._chance.choice(("teleoperation", "teleoperation", "both"))
-        self._until = self._clock.now + 3.0
+        if self._clock.now >= self._insists:
+            self._wanted = self._chance.choice(self._robots)
+            self._level = self._chance.choice(LEVELS)
+            self._takeover = self._chance.choice(TAKEOVERS)
+        robot, level = self._wanted, self._level
+        self._until = self._clock.now + (1.0 if self._takeover == "force" else 3.0)
         life = self._life
 
         def answered(reply: m.Reply) -> None:
+            if reply.code == m.BUSY and self._takeover and self._insists <= self._clock.now:
+                self._insists = self._clock.now + INSISTS
             if not isinstance(reply.content, m.Permission):
                 return
             session = reply.content.session
@@ -102,19 +118,29 @@ class BusyDriver:
             elif session != self._session:  # it comes too late
                 give_back(self.device, m.PermissionRevocation(robot, self.device.id_tag, session))
 
-        self._hand.ask(DVA, m.PermissionRequest(robot, level), answered)
+        wish = m.PermissionRequest(robot, level, self._sensors, self._takeover)
+        self._hand.ask(DVA, wish, answered)
 
     def _take(self, robot: str, level: str, session: int) -> None:
         """Begin with a robot that was granted."""
         self._robot, self._session, self._level = robot, session, level
-        self._until = self._clock.now + LONGEST_WAIT
-        if level == "both" and self._chance.random() < 0.6:
+        self._until, self._insists = self._clock.now + LONGEST_WAIT, 0.0
+        for listening in self._listening:
+            listening.close()
+        self._listening = [self._listen(sensor) for sensor in self._sensors]
+        if level == "missions" or (level == "both" and self._chance.random() < 0.6):
             self._send_out()
             return
         network, me = self.device.network, self.device.id_tag
         self._frames = network.subscribe(me, robot, FRAME, self._see)
         self._does = self._start
         self._start()
+
+    def _listen(self, sensor: str) -> Subscription:
+        """Listen to a sensor until the next robot is taken, whoever holds this one then."""
+        self._order(m.DevSub(sensor, 1.0))
+        network, me = self.device.network, self.device.id_tag
+        return network.subscribe(me, self._robot, sensor_topic(sensor, me), do_nothing)
 
     def _see(self, frame: object) -> None:
         if isinstance(frame, CameraFrame):
@@ -139,6 +165,9 @@ class BusyDriver:
             return
         if chance.random() < 0.5:
             self._wish = m.SetTeleOp(chance.uniform(0.1, 0.5), chance.uniform(-0.4, 0.4))
+        if chance.random() < 0.05:
+            wild = chance.choice((-0.3, 0.9, 3.0, 99.0)), chance.choice((0.0, -4.0, 40.0))
+            self._wish = m.SetTeleOp(*wild)
         if now >= self._hushed and chance.random() < 0.1:
             self._hushed = now + chance.choice((1.0, 4.0, 8.0, KEPT))
         if chance.random() < 0.5:
@@ -173,8 +202,15 @@ class BusyDriver:
         self._finish(self._chance.uniform(1.0, 15.0))
 
     def _wait(self) -> None:
+        """Hold the robot without driving it; now and then ask for what it is not held for."""
+        chance = self._chance
         if self._clock.now >= self._until:
             self._give_back()
+        elif self._level != "both" and chance.random() < 0.1:
+            is_driver = self._level == "teleoperation"
+            mission = m.GoTo((self._place(),)), m.CancelMission(), m.ReturnToBase()
+            drive = m.StartTeleOp(), m.StopTeleOp()
+            self._order(chance.choice(mission if is_driver else drive))
 
     # --- how a drive ends --------------------------------------------------------------------
 
@@ -229,6 +265,8 @@ class BusyDriver:
         now = self._clock.now
         if self._does == self._drive and now >= self._hushed and not self.device.silent:
             body = self._wish._replace(seen_tick=self._tick)
+            if self._tick is not None and self._chance.random() < 0.02:  # a picture to come
+                body = body._replace(seen_tick=self._tick + self._chance.randrange(100, 5000))
             if self._publishes:
                 message = self.device.outbox.message(self._robot, body, now, self._session)
                 data, topic = encode(message), command_topic(self._robot)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -23,8 +24,9 @@ End = Callable[[], object]
 Begin = Callable[[StormScene, Fault, random.Random], End | None]
 ANY: Final = ("robot", "operator", "driver", "guard", "dva")
 DRIVERS: Final = ("operator", "driver")
-ON_DRIVING: Final = ("StartTeleOp", "SetTeleOp", "PermissionGrant", "PermissionRevocation", "Reply")
-DRIVEN: Final = ("SetTeleOp", "SetTeleOp", "StartTeleOp", "PermissionGrant")
+ON_MISSION: Final = ("GoTo", "Patrol", "GetMissionStatus")
+DRIVEN: Final = ("SetTeleOp", "SetTeleOp", "StartTeleOp", "PermissionGrant", *ON_MISSION)
+ON_DRIVING: Final = (*DRIVEN, "PermissionRevocation", "PermissionRevocation", "Reply", "Reply")
 DRIFT: Final = 200e-6  # of a robot's clock; a quartz is off by less, one that is slewed by more
 GIVEN_BACK: Final = 5.0  # after it was granted, what was asked for too much [s]
 HAND: Final = "somebody at the robot"
@@ -113,6 +115,17 @@ def _replay(storm: StormScene, fault: Fault, chance: random.Random) -> None:
         storm.interference.later(passing, after)
 
 
+def _order_again(storm: StormScene, fault: Fault, chance: random.Random) -> None:
+    """An order to a robot arrives again when what it began is over: a copy that was long away."""
+    past = storm.interference.past(storm.id_of(fault.target))
+    orders = [each for each in past if any(kind in each.payload for kind in _ORDERS)]
+    for passing in orders[-3:]:
+        storm.interference.later(passing, fault.value)
+
+
+_ORDERS: Final = b"<StartTeleOp", b"<GoTo", b"<Patrol", b"<ReturnToBase"
+
+
 def _replay_by_another(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     """An intruder sends some of the last messages again, over a connection of its own."""
     to = storm.id_of(fault.target)
@@ -163,9 +176,10 @@ def _restart(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 
 def _restart_program(storm: StormScene, robot: StormRobot, chance: random.Random) -> None:
-    """Restart the program of a robot, whose clock is another one then."""
+    """Restart the program of a robot, whose clock is another one then, or a little slow."""
     storm.run.deafened(robot.id, True)
-    robot.agent.restart(chance.uniform(0.0, 1e5))
+    slow = max(0.0, robot.agent.controller.clock_offset - chance.uniform(0.5, 10.0))
+    robot.agent.restart(chance.choice((slow, chance.uniform(0.0, 1e5))))
     storm.run.deafened(robot.id, False)
 
 
@@ -244,7 +258,9 @@ def _by_hand(storm: StormScene, fault: Fault, chance: random.Random) -> End:
             rests = storm.now + chance.choice(DEADLINES) + 5.0
         elif chance.random() < 0.02:
             hand.let_go(HAND)
-        taken = hand.drive(HAND, chance.uniform(0.0, 0.6), chance.uniform(-0.6, 0.6))
+        wild = chance.random() < 0.05
+        speed = chance.choice((-0.5, 2.0, math.nan)) if wild else chance.uniform(0.0, 0.6)
+        taken = hand.drive(HAND, speed, chance.uniform(-0.6, 0.6))
         if taken.code == m.WRONG_MODE:
             hand.take(HAND)
         return True
@@ -272,8 +288,10 @@ def _kill_dva_writing(storm: StormScene, fault: Fault, chance: random.Random) ->
 
 
 def _fill_disk(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """Let the DVA write nothing to its memory, in this life and the next."""
+    """Let the DVA write nothing to its memory, and perhaps kill it meanwhile."""
     storm.dva.full += 1
+    if fault.value:
+        storm.run.clock.call_after(chance.random() * fault.for_s, storm.dva.kill, fault.value)
 
     def ends() -> None:
         storm.dva.full -= 1
@@ -337,7 +355,22 @@ def _restart_app(storm: StormScene, fault: Fault, chance: random.Random) -> None
 
 
 def _emergency(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    storm.intruder.ask(storm.id_of(fault.target), m.Emergency())
+    """Somebody sends one, in whatever name, to whomever it is addressed, in any session."""
+    robot = storm.id_of(fault.target)
+    if chance.random() < 0.4:
+        storm.intruder.ask(robot, m.Emergency())
+        return
+    named = chance.choice((robot, *(each.id for each in storm.robots)))
+    claimed = chance.choice((storm.intruder.device.id_tag, DVA, *storm.labelled.values()))
+    session = chance.choice((0, 1, *storm.sessions_seen(robot)))
+    number = chance.randrange(2**29, 2**30)  # of no other message
+    message = m.Message(named, number, claimed, "12:00:00", session, m.Emergency())
+    for _ in range(chance.choice((1, 1, 20))):
+        storm.intruder.send(robot, encode(message))
+
+
+def _button(storm: StormScene, fault: Fault, chance: random.Random) -> None:
+    ManualControl(storm.robot(fault.target).agent).press_emergency()
 
 
 def _revoke(storm: StormScene, fault: Fault, chance: random.Random) -> None:
@@ -401,12 +434,13 @@ def _second_driver(storm: StormScene, fault: Fault, chance: random.Random) -> En
 
 
 def _flood(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """An intruder sends so many requests a second."""
+    """An intruder sends so many requests a second: of all kinds, or of one."""
     to, goes, clock = storm.id_of(fault.target), [True], storm.run.clock
-    bodies = m.GetMissionStatus(), m.StartTeleOp(), m.GetSensorInfo(), m.SetTeleOp(0.5, 0.0)
+    every = m.GetMissionStatus(), m.StartTeleOp(), m.GetSensorInfo(), m.SetTeleOp(0.5, 0.0)
+    bodies = chance.choice((every, every[:1], every[1:2], (m.DevSub("smoke", 1.0),)))
 
     def send() -> bool:
-        storm.intruder.send_message(to, chance.choice(bodies), chance.randrange(2**40))
+        storm.flooder.send_message(to, chance.choice(bodies), chance.randrange(2**40))
         return goes[0]
 
     clock.every(1.0 / fault.value, send)
@@ -427,6 +461,14 @@ def _report_twice(storm: StormScene, fault: Fault, chance: random.Random) -> Non
     kind, place = chance.choice(("fire", "gas_leak")), storm.anywhere(chance)
     for _ in range(max(2, round(fault.value))):
         storm.intruder.report(kind, Position(place.latitude, place.longitude))
+
+
+def _take_back(storm: StormScene, fault: Fault, chance: random.Random) -> None:
+    """An event is reported, and taken back a little later by who has reported it."""
+    place, hand = storm.anywhere(chance), storm.intruder
+    hand.report("flood", place)
+    body = m.EventReport(None, "flood", place, 0.5, 0.9, "refuted")
+    storm.run.clock.call_after(fault.value, hand.ask, DVA, body)
 
 
 _LONG, _SHORT, _SHARE = (2.0, 60.0), (0.5, 15.0), (0.1, 0.9)
@@ -504,6 +546,14 @@ FAULTS: Final[dict[str, FaultKind]] = {
         on=("StopTeleOp", "CancelMission", "StartTeleOp", "PermissionRevocation"),
         weight=2.0,
     ),
+    "order-again": FaultKind(
+        "the last orders to a robot arrive again, so many seconds after it was to stop",
+        ("robot",),
+        _order_again,
+        value=(1.0, 20.0),
+        on=("StopTeleOp", "CancelMission"),
+        weight=2.0,
+    ),
     "replay-by-another": FaultKind(
         "an intruder sends so many of the last messages again",
         ("robot", "dva"),
@@ -579,8 +629,15 @@ FAULTS: Final[dict[str, FaultKind]] = {
         value=(0.5, 20.0),
         weight=2.0,
     ),
-    "disk-full": FaultKind(
-        "the DVA cannot write to its memory", ("dva",), _fill_disk, lasts=_LONG, weight=2.0
+    "disk-full": FaultKind("the DVA cannot write to its memory", ("dva",), _fill_disk, lasts=_LONG),
+    "disk-full-and-killed": FaultKind(
+        "the DVA cannot write, is killed meanwhile, and is back after so many seconds",
+        ("dva",),
+        _fill_disk,
+        lasts=_LONG,
+        value=(0.5, 20.0),
+        on=("EventReport", "PermissionRequest"),
+        weight=2.0,
     ),
     "dva-slow": FaultKind(
         "a message takes the DVA so many seconds",
@@ -616,6 +673,9 @@ FAULTS: Final[dict[str, FaultKind]] = {
     ),
     "emergency": FaultKind(
         "somebody stops a robot", ("robot",), _emergency, on=ON_DRIVING, weight=3.0
+    ),
+    "emergency-button": FaultKind(
+        "somebody presses the button at a robot", ("robot",), _button, on=ON_DRIVING
     ),
     "revocation": FaultKind(
         "the DVA ends a permission", ("robot",), _revoke, on=DRIVEN, weight=2.0
@@ -660,6 +720,12 @@ FAULTS: Final[dict[str, FaultKind]] = {
     ),
     "event-doubled": FaultKind(
         "one event is reported so many times", ("",), _report_twice, value=(2.0, 6.0)
+    ),
+    "event-taken-back": FaultKind(
+        "an event is taken back so many seconds after it was reported",
+        ("",),
+        _take_back,
+        value=(0.5, 40.0),
     ),
     "events-by-the-hundred": FaultKind(
         "so many events are reported at once", ("",), _report, value=(100.0, 1000.0), weight=0.1

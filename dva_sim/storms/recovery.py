@@ -1,13 +1,14 @@
 """S8: when faults cease, everything recovers within a stated time, shown by doing it.
 
 Some time after the last fault somebody new does what anybody could do before: reports an event,
-asks for each robot in turn, drives it and stops it by an emergency. What does not succeed has not
-recovered. Nobody is asked how it is.
+asks for each robot in turn, drives it, stops it by an emergency, sends it out and calls it back;
+and the DVA lists everybody, for a while. What does not succeed has not recovered. Nobody is asked
+how it is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from dva_sim.kernel.recorder import Accepted, Recorder
 from dva_sim.protocol import messages as m
@@ -20,6 +21,8 @@ from dva_sim.storms.plan import PROBES_LAST, RECOVERS_WITHIN
 AGAIN = 1.0  # between two attempts of a probe [s]
 USED_LATELY = 30.0  # a robot that obeyed somebody so lately needs no probe [s]
 STANDS_AFTER = 5.0  # an emergency was answered [s]
+LISTED = 30  # times without a break that the DVA has to list everybody, a second apart
+LIST = "the list"
 BYSTANDER = NUMBER + 50
 
 
@@ -46,19 +49,25 @@ class RecoveryProbes:
         self._open: dict[str, str] = {}
         self._used: dict[str, float] = {}
         self._session: dict[str, int] = {}
+        self._missing, self._listed = set[str](), 0
+        self._place = m.Position(0.0, 0.0)
 
-    def begin(self, robots: Sequence[str], place: m.Position) -> None:
+    def begin(self, robots: Sequence[str], others: Iterable[str], place: m.Position) -> None:
         """Begin to probe, once the time for recovery has passed.
 
         Args:
             robots: Ids of the robots that have power.
-            place: Where an event is reported.
+            others: Ids of the guards and operators.
+            place: Where an event is reported, and where robots are sent.
         """
+        self._place = place
         self._open = dict.fromkeys(robots, "gives nobody the robot")
         self._open[DVA] = "takes no report"
+        self._open[LIST] = "does not list everybody"
         self._clock.call_at(self._calm, self._probe.device.register)
         begins = self._calm + RECOVERS_WITHIN
         self._clock.call_at(begins, self._report, place)
+        self._clock.call_at(begins, self._list, frozenset((*robots, *others)))
         for robot in robots:
             self._clock.call_at(begins, self._ask_for, robot)
 
@@ -77,10 +86,32 @@ class RecoveryProbes:
 
     def end(self) -> None:
         """Tell what has not recovered."""
-        for robot, what in self._open.items():
-            after = RECOVERS_WITHIN + PROBES_LAST
-            text = f"{what} {after:.0f} s after the last fault"
-            self._recorder.violated("S8", self._clock.now, self._stage.labels[robot], text)
+        after = f"{RECOVERS_WITHIN + PROBES_LAST:.0f} s after the last fault"
+        for who, what in self._open.items():
+            label = self._stage.labels[DVA if who == LIST else who]
+            missing = ", ".join(sorted(self._missing)) if who == LIST else ""
+            text = f"{what} {after}{missing and ', such as '}{missing}"
+            self._recorder.violated("S8", self._clock.now, label, text)
+
+    def _list(self, expected: frozenset[str]) -> None:
+        """Have everybody listed often enough without a break."""
+
+        def again() -> None:
+            self._clock.call_after(AGAIN, self._list, expected)
+
+        def answered(reply: m.Reply) -> None:
+            if not isinstance(reply.content, m.DeviceList):
+                again()
+                return
+            missing = expected - {device.id_tag for device in reply.content.devices}
+            self._missing |= {self._stage.labels[device] for device in missing}
+            self._listed = 0 if missing else self._listed + 1
+            if self._listed == LISTED:
+                del self._open[LIST]
+            else:
+                again()
+
+        self._probe.ask(DVA, m.GetDeviceList(), answered, again)
 
     def _report(self, place: m.Position) -> None:
         def answered(reply: m.Reply) -> None:
@@ -113,7 +144,7 @@ class RecoveryProbes:
             else:
                 again()
 
-        self._probe.ask(DVA, m.PermissionRequest(robot, "teleoperation"), answered, again)
+        self._probe.ask(DVA, m.PermissionRequest(robot, "both"), answered, again)
 
     def _start(self, robot: str, session: int) -> None:
         def again(*_: object) -> None:
@@ -155,6 +186,32 @@ class RecoveryProbes:
 
     def _look(self, robot: str) -> None:
         if abs(self._motion_of(robot).speed) < MOVING:
+            self._open[robot] = "does not go where it is sent"
+            self._send_out(robot)
+
+    def _send_out(self, robot: str) -> None:
+        """Send a robot on a mission, and call it back; a permission that was lost is asked for."""
+        session = self._session[robot]
+
+        def again(*_: object) -> None:
+            self._clock.call_after(AGAIN, self._send_out, robot)
+
+        def called_back(reply: m.Reply) -> None:
+            if reply.code != m.OK:
+                again()
+                return
             self._open.pop(robot, None)
-            held = m.PermissionRevocation(robot, self._probe.device.id_tag, self._session[robot])
+            held = m.PermissionRevocation(robot, self._probe.device.id_tag, session)
             self._probe.ask(DVA, held)
+
+        def answered(reply: m.Reply) -> None:
+            if reply.code in (m.NOT_PERMITTED, m.BAD_SESSION):
+                self._open[robot] = "gives nobody the robot"
+                self._ask_for(robot)
+            elif reply.code == m.OK:
+                self._open[robot] = "does not come back when it is called"
+                self._probe.ask(robot, m.CancelMission(), called_back, again, session)
+            else:
+                again()
+
+        self._probe.ask(robot, m.GoTo((self._place,)), answered, again, session)

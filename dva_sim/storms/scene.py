@@ -21,13 +21,14 @@ from dva_sim.protocol.codec import decode
 from dva_sim.protocol.exchange import NOON
 from dva_sim.protocol.messages import PermissionGrant, Position
 from dva_sim.simulation.full.run import Run, Watched
-from dva_sim.simulation.full.stage import DVA
+from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.storms.drivers import BusyDriver
 from dva_sim.storms.dva_lives import DvaLives
 from dva_sim.storms.interference import Interference, PassingMessage
-from dva_sim.storms.intruder import Intruder
+from dva_sim.storms.intruder import NUMBER, Intruder
 from dva_sim.storms.plan import StormPlan
 
+FLOODER = NUMBER + 1  # holds nothing, ever
 FITS = 0.8  # around a place to which robots are sent [m]
 
 
@@ -51,8 +52,11 @@ class StormScene:
         recorder: What happened.
         interference: What reaches whom.
         intruder: Does what no honest device does.
+        flooder: Sends more than anybody can take, and is given nothing.
         dva: Kills and restarts the DVA.
         robots: All robots.
+        guards: Ids of the guards.
+        operators: Ids of the operators of the scenario.
         drivers: Those who always drive, by label.
         labelled: Ids by label.
     """
@@ -69,22 +73,30 @@ class StormScene:
         self.robots = [
             StormRobot(i, r, RobotFaults(r, self._lost)) for i, r in run.field.robots.items()
         ]
+        self.guards = self._ids("guard", run.scenario.guard.count)
+        self.operators = self._ids("operator", run.scenario.operator.count)
         self.drivers = {each.device.label: each for each in self._make_drivers()}
         self.labelled = {label: id_tag for id_tag, label in run.stage.labels.items()}
         self.interference = Interference(clock, self.arrives)
         assert isinstance(run.network, VirtualNetwork)
         run.network.interference = self.interference
         self.intruder = Intruder(run.stage)
+        self.flooder = Intruder(run.stage, FLOODER, "intruder-2")
         self._sessions: dict[str, list[int]] = {}
 
     def _make_drivers(self) -> Iterator[BusyDriver]:
         stage, robots = self.run.stage, [robot.id for robot in self.robots]
+        sensors = tuple(sorted(self.robots[0].agent.sensors))
         for number in range(1, self.plan.drivers + 1):
             chance = random.Random(f"{self.plan.seed} driver {number}")
             place = partial(self.free_place, chance)
-            driver = BusyDriver(stage, number, robots, chance=chance, place=place)
+            driver = BusyDriver(stage, number, robots, sensors=sensors, chance=chance, place=place)
             driver.start(self.plan.calm_s)
             yield driver
+
+    @staticmethod
+    def _ids(kind: str, count: int) -> list[str]:
+        return [id_of(kind, number) for number in range(1, count + 1)]
 
     def arrives(self, passing: PassingMessage) -> None:
         """Let a message reach its receiver."""

@@ -15,19 +15,21 @@ from typing import Any
 
 from typing_extensions import override
 
+from dva_sim.agents.robot.command_queue import EACH
 from dva_sim.kernel.recorder import Accepted, Breach
 from dva_sim.simulation.full.observations import RobotMotion, motion_of
 from dva_sim.simulation.full.physical_world import PHYSICS_TICK
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.storms.answers import AnswerWatch
-from dva_sim.storms.bounds import oversized
+from dva_sim.storms.bounds import is_waiting, oversized, waiting_of
 from dva_sim.storms.faults import FAULTS
 from dva_sim.storms.interference import PassingMessage
 from dva_sim.storms.plan import Fault, StormPlan
 from dva_sim.storms.recovery import RecoveryProbes
+from dva_sim.storms.refused_drivers import RefusedDrivers
 from dva_sim.storms.scene import StormScene
 
-LOOK_AT_BOUNDS = 60.0  # how often all containers are counted [s]
+LOOK_AT_BOUNDS = 10.0  # how often all containers are counted [s]
 QUIET = b"<HBMsg>", b"<RobotStatus>"  # of messages that only say that somebody is there
 SILENCED = frozenset(
     {"robot-hangs", "robot-without-power", "robot-restarts", "replies-lost", "vanishes"}
@@ -87,9 +89,15 @@ class Storm(StormScene):
     def __init__(self, plan: StormPlan, folder: Path) -> None:
         super().__init__(plan, folder)
         run, clock = self.run, self.run.clock
-        nodes = {DVA: "dva"} | {robot.id: robot.agent.device.label for robot in self.robots}
-        self._answers = AnswerWatch(self.recorder, lambda: clock.now, nodes, self.answered)
+        labels = run.stage.labels
+        people = *self.guards, *self.operators
+        nodes = {node: labels[node] for node in (DVA, *(r.id for r in self.robots), *people)}
+        self._refused = RefusedDrivers(self.recorder, labels, frozenset(self.operators))
+        self._answers = AnswerWatch(
+            self.recorder, lambda: clock.now, nodes, self.answered, self._waits
+        )
         run.network.taps |= {node: self._answers.tap(node) for node in nodes}
+        self._nodes = frozenset(nodes)
         self._recovery = RecoveryProbes(run.stage, self.recorder, self._motion, plan.calm_s)
         self._digest = hashlib.blake2b(digest_size=12)
         self.begun: Counter[str] = Counter()
@@ -97,9 +105,11 @@ class Storm(StormScene):
         clock.every(PHYSICS_TICK, run.show_motions)
         clock.every(1.0, self._answers.look)
         clock.every(LOOK_AT_BOUNDS, self._look_at_bounds)
+        clock.every(1.0, self._look_at_queues)
         for fault in plan.faults:
             clock.call_at(fault.at_s, self._await, fault)
-        self._recovery.begin([robot.id for robot in self.robots], self.anywhere(_chance(plan)))
+        robots, others = [robot.id for robot in self.robots], (*self.guards, *self.operators)
+        self._recovery.begin(robots, others, self.free_place(_chance(plan)))
 
     def play(self, enough: Callable[[], bool] = lambda: False) -> StormOutcome:
         """Let the storm pass, and judge it.
@@ -159,13 +169,14 @@ class Storm(StormScene):
             self.run.clock.call_after(fault.for_s + 1.0, self._excuse, node, False)
 
     def _excuse(self, node: str, excused: bool) -> None:
-        for each in (node,) if node else (DVA, *(robot.id for robot in self.robots)):
+        for each in (node,) if node else self._nodes:
             self._answers.excuse(each, excused)
 
     # --- what is seen --------------------------------------------------------------------------
 
     @override
     def arrives(self, passing: PassingMessage) -> None:
+        self._refused.arrives(self.now, passing)
         self._answers.watch(passing)
         if passing.to == DVA and not any(quiet in passing.payload for quiet in QUIET):
             self.run.show_page()
@@ -179,15 +190,31 @@ class Storm(StormScene):
         return motion_of(self.run.field.robots[robot])
 
     def _look_at_bounds(self) -> None:
-        agents = [self.run.dva, *(robot.agent for robot in self.robots)]
-        for name, held, bound in oversized(agents):
+        robots = [robot.agent for robot in self.robots]
+        team = {*self.guards, *self.operators}
+        others = [device for device in self.run.stage.devices if device.id_tag in team]
+        events = self.run.dva.desk.book.total
+        for name, held, bound in oversized([self.run.dva, *robots, *others], events):
             what = f"{name} holds {held}, more than {bound}"
             self.recorder.violated("S10", self.now, "dva" if "Dva" in name else "robots", what)
+
+    def _waits(self, node: str, data: bytes) -> bool:
+        inboxes = (robot.agent.inbox for robot in self.robots if robot.id == node)
+        return any(is_waiting(inbox, data) for inbox in inboxes)
+
+    def _look_at_queues(self) -> None:
+        stranger = self.flooder.device.id_tag
+        for robot in self.robots:
+            waits = waiting_of(robot.agent.inbox, stranger)
+            if waits > EACH:
+                what = f"lets {waits} messages of a stranger wait, more than {EACH}"
+                self.recorder.violated("S10", self.now, robot.agent.device.label, what)
 
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:
         """Note what was sent."""
         if not isinstance(payload, bytes):
             return
+        self._refused.sent(now, source, to, payload)
         self._digest.update(f"{now:.6f} {source} {to} ".encode() + payload)
         self.note_session(source, to, payload)
 

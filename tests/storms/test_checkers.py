@@ -6,16 +6,23 @@ from types import SimpleNamespace
 import pytest
 from storms.test_storms import SMALL
 
+from dva_sim.core.handovers import STOP_WITHIN
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.messaging import Request
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import encode
+from dva_sim.simulation.full.observations import Right
+from dva_sim.simulation.full.stage import DVA
+from dva_sim.simulation.full.takeovers import Takeovers
 from dva_sim.storms.answers import ANSWERED_WITHIN, AnswerWatch
 from dva_sim.storms.bounds import MOST, oversized
 from dva_sim.storms.interference import PassingMessage
 from dva_sim.storms.plan import StormPlan
+from dva_sim.storms.refused_drivers import RefusedDrivers
 from dva_sim.storms.storm import Storm, play
 
-ROBOT = "02:00:00:01:00:01"
+ROBOT, DRIVER, OTHER = "02:00:00:01:00:01", "02:00:00:03:00:01", "02:00:00:03:00:02"
+MESSAGE = encode(m.Message(ROBOT, 1, DRIVER, "12:00:00", 1, m.GetMissionStatus()))
 
 
 class Asked:
@@ -30,7 +37,11 @@ class Asked:
     def ask(self, service):
         """The robot gets a request, and its service does something with it."""
         tap = self.answers.tap(ROBOT)
-        tap.serve(service, Request(b"<msg/>", lambda _: None, peer="somebody"))
+
+        def take(data):
+            tap.serve(service, Request(data, lambda _: None, peer="somebody"))
+
+        self.answers.watch(PassingMessage("somebody", ROBOT, MESSAGE, take))
 
     def after(self, seconds):
         """The rules that are broken when some time has passed."""
@@ -73,6 +84,18 @@ def test_nothing_is_expected_of_a_robot_that_is_down():
     assert asked.after(ANSWERED_WITHIN + 1) == set()
 
 
+def test_a_refusal_that_is_answered_excuses_nothing():
+    asked = Asked()
+    asked.ask(lambda request: None)
+
+    def refuse(request):
+        count(asked)
+        request.answer(b"")
+
+    asked.ask(refuse)
+    assert asked.after(ANSWERED_WITHIN + 1) == {"S11"}
+
+
 @pytest.mark.parametrize(("counted", "broken"), [(True, set()), (False, {"S11"})])
 def test_what_is_no_message_has_to_be_counted_or_answered(counted, broken):
     asked = Asked()
@@ -95,6 +118,50 @@ Hoard.__module__ = "dva_sim.made_up"
 @pytest.mark.parametrize(("many", "found"), [(MOST, []), (MOST + 1, ["Hoard.kept[]"])])
 def test_a_container_beyond_its_bound_is_found(many, found):
     assert [name for name, *_ in oversized([Hoard(many)])] == found
+
+
+# --- S2 and S5: robots that change hands, drivers who go on --------------------------------------
+
+
+def asked_for(takeover):
+    return m.Message(DVA, 7, OTHER, "12:00:00", 0, m.PermissionRequest(ROBOT, "both", (), takeover))
+
+
+@pytest.mark.parametrize(
+    ("takeover", "after", "found"),
+    [("force", 5.0, [(OTHER, 1)]), ("force", STOP_WITHIN + 1, []), ("ask", 5.0, [])],
+)
+def test_a_robot_that_was_stopped_for_somebody_is_noticed_when_it_is_given(takeover, after, found):
+    watch = Takeovers()
+    assert list(watch.given([Right(ROBOT, DRIVER, 1)], 0.0, True)) == []
+    watch.hears(OTHER, asked_for(takeover))
+    watch.says(OTHER, m.Reply(7, m.BUSY, ""), 1.0)
+    assert list(watch.given([], 2.0, True)) == []
+    given = list(watch.given([Right(ROBOT, OTHER, 2)], after, True))
+    assert [(right.holder, session) for right, session in given] == found
+
+
+@pytest.mark.parametrize(
+    ("refusals", "after", "again", "broken"),
+    [
+        (3, 30.0, False, {"S5"}),
+        (3, 10.0, False, set()),
+        (2, 30.0, False, set()),
+        (3, 30.0, 1, set()),
+    ],
+)
+def test_a_driver_who_goes_on_though_it_is_refused_breaks_s5(refusals, after, again, broken):
+    recorder = Recorder(False)
+    watch = RefusedDrivers(recorder, {ROBOT: "robot-1", DRIVER: "operator-1"}, {DRIVER})
+    no = encode(m.Message(DRIVER, 1, ROBOT, "12:00:00", 1, m.Reply(1, m.BAD_SESSION, "")))
+    for second in range(refusals):
+        watch.arrives(second, PassingMessage(ROBOT, DRIVER, no, None))
+    if again:
+        start = encode(m.Message(ROBOT, 8, DRIVER, "12:00:00", 2, m.StartTeleOp()))
+        watch.sent(after - 1.0, DRIVER, ROBOT, start)
+    command = encode(m.Message(ROBOT, 9, DRIVER, "12:00:00", 1, m.SetTeleOp(0.1, 0.0)))
+    watch.sent(after, DRIVER, ROBOT, command)
+    assert set(recorder.violations) == broken
 
 
 # --- S8: robots and a DVA that do not recover ------------------------------------------------
