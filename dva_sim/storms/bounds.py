@@ -39,6 +39,10 @@ KEPT_FOR_MEASURES: Final = frozenset({"DvaAgent.events", "DvaAgent.facts"})
 """What a run keeps of everything, to measure it afterwards; a DVA that lasts keeps none of it."""
 _ATOMS: Final = (str, bytes, int, float, complex, bool, type(None), type, ModuleType, FunctionType)
 _NOT_THEIRS: Final = (Recorder, Clock)
+_SHARED: Final = tuple(
+    f"dva_sim.{room}." for room in ("storms", "worlds", "kernel", "simulation.scenario")
+)
+"""Modules of what no agent fills: checkers, the world, the scenario."""
 
 
 def waiting_of(inbox: CommandQueue, peer: str) -> int:
@@ -79,7 +83,7 @@ def oversized(roots: Iterable[object], events: int = 0) -> Iterator[tuple[str, i
             todo += [(f"{name}[]", value) for value in inner if not isinstance(value, _ATOMS)]
         elif isinstance(each, MethodType):
             continue
-        elif type(each).__module__.startswith("dva_sim.") and not _is_ours(each):
+        elif _is_theirs(each):
             todo += [(f"{type(each).__name__}.{key}", v) for key, v in _attributes(each)]
 
 
@@ -91,5 +95,6 @@ def _attributes(each: object) -> Iterator[tuple[str, Any]]:
                 yield slot, getattr(each, slot)
 
 
-def _is_ours(each: object) -> bool:
-    return type(each).__module__.startswith("dva_sim.storms.")
+def _is_theirs(each: object) -> bool:
+    module = type(each).__module__
+    return module.startswith("dva_sim.") and not module.startswith(_SHARED)

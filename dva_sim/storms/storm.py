@@ -29,7 +29,7 @@ from dva_sim.storms.recovery import RecoveryProbes
 from dva_sim.storms.refused_drivers import RefusedDrivers
 from dva_sim.storms.scene import StormScene
 
-LOOK_AT_BOUNDS = 10.0  # how often all containers are counted [s]
+LOOK_AT_BOUNDS = 30.0  # how often all containers are counted [s]
 QUIET = b"<HBMsg>", b"<RobotStatus>"  # of messages that only say that somebody is there
 SILENCED = frozenset(
     {"robot-hangs", "robot-without-power", "robot-restarts", "replies-lost", "vanishes"}

@@ -70,6 +70,7 @@ class Seen(NamedTuple):
         waits: Since when it has waited for somebody who takes it up.
         times: Time of each step, as the book has it.
         debt: What who has it in hand owes.
+        is_over: True if it is closed, and nothing happens to it any more.
     """
 
     found: frozenset[str]
@@ -78,6 +79,7 @@ class Seen(NamedTuple):
     waits: float
     times: Mapping[str, float] = MappingProxyType({})
     debt: Debt = Debt(None, False, 0.0)
+    is_over: bool = False
 
 
 @dataclass
@@ -321,7 +323,11 @@ class EventLedger:
         every = (*book.open.values(), *book.closed.values())
         seen, self._seen = self._seen, {}
         for event in every:
-            yield from self._of_event(event, seen.get(event.number), now, last)
+            old = seen.get(event.number)
+            if old is not None and old.is_over and not event.open and old.times == event.times:
+                self._seen[event.number] = old
+            else:
+                yield from self._of_event(event, old, now, last)
 
     def _forget_unpromised(self, book: EventBook) -> None:
         """Forget events of which nobody was told that they are known, if a restart has lost them.
@@ -443,7 +449,7 @@ class EventLedger:
         since = old.since if hands == old.hands and not word.anew else now
         word.busy = word.anew = False
         debt = self._debt(event, hands, old.debt, now)
-        return Seen(found, hands, since, waits, dict(event.times), debt)
+        return Seen(found, hands, since, waits, dict(event.times), debt, not event.open)
 
     def _debt(self, event: Event, hands: tuple[str | None, ...], old: Debt, now: float) -> Debt:
         """What who has an event in hand owes; who has several orders may begin with any."""
