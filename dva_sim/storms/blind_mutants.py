@@ -109,14 +109,14 @@ def _confirmed_on_arrival(original: Original, bug: Bug) -> Original:
     return wrong
 
 
-def _remembers_wishes(original: Original, bug: Bug) -> Original:
-    """The DVA keeps each wish for a robot for ever."""
+def _remembers_requests(original: Original, bug: Bug) -> Original:
+    """The DVA keeps each request for ever."""
 
     def wrong(self: Any, *args: Any) -> Any:
-        wishes = vars(self).setdefault("wishes", [])
-        wishes.append(args)
-        if len(wishes) > LEAKED:
-            bug.act(f"the DVA keeps {len(wishes)} wishes")
+        kept = vars(self).setdefault("kept", [])
+        kept.append(args)
+        if len(kept) > LEAKED:
+            bug.act(f"the DVA keeps {len(kept)} requests")
         return original(self, *args)
 
     return wrong
@@ -247,11 +247,8 @@ WRITTEN_BLIND: Final[dict[str, Mutant]] = {
         "dva_sim.agents.operator.operator:OperatorAgent._be_free",
         skipped(lambda self, drive: drive.log.outcome in BY_DVA),
     ),
-    "wishes-kept": Mutant(
-        "S10",
-        "the DVA keeps each wish for a robot",
-        "dva_sim.core.dva:Dva._permitted",
-        _remembers_wishes,
+    "requests-kept": Mutant(
+        "S10", "the DVA keeps each request", "dva_sim.core.dva:Dva.handle", _remembers_requests
     ),
     "unknown-unanswered": Mutant(
         "S11",
