@@ -27,9 +27,9 @@ PROFILES: Final[dict[str, tuple[str, ...]]] = {
         if kind.startswith(("robot", "dva", "disk", "frozen", "clock", "vanishes", "replies"))
     ),
     "people": (
-        *("revocation", "take-over", "emergency", "asks-twice", "old-session", "held-tilt"),
-        *("second-driver", "flood", "taken-by-hand", "vanishes", "replay-by-another"),
-        *("guard-idle", "app-restarts", "order-again", "emergency-button"),
+        *("revocation", "take-over", "emergency", "emergency-button", "asks-twice", "old-session"),
+        *("held-tilt", "second-driver", "flood", "flood-in-doubt", "taken-by-hand", "vanishes"),
+        *("replay-by-another", "order-again", "guard-idle", "app-restarts"),
     ),
     "none": (),
 }

@@ -28,7 +28,9 @@ KEPT = 40.0  # a robot that is held and not driven: longer than a lease lasts [s
 LOST: Final = m.NOT_PERMITTED, m.BAD_SESSION
 LEVELS: Final = "teleoperation", "teleoperation", "both", "both", "missions"
 TAKEOVERS: Final[tuple[str | None, ...]] = (None, None, "ask", "force")
-INSISTS: Final = 40.0  # on a robot that somebody else has: longer than it is stopped and kept [s]
+INSISTS: Final = 2.0, 40.0, 40.0
+"""How long somebody insists on a robot that another has: longer than it is stopped and kept, or
+until something else comes to mind [s]."""
 
 
 class BusyDriver:
@@ -109,7 +111,7 @@ class BusyDriver:
 
         def answered(reply: m.Reply) -> None:
             if reply.code == m.BUSY and self._takeover and self._insists <= self._clock.now:
-                self._insists = self._clock.now + INSISTS
+                self._insists = self._clock.now + self._chance.choice(INSISTS)
             if not isinstance(reply.content, m.Permission):
                 return
             session = reply.content.session

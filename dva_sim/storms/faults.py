@@ -447,6 +447,27 @@ def _flood(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     return lambda: goes.__setitem__(0, False)
 
 
+def _flood_in_doubt(storm: StormScene, fault: Fault, chance: random.Random) -> End:
+    """An intruder orders a robot about so many times a second, and the DVA does not hear of it."""
+    robot, goes, rules = storm.id_of(fault.target), [True], storm.interference.rules
+
+    def meets(passing: i.PassingMessage) -> bool:
+        storm.interference.counts[fault.kind] += passing[:2] == (robot, DVA)
+        return passing[:2] == (robot, DVA)
+
+    def send() -> bool:
+        storm.flooder.send_message(robot, m.StartTeleOp(), chance.randrange(2**40))
+        return goes[0]
+
+    def ends() -> None:
+        goes[0] = False
+        rules.remove(meets)
+
+    rules.append(meets)
+    storm.run.clock.every(1.0 / fault.value, send)
+    return ends
+
+
 # --- events ------------------------------------------------------------------------------
 
 
@@ -550,9 +571,9 @@ FAULTS: Final[dict[str, FaultKind]] = {
         "the last orders to a robot arrive again, so many seconds after it was to stop",
         ("robot",),
         _order_again,
-        value=(1.0, 20.0),
+        value=(1.0, 8.0),
         on=("StopTeleOp", "CancelMission"),
-        weight=2.0,
+        weight=3.0,
     ),
     "replay-by-another": FaultKind(
         "an intruder sends so many of the last messages again",
@@ -711,6 +732,13 @@ FAULTS: Final[dict[str, FaultKind]] = {
         _flood,
         lasts=_SHORT,
         value=(20.0, 200.0),
+    ),
+    "flood-in-doubt": FaultKind(
+        "an intruder sends so many orders a second to a robot that the DVA does not hear",
+        ("robot",),
+        _flood_in_doubt,
+        lasts=(3.0, 10.0),
+        value=(50.0, 200.0),
     ),
     "event-anywhere": FaultKind(
         "so many events are reported, in walls and elsewhere",
