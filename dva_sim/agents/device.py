@@ -68,6 +68,8 @@ class AgentDevice:
         labels: Names of all devices by id, for the timeline.
         time_of_day: When the run starts [s since midnight], and whether timestamps are exact.
         silent: Whether it sends nothing at all, as it has no power.
+        withdrawn: Whether it publishes nothing and lets its registration lapse, so that the DVA
+            counts it as silent and sends nobody to it; it answers as before.
         meanwhile: What it does while the DVA is silent, in words.
         dva_watch: Whether the DVA is there.
     """
@@ -86,6 +88,7 @@ class AgentDevice:
     labels: dict[str, str] = field(default_factory=dict)
     time_of_day: tuple[float, bool] = (NOON, False)
     silent: bool = False
+    withdrawn: bool = False
     meanwhile: str = ""
     dva_watch: DvaWatch = field(default_factory=DvaWatch)
     clock: Clock = field(init=False)
@@ -184,6 +187,9 @@ class AgentDevice:
         def failed() -> None:
             self.clock.call_after(REGISTER_AGAIN, self._register, then, life)
 
+        if self.withdrawn:
+            failed()
+            return
         self.ask(self.dva, self._registration, answered, failed)
 
     @property
@@ -437,7 +443,7 @@ class AgentDevice:
 
     def publish(self, topic: str, body: m.Body) -> None:
         """Publish a message to whoever has subscribed."""
-        if self.silent:
+        if self.silent or self.withdrawn:
             return
         data = encode(self.outbox.message(self.dva, body, self.clock.now))
         self.network.publish(self.id_tag, topic, data, len(data))

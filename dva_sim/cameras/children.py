@@ -17,7 +17,9 @@ SERVING_WITHIN = 30.0  # from the start of the web process to its first word [s]
 END_WITHIN = 0.8  # for a child to end by itself once it is asked to [s]
 MOST_SAID = 10_000  # of what a child says on standard error [B]
 # Lines for the process that draws pictures.
-PAINTED = LineKinds(newest=frozenset({"frame"}), kept=frozenset({"scene", "contain"}))
+PAINTED = LineKinds(
+    newest=frozenset({"frame", "picture"}), kept=frozenset({"scene", "contain", "ready"})
+)
 
 
 class ChildFailed(RunsFailed):

@@ -39,7 +39,25 @@ class FrameLine(TypedDict):
     figures: list[list[Any]]
 
 
-PaintersLine: TypeAlias = DrawnSceneLine | ContainedLine | FrameLine
+class PictureLine(TypedDict):
+    """A picture that a real camera has taken; `jpeg` is base64."""
+
+    k: Literal["picture"]
+    t: int
+    robot: int
+    number: int
+    captured_ms: int
+    jpeg: str
+
+
+class ReadyLine(TypedDict):
+    """All pictures are real: nothing has to be built before the first one."""
+
+    k: Literal["ready"]
+    t: int
+
+
+PaintersLine: TypeAlias = DrawnSceneLine | ContainedLine | FrameLine | PictureLine | ReadyLine
 
 
 class Show(Protocol):

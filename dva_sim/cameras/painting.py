@@ -7,6 +7,7 @@ for nobody: a frame or a picture for which there is no time is dropped and count
 
 from __future__ import annotations
 
+import base64
 import select
 import time
 from typing import Any
@@ -35,6 +36,7 @@ class Painter:
 
     def __init__(self) -> None:
         self._eyes: Eyes | None = None
+        self._only_passes = False
         self._frames: dict[int, Line] = {}
         self._due: dict[int, float] = {}
         self._watched: frozenset[int] = frozenset()
@@ -42,8 +44,8 @@ class Painter:
 
     @property
     def is_ready(self) -> bool:
-        """True once the site is built, which takes seconds."""
-        return self._eyes is not None
+        """True once the site is built, which takes seconds, or where nothing has to be drawn."""
+        return self._eyes is not None or self._only_passes
 
     def hear(self, line: Line) -> None:
         """Take a line from either end."""
@@ -54,7 +56,9 @@ class Painter:
             self._eyes = Eyes(line["scenario"], line["seed"])
         elif kind == "contain" and self._eyes is not None:
             self._eyes.contain(line["n"], line["t"] / 1000)
-        elif kind == "frame" and line["robot"] in self._watched:
+        elif kind == "ready":
+            self._only_passes = True
+        elif kind in ("frame", "picture") and line["robot"] in self._watched:
             self.dropped += self._frames.pop(line["robot"], None) is not None
             self._frames[line["robot"]] = line
 
@@ -71,15 +75,23 @@ class Painter:
     def draw(self, now: float) -> Picture | None:
         """Draw the picture that has waited longest, if one is due at `now` [s]."""
         ready = [robot for robot in self._frames if self._due.get(robot, now) <= now]
-        if self._eyes is None or not ready:
+        if not self.is_ready or not ready:
             return None
         robot = min(ready, key=lambda robot: self._due.get(robot, 0.0))
         frame = self._frames.pop(robot)
-        self._due[robot] = now + 1.0 / max(LEAST_RATE, RATE_ROOM * self._eyes.rate)
+        rate = 0.0 if self._eyes is None else self._eyes.rate
+        self._due[robot] = now + 1.0 / max(LEAST_RATE, RATE_ROOM * rate)
         self.drawn += 1
-        jpeg = self._eyes.jpeg(frame)
+        jpeg = self._jpeg(frame)
         captured, arrived = round(frame["captured_ms"]), round(frame["t"])
         return Picture(robot, frame["number"], captured, arrived, jpeg)
+
+    def _jpeg(self, frame: Line) -> bytes:
+        """Return the picture of a frame: as a real camera has taken it, or drawn."""
+        if "jpeg" in frame:
+            return base64.b64decode(frame["jpeg"])
+        assert self._eyes is not None
+        return self._eyes.jpeg(frame)
 
 
 def run(world: PipeEnd, web: PipeEnd) -> Painter:

@@ -7,12 +7,15 @@ delays the run.
 
 from __future__ import annotations
 
+import base64
 import json
 import time
 from collections.abc import Callable
 
+from typing_extensions import override
+
 from dva_sim.cameras.children import END_WITHIN, PAINTED, Child
-from dva_sim.cameras.lines import FrameLine, contained_line, scene_line
+from dva_sim.cameras.lines import FrameLine, PictureLine, contained_line, scene_line
 from dva_sim.cameras.screens import FilmedRun, OwnScreens, camera_url
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.realtime import LiveClock
@@ -50,6 +53,7 @@ class CameraService:
         shown = f"[{host}]" if ":" in host else host
         self.base = f"http://{shown}:{self._listener.getsockname()[1]}/"
         self._run: FilmedRun | None = None
+        self._labels: list[str] = []
         self._child: Child | None = None
         self._numbers = _Numbers()
         self._contained: set[int] = set()
@@ -65,21 +69,34 @@ class CameraService:
         for id_tag in run.field.robots:
             self._numbers[id_tag]  # robots come first, in the order of their labels
         self._screens = OwnScreens(run, "", self._numbers, self._show)
-        self._clock.watch(self._listener.fileno(), self._begin)
         self._clock.every(1.0 / run.scenario.camera.rate_hz, self._look)
+        self._await_viewers()
+
+    def _await_viewers(self) -> None:
+        self._clock.watch(self._listener.fileno(), self._begin)
         self._tell(f"shows pictures of the robots at {camera_url(self.base, 'LABEL')}")
 
     def _begin(self) -> None:
         """Start the process that draws and serves; it accepts the first viewer."""
-        assert self._run is not None
         self._clock.unwatch(self._listener.fileno())
         words = ["--listen-fd", str(self._listener.fileno()), "--labels", json.dumps(self._labels)]
         child = self._child = Child("camera process", MODULE, words, [self._listener], PAINTED)
         self._clock.watch(child.pipe.fileno(), self._hear)
+        self._greet(child)
+        self._clock.every(FLUSH, lambda: self._flush(child))
+
+    def _greet(self, child: Child) -> None:
+        """Send what the process has to know before the first picture."""
+        assert self._run is not None
         scenario = self._run.scenario.model_dump(mode="json")
         child.pipe.put(scene_line(scenario, self._seed))
         self._contained.clear()
-        self._clock.every(FLUSH, lambda: self._flush(child))
+
+    def _watch(self, numbers: list[int]) -> None:
+        """Film the robots that are watched, by their numbers."""
+        assert self._run is not None
+        ids = list(self._run.field.robots)
+        self._screens.watch({ids[n] for n in numbers if 0 <= n < len(ids)})
 
     def _flush(self, child: Child) -> bool:
         child.pipe.flush()
@@ -90,12 +107,11 @@ class CameraService:
         assert self._child is not None
         pipe = self._child.pipe
         for line in pipe.lines():
-            if self._run is not None and "watch" in line:
-                ids = list(self._run.field.robots)
-                self._screens.watch({ids[n] for n in line["watch"] if 0 <= n < len(ids)})
+            if "watch" in line:
+                self._watch(line["watch"])
         if not pipe.is_open:
             self._clock.unwatch(pipe.fileno())
-            self._screens.watch(set())
+            self._watch([])
             self._tell(f"shows no pictures for {AGAIN_AFTER:g} s: {self._child.why()}")
             self._end()
             self._clock.call_after(AGAIN_AFTER, self._wait_again)
@@ -132,6 +148,38 @@ class CameraService:
             self._clock.unwatch(self._listener.fileno())
         self._end()
         self._listener.close()
+
+
+class PictureService(CameraService):
+    """Serves the pictures that a real camera has taken, as they are."""
+
+    def serve(self, label: str) -> None:
+        """Serve the camera of one robot from now on."""
+        self._labels, self._number, self._is_watched = [label], 0, False
+        self._await_viewers()
+
+    def show(self, jpeg: bytes) -> None:
+        """Pass a picture to whoever looks; without viewers it goes nowhere."""
+        self._number += 1
+        if self._child is not None and self._is_watched:
+            now = round(1000 * self._clock.now)
+            line: PictureLine = {
+                "k": "picture",
+                "t": now,
+                "robot": 0,
+                "number": self._number,
+                "captured_ms": now,
+                "jpeg": base64.b64encode(jpeg).decode(),
+            }
+            self._child.pipe.put(line, 0)
+
+    @override
+    def _greet(self, child: Child) -> None:
+        child.pipe.put({"k": "ready", "t": 0})
+
+    @override
+    def _watch(self, numbers: list[int]) -> None:
+        self._is_watched = bool(numbers)
 
 
 class _Numbers(dict[str, int]):

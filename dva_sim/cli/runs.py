@@ -317,7 +317,7 @@ def console(
 
 
 @asks(
-    profile=(argument("A robot by name or path.", "PROFILE", ROBOTS), "servrobot"),
+    profile=(argument("A robot by name or path; with --ros: agents/ros.", "PROFILE", ROBOTS), ""),
     dva=(
         text(
             "Register with this DVA and listen at once, rather than from the page.",
@@ -326,6 +326,8 @@ def console(
         None,
     ),
     number=(count("Number of the robot, which gives its id and label.", least=1, most=1000), 1),
+    ros=(text("Control a ROS robot through its rosbridge server.", metavar="ws://HOST:PORT"), None),
+    namespace=(text("With --ros: namespace of its topics.", metavar="NAME", of=str), "robot_1"),
     listen=(count("Port for requests; 0: any free port.", **_PORT), 0),
     port=PAGE["port"],
     host=PAGE["host"],
@@ -335,6 +337,10 @@ def console(
     **RUN,
 )
 def robot(
+    profile: str,
+    ros: str | None,
+    namespace: str,
+    port: int,
     no_open: bool,
     no_token: bool,
     set_: list[str] | None,
@@ -342,22 +348,52 @@ def robot(
     verbose: Verbose = False,
     **asked: Any,
 ) -> None:
-    """Run one simulated robot over sockets, with its own page.
+    """Run one simulated robot over sockets, or connect a ROS robot.
 
-    The robot starts switched off. Register it with a DVA and open its port from its page.
+    A simulated robot starts switched off: register it with a DVA and open its port from its page.
+    A ROS robot has no page. It registers once its odometry matches its profile.
 
     Examples:
         dva-sim robot  # the service robot; register it and open its port on the page
         dva-sim robot pibot --dva 192.168.1.10:5600  # the model car, at a DVA elsewhere
         dva-sim robot --number 2 --port 0  # another one beside it: robot-2
+        dva-sim robot --ros ws://192.168.1.20:9090 --dva 192.168.1.10:5600  # a robot of ROS
     """
     from dva_sim.cli import exposure  # late: start-up
+
+    changes, dva = tuple(set_ or ()), asked.pop("dva")
+    if ros is not None:
+        from dva_sim.live.ros_robot import RosRobotOptions, run_ros_robot  # late: start-up
+        from dva_sim.ros.profile import DEFAULT  # late: start-up
+
+        bridged = RosRobotOptions(
+            ros=ros,
+            namespace=namespace,
+            profile=profile or DEFAULT,
+            dva=dva or "",
+            changes=changes,
+            **asked,
+        )
+        exposure.warn_of_devices(
+            [bridged.host], has_keys=bridged.keys is not None, close_by=_CLOSED
+        )
+        with loudness(quiet, verbose):
+            run_ros_robot(bridged, _say_at_once)
+        return
     from dva_sim.console.simulator.robot_simulator import (  # late: start-up
         RobotOptions,
         RobotSimulator,
     )
 
-    options = RobotOptions(open=not no_open, token=not no_token, changes=tuple(set_ or ()), **asked)
+    options = RobotOptions(
+        profile=profile or "servrobot",
+        port=port,
+        dva=dva,
+        open=not no_open,
+        token=not no_token,
+        changes=changes,
+        **asked,
+    )
     exposure.warn_of_pages([options.host], has_token=options.token)
     exposure.warn_of_devices([options.host], has_keys=options.keys is not None, close_by=_CLOSED)
     with loudness(quiet, verbose):

@@ -34,6 +34,7 @@ KINDS: Final = {
     "experiments/validation": FolderKind("file"),
     "worlds": FolderKind("site", "dva-sim site show"),
     "agents/robots": FolderKind("robot"),
+    "agents/ros": FolderKind("robot of ROS"),
     "agents/phones": FolderKind("phone"),
     "agents/accelerometers": FolderKind("accelerometer"),
     "agents/people": FolderKind("profile of people"),

@@ -21,11 +21,17 @@ from dva_sim.agents.robot.controller import (
     RobotController,
     TimedSetPoint,
 )
-from dva_sim.agents.robot.decision_log import HANGS, LEASE_ENDS, MISSION_ENDS, DecisionLog
+from dva_sim.agents.robot.decision_log import (
+    HANGS,
+    LEASE_ENDS,
+    MISSION_ENDS,
+    PRESSED,
+    DecisionLog,
+)
 from dva_sim.agents.robot.field_of_view import FieldOfView, HazardSpot
 from dva_sim.agents.robot.loops import CollisionGuardedDrive, MissionLoop, Surrounded
 from dva_sim.agents.robot.sensors import SensorPort, SensorSubscriptions
-from dva_sim.kernel.recorder import DriveLog, make_accepted
+from dva_sim.kernel.recorder import ByHand, DriveLog, make_accepted
 from dva_sim.network.messaging import Request, Subscription
 from dva_sim.network.patterns import Pattern
 from dva_sim.protocol import messages as m
@@ -99,6 +105,8 @@ class RobotAgent:
         set_point: What it was told last, and until when.
         filmed: Told of each frame that it takes, with its id.
         trace: Told each decision, if there is one.
+        unfit: Why it cannot be driven now; empty: it can.
+        takes_missions: Whether it drives missions by itself.
         refuses: Made to refuse every command with this code: a fault that is planted.
         blind: Whether it takes no pictures: another one.
         drained: Whether its battery counts as empty, whatever is in it: another one.
@@ -125,6 +133,7 @@ class RobotAgent:
         self.set_point = STAND
         self.filmed: Callable[[str, CameraFrame], object] | None = None
         self.trace: DecisionLog | None = None
+        self.unfit, self.takes_missions = "", True
         self.refuses: int | None = None
         self.blind = self.drained = False
         self._fared, self._held_since = m.OK, 0.0
@@ -248,6 +257,31 @@ class RobotAgent:
         self.device.connect(self.device.dva)
         self._confirmations.ask()
 
+    def withdraw(self, why: str) -> None:
+        """Stand idle, and take no order until `return_to_service`: nobody can drive it safely.
+
+        The robot publishes that it is idle. Then it falls silent, so that the DVA sends nobody to
+        it; it still answers, and says why it refuses.
+        """
+        self.unfit = why
+        self.device.tell(f"cannot be driven: {why}", "mode")
+        before, now = self.controller.mode, self.device.clock.now
+        decision = self.controller.press_emergency(now)
+        self.device.recorder.on_hand(ByHand(self.device.id_tag, "", "stops", now))
+        self._happened(PRESSED)
+        if decision.set_point is not None:
+            self.move(decision.set_point)
+        if self.controller.mode is not before:
+            self.mode_changed("")
+        self._publish_status()
+        self._publish_holder()
+        self.device.withdrawn = True
+
+    def return_to_service(self) -> None:
+        """Take orders again: what made the robot unfit is over."""
+        self.unfit, self.device.withdrawn = "", False
+        self.device.tell("can be driven again", "mode")
+
     def power(self, on: bool) -> None:
         """Give motors, computer and radio power, or none: then it brakes, and is silent."""
         if on is not self.body.powered:
@@ -334,10 +368,14 @@ class RobotAgent:
         now, moving = self.device.clock.now, self.is_moving
         controller, is_command = self.controller, isinstance(message.body, m.SetTeleOp)
         before, mission = controller.mode, controller.mission_status
-        decision = controller.handle(message, arrived, now, moving, waited)
+        unable = self._unable(message.body)
+        if unable is None:
+            decision = controller.handle(message, arrived, now, moving, waited)
+        else:
+            decision = unable
         if is_command and self.refuses is not None:
             decision = Decision(self.refuses, "refuses all commands")
-        if self.trace is not None:
+        if self.trace is not None and unable is None:
             self.trace.decided(message, arrived, now, moving, decision, waited)
         if decision.waits and not waited:
             return decision
@@ -359,6 +397,20 @@ class RobotAgent:
         if not is_command:
             self._confirmations.ask()
         return decision
+
+    def _unable(self, body: m.Body) -> Decision | None:
+        """Return why the robot cannot do what it is asked, whoever asks; None if it can.
+
+        It obeys an emergency as far as it reaches the motors, and does not promise more.
+        """
+        if isinstance(body, Mission) and not self.takes_missions:
+            return Decision(m.NOT_SUPPORTED, "this robot drives no missions")
+        if self.unfit and isinstance(body, m.StartTeleOp | Mission):
+            return Decision(m.BUSY, self.unfit)
+        if self.unfit and isinstance(body, m.Emergency):
+            stop = self.controller.press_emergency(self.device.clock.now)
+            return stop._replace(code=m.BUSY, text=f"told to stop, but {self.unfit}")
+        return None
 
     def _told_by_dva(self, reply: m.Reply) -> Decision:
         """The DVA has answered what it was asked, over a connection of the robot's own."""

@@ -24,6 +24,7 @@ from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import Document, load_yaml
+from dva_sim.ros.profile import RosProfile
 from dva_sim.simulation.middleware import MiddlewareScenario
 from dva_sim.simulation.models import MODELS, PLUGINS, OwnScenario
 from dva_sim.simulation.scenario import Scenario
@@ -65,6 +66,7 @@ KINDS: Final = (
     FileKind("site", SiteFile, "worlds", _DRAW),
     FileKind("ROS map", RosMap, "worlds", _DRAW),
     FileKind("robot", RobotProfile, "agents/robots"),
+    FileKind("robot of ROS", RosProfile, "agents/ros"),
     FileKind("phone", PhoneProfile, "agents/phones"),
     FileKind("accelerometer", AccelerometerPart, "agents/accelerometers"),
     FileKind("guard", GuardProfile, "agents/people"),

@@ -1,0 +1,1 @@
+"""Robots and clients of ROS, by the rosbridge protocol."""

@@ -1,0 +1,116 @@
+"""The body of a robot of ROS: it is where its odometry says, and moves by velocity commands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from typing_extensions import override
+
+from dva_sim.network.realtime import LiveClock
+from dva_sim.ros.readings import RosMotion
+from dva_sim.worlds.bodies import RobotBody
+from dva_sim.worlds.drives import DriveSpec
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.physics import World
+
+STILL_TOLD: Final = 1.0  # design: a robot is told to stand for so long after each drive [s]
+STILL: Final = 0.02  # below this it counts as standing [m/s, rad/s]
+
+
+class RosBody(RobotBody):
+    """A body that no physics moves: `place` says where it is, and `send` takes its commands.
+
+    A command is repeated while it is in force. After its end the robot is told to stand until it
+    does, and for `STILL_TOLD` in any case; then nothing is published, so that others may drive it.
+
+    Args:
+        world: The site; physics of others pass it by.
+        name: Label of the robot.
+        spec: Limits that commands are clamped to.
+        clock: Real time.
+        period: Between two repetitions of a command [s].
+        send: Takes speed [m/s] and turn rate [rad/s]; returns False if they could not be sent.
+
+    Attributes:
+        stopped_at: Time since which the robot should slow down and stand [s].
+        has_stood: Whether it has stood since then.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        name: str,
+        spec: DriveSpec,
+        clock: LiveClock,
+        period: float,
+        send: Callable[[float, float], bool],
+    ) -> None:
+        super().__init__(world, name, spec, Pose(0.0, 0.0, 0.0))
+        self._clock, self._send = clock, send
+        self._set_point = 0.0, 0.0, 0.0
+        self.stopped_at = self._told_until = -math.inf
+        self.has_stood = True
+        self._is_asked_to_move = False
+        clock.every(period, self._repeat)
+
+    @property
+    @override
+    def asked(self) -> tuple[float, float, float]:
+        speed, turn_rate, until = self._set_point
+        return speed, turn_rate, until if speed or turn_rate else 0.0
+
+    @property
+    def is_asked_to_move(self) -> bool:
+        """Whether a command other than to stand is in force."""
+        return self._is_asked_to_move and self._clock.now < self._set_point[2]
+
+    def place(self, motion: RosMotion) -> None:
+        """Be where odometry says, and move so."""
+        body, heading = self.body, motion.heading
+        turns = round((body.angle - heading) / (2.0 * math.pi))
+        body.position, body.angle = (motion.x, motion.y), heading + 2.0 * math.pi * turns
+        ahead = math.cos(heading), math.sin(heading)
+        body.velocity = motion.speed * ahead[0], motion.speed * ahead[1]
+        body.angular_velocity = motion.turn_rate
+        if abs(motion.speed) <= STILL and abs(motion.turn_rate) <= STILL:
+            self.has_stood = True
+
+    @override
+    def drive(self, speed: float, turn_rate: float, until: float) -> None:
+        most, fastest, now = self.spec.max_speed, self.spec.max_turn_rate, self._clock.now
+        if not (math.isfinite(speed) and math.isfinite(turn_rate)) or math.isnan(until):
+            speed = turn_rate = 0.0
+        speed = 0.0 if speed < 0.0 else most if speed > most else speed
+        if not -fastest <= turn_rate <= fastest:
+            turn_rate = math.copysign(fastest, turn_rate)
+        self._set_point = speed, turn_rate, until
+        moves = (speed != 0.0 or turn_rate != 0.0) and until > now
+        if not moves:
+            self.stand()
+            return
+        self._is_asked_to_move = True
+        self._send(speed, turn_rate)
+        if not math.isinf(until):
+            self._clock.call_at(until, self._expire)
+
+    def stand(self) -> None:
+        """Tell the robot to stand."""
+        now = self._clock.now
+        if self._is_asked_to_move or now >= self._told_until:
+            self.stopped_at, self.has_stood = now, self.has_stood and not self._is_asked_to_move
+        self._is_asked_to_move, self._told_until = False, now + STILL_TOLD
+        self._set_point = 0.0, 0.0, now
+        self._send(0.0, 0.0)
+
+    def _expire(self) -> None:
+        if self._is_asked_to_move and self._clock.now >= self._set_point[2]:
+            self.stand()
+
+    def _repeat(self) -> None:
+        self._expire()
+        if self._is_asked_to_move:
+            self._send(*self._set_point[:2])
+        elif not self.has_stood or self._clock.now < self._told_until:
+            self._send(0.0, 0.0)

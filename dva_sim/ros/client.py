@@ -1,0 +1,174 @@
+"""A client of a rosbridge server that reconnects by itself."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from typing import Any, Final, NamedTuple
+
+from dva_sim.network.realtime import LiveClock
+from dva_sim.ros.rosbridge import BadOperation, decode, encode
+from dva_sim.ros.websocket import WebSocketDialer, WebSocketUrl
+
+FIRST_PAUSE, LONGEST_PAUSE = 0.5, 2.0  # design: before another attempt to connect [s]
+SILENT_AFTER: Final = 5.0  # design: a connection over which nothing comes is given up [s]
+LARGEST: Final = 16_000_000  # design: a larger message ends the connection [B]
+MOST_QUEUED: Final = 200_000  # design: commands are not queued behind so much [B]
+
+
+class Subscribed(NamedTuple):
+    """A topic that is read.
+
+    Attributes:
+        type: Of its messages, as this version of ROS writes it.
+        take: Takes each message.
+        largest: Larger ones are dropped unread [B].
+        throttle_ms: The server sends no more often.
+    """
+
+    type: str
+    take: Callable[[Any], object]
+    largest: int
+    throttle_ms: int = 0
+
+
+class RosbridgeClient:
+    """Keeps a connection to a rosbridge server, and tells when it is lost and when it is back.
+
+    Args:
+        clock: Polls the socket.
+        url: Of the server.
+        topics: Topics to read, by name.
+        advertised: Types of the topics that are published, by name.
+        on_change: Told when the connection is made, with an empty text, and when it is lost or
+            cannot be made, with the reason.
+        on_bad: Told what was refused, and of which topic.
+
+    Attributes:
+        is_connected: Whether messages can be sent now.
+        counters: What was refused, by reason.
+    """
+
+    def __init__(
+        self,
+        clock: LiveClock,
+        url: WebSocketUrl,
+        topics: Mapping[str, Subscribed],
+        advertised: Mapping[str, str],
+        *,
+        on_change: Callable[[str], object],
+        on_bad: Callable[[str, str], object],
+    ) -> None:
+        self._clock, self._url, self._topics, self._advertised = clock, url, topics, advertised
+        self._on_change, self._on_bad = on_change, on_bad
+        self._pause, self._heard, self._is_over = FIRST_PAUSE, 0.0, False
+        self._dialer: WebSocketDialer | None = None
+        self.is_connected = False
+        self.counters: Counter[str] = Counter()
+        clock.every(1.0, self._look)
+
+    def connect(self) -> None:
+        """Begin to connect; from now on it tries again by itself."""
+        if self._is_over:
+            return
+        self._dialer = WebSocketDialer(
+            self._clock,
+            self._url,
+            largest=LARGEST,
+            on_open=self._opened,
+            on_text=self._take,
+            on_end=self._lost,
+        )
+
+    def publish(self, topic: str, message: Mapping[str, Any]) -> bool:
+        """Publish on an advertised topic; return False if the message cannot leave now."""
+        connection = self._dialer.connection if self._dialer is not None else None
+        if not self.is_connected or connection is None or connection.waiting > MOST_QUEUED:
+            return False
+        connection.send(encode({"op": "publish", "topic": topic, "msg": message}))
+        return self.is_connected
+
+    def renew(self, why: str) -> None:
+        """Drop the connection, with all that waits in it, and connect again."""
+        if self.is_connected and self._dialer is not None:
+            assert self._dialer.connection is not None
+            self._dialer.connection.end(why)
+
+    def close(self) -> None:
+        """Take back what was advertised and subscribed to, and end the connection."""
+        self._is_over = True
+        if self.is_connected:
+            for topic in self._topics:
+                self._send({"op": "unsubscribe", "topic": topic})
+            for topic in self._advertised:
+                self._send({"op": "unadvertise", "topic": topic})
+        if self._dialer is not None:
+            self._dialer.close()
+
+    def _send(self, operation: dict[str, Any]) -> None:
+        if self._dialer is not None and self._dialer.connection is not None:
+            self._dialer.connection.send(encode(operation))
+
+    def _opened(self) -> None:
+        self.is_connected, self._heard = True, self._clock.now
+        for topic, kind in self._advertised.items():
+            self._send({"op": "advertise", "topic": topic, "type": kind})
+        for topic, wanted in self._topics.items():
+            self._send(
+                {
+                    "op": "subscribe",
+                    "topic": topic,
+                    "type": wanted.type,
+                    "throttle_rate": wanted.throttle_ms,
+                    "queue_length": 1,  # of old readings none is of use
+                }
+            )
+        self._on_change("")
+
+    def _lost(self, why: str) -> None:
+        was_connected, self.is_connected = self.is_connected, False
+        if self._is_over:
+            return
+        self._pause = FIRST_PAUSE if was_connected else min(2.0 * self._pause, LONGEST_PAUSE)
+        self._clock.call_after(self._pause, self.connect)
+        self._on_change(why)
+
+    def _look(self) -> None:
+        """Give a connection up over which nothing comes: a peer may be gone without a word."""
+        silence = self._clock.now - self._heard
+        if silence > SILENT_AFTER:
+            self.renew(f"nothing was heard for {SILENT_AFTER:g} s")
+
+    def _take(self, data: bytes) -> None:
+        self._heard = self._clock.now
+        topic = self._topic_of(data)
+        wanted = self._topics.get(topic)
+        if wanted is not None and len(data) > wanted.largest:
+            self._refuse(topic, f"{len(data)} bytes; at most {wanted.largest} are read")
+            return
+        if wanted is None and len(data) > MOST_QUEUED:
+            self._refuse("", f"{len(data)} bytes of a topic that was not asked for")
+            return
+        try:
+            operation = decode(data)
+        except BadOperation as error:
+            self._refuse(topic, str(error))
+            return
+        if operation["op"] == "publish":
+            wanted = self._topics.get(str(operation.get("topic")))
+            if wanted is not None:
+                wanted.take(operation.get("msg"))
+        elif operation["op"] == "status" and operation.get("level") in ("error", "warning"):
+            self._refuse("", f"the server says: {str(operation.get('msg'))[:120]}")
+
+    def _topic_of(self, data: bytes) -> str:
+        """Return the topic of a message that may be too large to be read."""
+        for topic in self._topics:
+            name = f'"{topic}"'.encode()
+            if name in data[:300] or name in data[-300:]:
+                return topic
+        return ""
+
+    def _refuse(self, topic: str, why: str) -> None:
+        self.counters[f"refused: {topic or 'a message'}"] += 1
+        self._on_bad(topic, why)

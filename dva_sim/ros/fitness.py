@@ -1,0 +1,81 @@
+"""Whether a robot of ROS can be driven: the bridge is up, odometry is fresh, and it obeys.
+
+Pure: it takes what happened with its time, and returns what is wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from dva_sim.ros.profile import RosLimits
+
+DRIFT: Final = 1e-4  # design: clocks of robot and bench differ in rate by less than that
+BACKLOG: Final = 3.0  # design: with odometry that is late for so long the bridge is renewed [s]
+NO_ODOMETRY: Final = "no odometry has come"
+NO_BRIDGE: Final = "the bridge is not connected"
+
+
+class Fitness:
+    """Collects what is known of a robot.
+
+    Odometry is late when none has come for `odometry_within_s`, or when it is that much older
+    than the freshest so far: a bridge whose queue grows delivers steadily what is long past.
+
+    Args:
+        limits: Times of the profile.
+    """
+
+    def __init__(self, limits: RosLimits) -> None:
+        self._limits = limits
+        self._bridge, self._refused = NO_BRIDGE, ""
+        self._heard, self._best, self._at, self._behind = -math.inf, math.inf, 0.0, 0.0
+        self._late_since = math.inf
+        self._does_not_stop = False
+
+    def connected(self) -> None:
+        """The bridge is there; what came over an earlier connection says nothing any more."""
+        self._bridge = self._refused = ""
+        self._heard, self._best, self._behind = -math.inf, math.inf, 0.0
+        self._late_since = math.inf
+
+    def lost(self, why: str) -> None:
+        """The bridge is gone, or cannot be reached; why at first is told until it is back."""
+        if self._bridge in ("", NO_BRIDGE):
+            self._bridge = f"the bridge is lost: {why}"
+
+    def moved(self, now: float, stamp: float | None) -> None:
+        """Odometry has come, and was measured at `stamp` by the robot's clock [s]."""
+        self._heard, self._refused = now, ""
+        if stamp is not None:
+            offset = now - stamp
+            self._best = min(offset, self._best + DRIFT * (now - self._at))
+            self._at, self._behind = now, offset - self._best
+
+    def refused(self, why: str) -> None:
+        """Odometry has come that says nothing of use."""
+        self._refused = why
+
+    def obeys(self, now: float, stopped_at: float, has_stood: bool) -> None:
+        """It was told to stand at a time [s], and has stood since or not."""
+        self._does_not_stop = not has_stood and now - stopped_at > self._limits.stands_within_s
+
+    def problem(self, now: float) -> str:
+        """Return why the robot cannot be driven; empty if it can."""
+        if self._bridge:
+            return self._bridge
+        if self._heard == -math.inf:
+            return f"odometry is refused: {self._refused}" if self._refused else NO_ODOMETRY
+        late = self._limits.odometry_within_s
+        if now - self._heard > late or self._behind > late:
+            self._late_since = min(self._late_since, now)
+            why = f": {self._refused}" if self._refused else ""
+            return f"odometry is more than {late:g} s late{why}"
+        self._late_since = math.inf
+        if self._does_not_stop:
+            return f"it does not stop within {self._limits.stands_within_s:g} s"
+        return ""
+
+    def needs_another_bridge(self, now: float) -> bool:
+        """Whether odometry has been late for so long that a new connection may help."""
+        return not self._bridge and self._behind > 0 and now - self._late_since > BACKLOG

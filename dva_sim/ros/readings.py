@@ -1,0 +1,231 @@
+"""Messages of ROS as values: checked for types, finite numbers and frames; SI and the site's frame.
+
+What a message says is taken from JSON as rosbridge writes it. `NaN` and numbers that are none come
+as null or as `NaN`; both are refused where a value is needed.
+
+References:
+    REP 103 (units and frames), REP 117 (ranges that are none); definitions of nav_msgs,
+    geometry_msgs, sensor_msgs and tf2_msgs.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import math
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+from dva_sim.ros.profile import RosProfile
+
+JPEG: Final = b"\xff\xd8\xff"
+RAYS: Final = 36  # of a scan as devices get it, the first one ahead
+MOST_RANGES: Final = 20_000  # of a scan that is read
+FASTEST: Final = 50.0  # design: a robot that says it is faster is not believed [m/s, rad/s]
+FARTHEST: Final = 100_000.0  # design: nor one farther from its origin [m]
+
+
+class BadReading(Exception):
+    """A message that says nothing of use, and why."""
+
+
+class RosMotion(NamedTuple):
+    """Where a robot is, and how it moves: site frame [m, rad], along its heading [m/s, rad/s].
+
+    Attributes:
+        stamp: When it was measured, by the robot's clock [s]; None: not said.
+    """
+
+    x: float
+    y: float
+    heading: float
+    speed: float
+    turn_rate: float
+    stamp: float | None
+
+
+def number(value: Any, what: str) -> float:
+    """Return a finite number.
+
+    Raises:
+        BadReading: it is none.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise BadReading(f"{what} is {_shown(value)}, not a finite number")
+    return float(value)
+
+
+def part(message: Any, *path: str) -> Any:
+    """Return what stands at a path of keys.
+
+    Raises:
+        BadReading: it is not there.
+    """
+    for key in path:
+        if not isinstance(message, Mapping) or key not in message:
+            raise BadReading(f"{'.'.join(path)} is missing")
+        message = message[key]
+    return message
+
+
+def _shown(value: Any) -> str:
+    shown = repr(value)
+    return shown if len(shown) <= 40 else f"{shown[:37]}..."
+
+
+def stamp_of(message: Any) -> float | None:
+    """Return the time in a header, of ROS 1 or 2 [s]; None if it is zero or missing."""
+    stamp = message.get("header", {}).get("stamp") if isinstance(message, Mapping) else None
+    if not isinstance(stamp, Mapping):
+        return None
+    whole, rest = stamp.get("sec", stamp.get("secs")), stamp.get("nanosec", stamp.get("nsecs"))
+    if not isinstance(whole, int) or not isinstance(rest, int) or not (whole or rest):
+        return None
+    return whole + rest * 1e-9
+
+
+def yaw_of(rotation: Any) -> float:
+    """Return the heading in a quaternion [rad].
+
+    Raises:
+        BadReading: it is not a rotation.
+    """
+    x, y, z, w = (number(part(rotation, key), f"orientation.{key}") for key in "xyzw")
+    if not 0.9 < math.sqrt(x * x + y * y + z * z + w * w) < 1.1:
+        raise BadReading("orientation is not a unit quaternion")
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+class RosReader:
+    """Reads the messages of one robot by its profile."""
+
+    def __init__(self, profile: RosProfile) -> None:
+        self._profile, origin = profile, profile.origin
+        self._turn = math.radians(origin.heading_deg)
+        self._cos, self._sin = math.cos(self._turn), math.sin(self._turn)
+        self._origin = origin.x_m, origin.y_m
+
+    def odometry(self, message: Any) -> RosMotion:
+        """Return what nav_msgs/Odometry says.
+
+        Raises:
+            BadReading: it is not as it should be.
+        """
+        self._check_frame("header.frame_id", part(message, "header", "frame_id"), "odometry")
+        self._check_frame("child_frame_id", part(message, "child_frame_id"), "base")
+        x, y, heading = self._placed(part(message, "pose", "pose"), "position", "orientation")
+        twist, units = part(message, "twist", "twist"), self._profile.units
+        speed = number(part(twist, "linear", "x"), "twist.linear.x") * units.metres
+        turn = number(part(twist, "angular", "z"), "twist.angular.z") * units.radians
+        if abs(speed) > FASTEST or abs(turn) > FASTEST:
+            raise BadReading(f"{speed:g} m/s and {turn:g} rad/s are beyond any robot")
+        return RosMotion(*(x, y, heading), speed=speed, turn_rate=turn, stamp=stamp_of(message))
+
+    def transform(self, message: Any, before: RosMotion | None) -> RosMotion | None:
+        """Return the motion by tf2_msgs/TFMessage; None if the robot is not in it.
+
+        Args:
+            message: Transforms, of which one may be of the robot.
+            before: The motion by the one before, from which speeds follow.
+
+        Raises:
+            BadReading: it is not as it should be.
+        """
+        transforms, frames = part(message, "transforms"), self._profile.frames
+        if not isinstance(transforms, list) or len(transforms) > 1000:
+            raise BadReading("transforms is not a list of at most 1000")
+        for each in transforms:
+            ends = part(each, "header", "frame_id"), part(each, "child_frame_id")
+            if tuple(_bare(end) for end in ends) == (_bare(frames.odometry), _bare(frames.base)):
+                place = self._placed(part(each, "transform"), "translation", "rotation")
+                return _moved(before, *place, stamp_of(each))
+        return None
+
+    def charge(self, message: Any) -> float:
+        """Return the share of charge that sensor_msgs/BatteryState says is left.
+
+        Raises:
+            BadReading: it does not say.
+        """
+        share = number(part(message, "percentage"), "percentage")
+        share /= 100.0 if self._profile.units.charge == "percent" else 1.0
+        if not 0.0 <= share <= 1.0:
+            raise BadReading(f"percentage {share:g} is not a share from 0 to 1: see units.charge")
+        return share
+
+    def picture(self, message: Any) -> bytes:
+        """Return the JPEG in sensor_msgs/CompressedImage.
+
+        Raises:
+            BadReading: there is none, or it is too large.
+        """
+        data = part(message, "data")
+        if not isinstance(data, str):
+            raise BadReading(f"data is {_shown(type(data).__name__)}, not base64")
+        most = self._profile.largest_picture_bytes
+        if len(data) * 3 // 4 > most + 3:
+            raise BadReading(f"{len(data) * 3 // 4} bytes; at most {most} are taken")
+        try:
+            picture = base64.b64decode(data, validate=True)
+        except (binascii.Error, ValueError):
+            raise BadReading("data is not base64") from None
+        if not picture.startswith(JPEG):
+            raise BadReading("data is not JPEG")
+        return picture
+
+    def scan(self, message: Any) -> tuple[float, ...]:
+        """Return the ranges of sensor_msgs/LaserScan in `RAYS` sectors [m], the nearest of each.
+
+        Raises:
+            BadReading: it is not as it should be.
+        """
+        units = self._profile.units
+        first = number(part(message, "angle_min"), "angle_min") * units.radians
+        step = number(part(message, "angle_increment"), "angle_increment") * units.radians
+        most = number(part(message, "range_max"), "range_max") * units.metres
+        ranges = part(message, "ranges")
+        if not isinstance(ranges, list) or not 0 < len(ranges) <= MOST_RANGES:
+            raise BadReading(f"ranges is not a list of 1 to {MOST_RANGES}")
+        if not 0.0 < most < FARTHEST:
+            raise BadReading(f"range_max {most:g} m is no range")
+        nearest = [most] * RAYS
+        for index, value in enumerate(ranges):
+            near = 0.0 if value == -math.inf else value  # REP 117: too close to be measured
+            if isinstance(near, int | float) and math.isfinite(near) and near >= 0.0:
+                sector = round((first + index * step) / (2.0 * math.pi / RAYS)) % RAYS
+                nearest[sector] = min(nearest[sector], near * units.metres)
+            elif value is not None and not isinstance(value, float):
+                raise BadReading(f"ranges has {_shown(value)}, not a number")
+        return tuple(round(value, 3) for value in nearest)
+
+    def _check_frame(self, where: str, said: Any, kind: str) -> None:
+        wanted = getattr(self._profile.frames, kind)
+        if not isinstance(said, str) or _bare(said) != _bare(wanted):
+            raise BadReading(f"{where} is {_shown(said)}, not {wanted!r}: see frames.{kind}")
+
+    def _placed(self, pose: Any, place: str, rotation: str) -> tuple[float, float, float]:
+        scale = self._profile.units.metres
+        x, y = (number(part(pose, place, key), f"{place}.{key}") * scale for key in "xy")
+        if math.hypot(x, y) > FARTHEST:
+            raise BadReading(f"{math.hypot(x, y):g} m from the origin is beyond any site")
+        heading = yaw_of(part(pose, rotation)) + self._turn
+        east = self._origin[0] + self._cos * x - self._sin * y
+        return east, self._origin[1] + self._sin * x + self._cos * y, heading
+
+
+def _bare(frame: Any) -> str:
+    return str(frame).lstrip("/")
+
+
+def _moved(
+    before: RosMotion | None, x: float, y: float, heading: float, stamp: float | None
+) -> RosMotion:
+    """A motion by two places; without times, or with the same time twice, speeds stay."""
+    if before is None:
+        return RosMotion(x, y, heading, speed=0.0, turn_rate=0.0, stamp=stamp)
+    if stamp is None or before.stamp is None or stamp <= before.stamp:
+        raise BadReading("transforms have no time that grows, so no speed follows from them")
+    dt, ahead = stamp - before.stamp, heading
+    along = (x - before.x) * math.cos(ahead) + (y - before.y) * math.sin(ahead)
+    turned = math.remainder(heading - before.heading, 2.0 * math.pi)
+    return RosMotion(x, y, heading, speed=along / dt, turn_rate=turned / dt, stamp=stamp)

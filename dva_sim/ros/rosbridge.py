@@ -1,0 +1,70 @@
+"""The rosbridge protocol, version 2: one JSON object per message, with its operation as `op`.
+
+References:
+    https://github.com/RobotWebTools/rosbridge_suite/blob/ros2/ROSBRIDGE_PROTOCOL.md
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Final
+
+MOST_NAME: Final = 256  # of a topic, a service or a type
+
+
+class BadOperation(Exception):
+    """A message that is no operation of the protocol, and why."""
+
+
+def encode(operation: dict[str, Any]) -> bytes:
+    """Return an operation as JSON.
+
+    Raises:
+        ValueError: a number in it is not finite.
+    """
+    return json.dumps(operation, separators=(",", ":"), allow_nan=False).encode()
+
+
+def decode(data: bytes) -> dict[str, Any]:
+    """Return the operation in a message.
+
+    Raises:
+        BadOperation: there is none.
+    """
+    try:
+        operation = json.loads(data)
+    except (ValueError, RecursionError):
+        raise BadOperation("a message is not JSON") from None
+    if not isinstance(operation, dict) or not isinstance(operation.get("op"), str):
+        raise BadOperation("a message has no op")
+    return operation
+
+
+def name_in(operation: dict[str, Any], key: str) -> str:
+    """Return the name of a topic, a service or a type.
+
+    Raises:
+        BadOperation: it is missing, or too long.
+    """
+    name = operation.get(key)
+    if not isinstance(name, str) or not 0 < len(name) <= MOST_NAME:
+        raise BadOperation(f"{operation['op']} has no {key}, or a longer one than {MOST_NAME}")
+    return name
+
+
+def number_in(operation: dict[str, Any], key: str, most: float) -> float:
+    """Return a number from 0 to `most`; 0 if it is missing.
+
+    Raises:
+        BadOperation: it is no such number.
+    """
+    value = operation.get(key, 0)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= most:
+        raise BadOperation(f"{operation['op']} has {key} {str(value)[:40]!r}: 0 to {most:g}")
+    return float(value)
+
+
+def plain_type(name: str) -> str:
+    """Return a type as ROS 1 writes it: `geometry_msgs/msg/Twist` is `geometry_msgs/Twist`."""
+    package, _, rest = name.partition("/")
+    return f"{package}/{rest.removeprefix('msg/').removeprefix('srv/')}"

@@ -1,0 +1,280 @@
+"""WebSocket connections in the thread of a run, which none of them ever blocks.
+
+The clock of the run polls the sockets. Bytes that the kernel does not take wait in a buffer of
+bounded size; a peer that lets it fill up is disconnected.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, Final
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.network.realtime import LiveClock
+
+if TYPE_CHECKING:
+    from websockets.client import ClientProtocol
+    from websockets.server import ServerProtocol
+
+FLUSH: Final = 0.01  # design: between two attempts to send what waits [s]
+AT_ONCE: Final = 1 << 16  # design: read before other sources have their turn [B]
+MOST_WAITING: Final = 8_000_000  # design: of a peer [B]
+OPENS_WITHIN: Final = 5.0  # design: TCP connection and handshake [s]
+NORMAL, TOO_SLOW, GOING = 1000, 1008, 1001  # close codes of RFC 6455
+PORT: Final = 9090  # of rosbridge
+
+
+class WebSocketConnection:
+    """One end of an open TCP connection that speaks, or is about to speak, WebSocket.
+
+    Args:
+        clock: Polls the socket.
+        sock: Connected, not blocking.
+        protocol: The state of this end.
+        on_text: Takes each whole text message.
+        on_end: Told once, with the reason, when the connection is over.
+
+    Attributes:
+        is_open: False once the connection is over.
+        on_event: Takes requests and responses of the handshake.
+    """
+
+    def __init__(
+        self,
+        clock: LiveClock,
+        sock: socket.socket,
+        protocol: ClientProtocol | ServerProtocol,
+        on_text: Callable[[bytes], object],
+        on_end: Callable[[str], object],
+    ) -> None:
+        self._clock, self._sock, self._protocol = clock, sock, protocol
+        self._on_text, self._on_end = on_text, on_end
+        self._parts: list[bytes] = []
+        self._buffer = bytearray()
+        self._flushing = False
+        self.is_open = True
+        self.on_event: Callable[[Any], object] = lambda _: None
+        sock.setblocking(False)
+        with suppress(OSError):
+            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        clock.watch(sock.fileno(), self._read)
+
+    @property
+    def has_failed(self) -> bool:
+        """True if the handshake was refused."""
+        return self._protocol.handshake_exc is not None
+
+    @property
+    def waiting(self) -> int:
+        """Bytes that the kernel has not taken yet."""
+        return len(self._buffer)
+
+    def send(self, text: bytes) -> None:
+        """Send a text message, as UTF-8."""
+        if self.is_open:
+            self._protocol.send_text(text)
+            self.push()
+
+    def close(self, code: int = NORMAL, reason: str = "") -> None:
+        """Say good-bye and end the connection, without waiting for the peer."""
+        if not self.is_open:
+            return
+        with suppress(Exception):  # a handshake that never ended has no close frame
+            self._protocol.send_close(code, reason[:120])
+            self.push()
+        self.end(reason)
+
+    def push(self) -> None:
+        """Hand what the protocol has to say to the kernel, as far as that takes it."""
+        self._buffer += b"".join(self._protocol.data_to_send())
+        self._flush()
+
+    def _flush(self) -> bool:
+        """Return True while bytes are left."""
+        if not self.is_open:
+            return False
+        try:
+            while self._buffer:
+                sent = self._sock.send(memoryview(self._buffer)[:AT_ONCE])
+                del self._buffer[:sent]
+        except BlockingIOError:
+            if len(self._buffer) > MOST_WAITING:
+                self.end("does not read what it is sent")
+                return False
+            if not self._flushing:
+                self._flushing = True
+                self._clock.every(FLUSH, self._flush)
+            return True
+        except OSError as error:
+            self.end(error.strerror or str(error))
+        self._flushing = False
+        return False
+
+    def _read(self) -> None:
+        try:
+            data = self._sock.recv(AT_ONCE)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self.end(error.strerror or str(error))
+            return
+        if data:
+            self._protocol.receive_data(data)
+        else:
+            self._protocol.receive_eof()
+        for event in self._protocol.events_received():
+            if self.is_open:
+                self._take(event)
+        if self.is_open:
+            self.push()
+        if self.is_open and (not data or self._protocol.close_expected()):
+            self.end(self._why())
+
+    def _why(self) -> str:
+        failed = self._protocol.handshake_exc or self._protocol.parser_exc
+        if failed is not None:
+            return str(failed)
+        reason = self._protocol.close_reason
+        return f"closed by the peer{f': {reason}' if reason else ''}"
+
+    def _take(self, event: Any) -> None:
+        """Take what the protocol has read: a piece of a message, or of a handshake."""
+        opcode = getattr(event, "opcode", None)
+        if opcode is None:
+            self.on_event(event)
+        elif int(opcode) in (0, 1, 2):
+            self._parts.append(bytes(event.data))
+            if event.fin:
+                data, self._parts = b"".join(self._parts), []
+                self._on_text(data)
+
+    def end(self, why: str) -> None:
+        """End the connection at once."""
+        if self.is_open:
+            self.is_open = False
+            self._clock.unwatch(self._sock.fileno())
+            self._sock.close()
+            self._buffer.clear()
+            self._on_end(why)
+
+
+class WebSocketUrl:
+    """Address of a WebSocket server, `ws://HOST:PORT/PATH`.
+
+    Raises:
+        ConfigError: it is none, in one line.
+    """
+
+    def __init__(self, text: str, option: str) -> None:
+        from websockets.exceptions import InvalidURI  # late: start-up
+        from websockets.uri import parse_uri  # late: start-up
+
+        should = "should be ws://HOST:PORT, as in ws://192.168.1.20:9090"
+        if text.startswith("wss://"):
+            raise ConfigError(f"{option} {text!r}: wss:// is not supported; give ws://")
+        try:
+            self.uri = parse_uri(text)
+        except (InvalidURI, ValueError):
+            raise ConfigError(f"{option} {text!r} {should}") from None
+        self.text, self.host = text, self.uri.host
+        self.port = self.uri.port if f":{self.uri.port}" in text else PORT
+
+
+class WebSocketDialer:
+    """Connects to a server without blocking.
+
+    Args:
+        clock: Polls the socket.
+        url: Of the server.
+        largest: Size of the largest message that is read [B].
+        on_open: Told when the handshake is done.
+        on_text: Takes each text message.
+        on_end: Told once when the connection is over, or could not be made.
+
+    Attributes:
+        connection: Once TCP has connected.
+    """
+
+    def __init__(
+        self,
+        clock: LiveClock,
+        url: WebSocketUrl,
+        *,
+        largest: int,
+        on_open: Callable[[], object],
+        on_text: Callable[[bytes], object],
+        on_end: Callable[[str], object],
+    ) -> None:
+        self._clock, self._url, self._largest = clock, url, largest
+        self._on_open, self._on_text, self._on_end = on_open, on_text, on_end
+        self.connection: WebSocketConnection | None = None
+        self._deadline, self._is_open, self._is_over = clock.now + OPENS_WITHIN, False, False
+        try:
+            place = socket.getaddrinfo(url.host, url.port, type=socket.SOCK_STREAM)[0]
+            self._sock = socket.socket(place[0], place[1])
+            self._sock.setblocking(False)
+            self._sock.connect_ex(place[4])
+        except OSError as error:
+            clock.call_after(0.0, self._over, error.strerror or str(error))
+            return
+        clock.every(FLUSH, self._look)
+
+    def _look(self) -> bool:
+        """Return True while TCP is connecting."""
+        if self._is_over:
+            return False
+        if select.select([], [self._sock], [], 0.0)[1]:
+            self._connected()
+            return False
+        if self._clock.now > self._deadline:
+            self._sock.close()
+            self._over("does not answer")
+            return False
+        return True
+
+    def _connected(self) -> None:
+        code = self._sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+        if code:
+            self._sock.close()
+            self._over(os.strerror(code))
+            return
+        from websockets.client import ClientProtocol  # late: start-up
+
+        protocol = ClientProtocol(self._url.uri, max_size=self._largest)
+        connection = WebSocketConnection(
+            self._clock, self._sock, protocol, self._on_text, self._over
+        )
+        connection.on_event = self._answered
+        self.connection = connection
+        protocol.send_request(protocol.connect())
+        connection.push()
+        self._clock.call_after(OPENS_WITHIN, self._give_up)
+
+    def _give_up(self) -> None:
+        if not self._is_open and self.connection is not None:
+            self.connection.end("does not speak WebSocket")
+
+    def _answered(self, _: Any) -> None:
+        connection = self.connection
+        assert connection is not None
+        if connection.has_failed:
+            return
+        self._is_open = True
+        self._on_open()
+
+    def _over(self, why: str) -> None:
+        if not self._is_over:
+            self._is_over = True
+            self._on_end(why)
+
+    def close(self) -> None:
+        """End the connection, or the attempt."""
+        if self.connection is not None:
+            self.connection.close(GOING)
+        elif not self._is_over:
+            self._sock.close()
+            self._is_over = True
