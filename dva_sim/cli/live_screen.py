@@ -22,6 +22,7 @@ from dva_sim.live.options import PARTS, LiveOptions
 from dva_sim.live.process import Report, run_part
 from dva_sim.live.supervisor import Summary, Supervisor
 from dva_sim.network.sockets import DEFAULT_PORT
+from dva_sim.ros.options import open_port
 from dva_sim.simulation.full.verdicts import Verdict, refuse_broken
 from dva_sim.simulation.scenario import contradictions
 
@@ -126,9 +127,13 @@ def run_all(options: LiveOptions) -> None:
     """
     console, board = _console(), Board()
     warn(console, options)
+    door = None
+    if options.rosbridge is not None:
+        door = open_port(options.host, options.rosbridge, "--rosbridge", options.token)
+        _print(console, f"rosbridge: {door.url}")
     if not console.is_terminal:
         with closing(InOrder(console, board)) as told:
-            summary = Supervisor(options, lambda _, report: told.hear(report)).run()
+            summary = Supervisor(options, lambda _, report: told.hear(report), door).run()
         _conclude(console, board, summary, options)
         return
     with Live(console=console, refresh_per_second=4, transient=True) as screen:
@@ -138,7 +143,7 @@ def run_all(options: LiveOptions) -> None:
             board.hear(report)
             screen.update(Group(board.table(), board.lines_of_story()))
 
-        summary = Supervisor(options, hear).run()
+        summary = Supervisor(options, hear, door).run()
     for line in board.story:
         _print(console, story_line(line))
     _conclude(console, board, summary, options)

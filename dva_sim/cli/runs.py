@@ -55,6 +55,12 @@ _TRANSPORT: Any = (
     ),
     None,
 )
+_ROSBRIDGE: Any = (
+    count(
+        "Port for clients of ROS (rosbridge); 0: any.", metavar="PORT", most=65_535, of=int | None
+    ),
+    None,
+)
 _TO_ROBOTS = "to the robots", "from the robots"
 _CLOSED = "--keys FOLDER closes it"
 
@@ -146,6 +152,8 @@ def _show_replay(**asked: Any) -> None:
     duration=(seconds(_FOR, "--for"), None),
     link=(text(_LINK, metavar="KEY=VALUE|FILE", of=list[str] | None), None),
     transport=_TRANSPORT,
+    rosbridge=_ROSBRIDGE,
+    no_token=(flag("--no-token", "Let in all clients of --rosbridge."), False),
     **RUN,
 )
 def live(
@@ -154,6 +162,7 @@ def live(
     link: list[str] | None,
     transport: list[str] | None,
     set_: list[str] | None,
+    no_token: bool,
     quiet: Quiet = False,
     verbose: Verbose = False,
     **asked: Any,
@@ -177,7 +186,11 @@ def live(
 
     changes = (*(set_ or ()), *changes_by_link(link or ()))
     options = LiveOptions(
-        changes=changes, emulated=bool(link), transport=tuple(transport or ()), **asked
+        changes=changes,
+        emulated=bool(link),
+        transport=tuple(transport or ()),
+        token=not no_token,
+        **asked,
     )
     dva, has_keys = options.dva, options.keys is not None
     at = dva if dva is not None and not problem_of(dva) and only in (None, "dva") else None
@@ -232,6 +245,7 @@ def live(
     out=(folder("Save tables of what people did in this folder.", "-o", "--out"), None),
     keep_motion=(folder("Save motion data of phones whose users agree in this folder."), None),
     overwrite=(Overwrite, False),
+    rosbridge=_ROSBRIDGE,
     **RUN,
 )
 def console(

@@ -40,6 +40,7 @@ class ConsoleOptions(PageOptions):
         results: Folder for the tables of what people did, if any.
         keep_motion: Folder for the samples of phones whose person agrees, if any.
         overwrite: What is there may be replaced.
+        rosbridge: Port for clients of ROS; None: there is none.
     """
 
     scenario: str = DEFAULT
@@ -54,6 +55,7 @@ class ConsoleOptions(PageOptions):
     results: Path | None = None
     keep_motion: Path | None = None
     overwrite: bool = False
+    rosbridge: int | None = None
 
     def kept_results(self) -> KeptResults | None:
         """What makes tables of what people do, if they are wanted.

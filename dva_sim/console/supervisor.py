@@ -20,6 +20,9 @@ from dva_sim.live.process import ending_when_asked
 from dva_sim.live.recording import Keeper, LiveRecorder
 from dva_sim.network.emulator.process import LinkEnded
 from dva_sim.network.emulator.report import LinkReport
+from dva_sim.ros.gateway import RosGateway
+from dva_sim.ros.options import open_port
+from dva_sim.ros.server import RosbridgeServer
 from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation.full.verdicts import refuse_broken, verdicts
 from dva_sim.simulation.scenario import Scenario
@@ -137,6 +140,7 @@ class ConsoleSupervisor:
             self._processes.start(world, actions.take, audit=path)
             if world.sockets is not None:
                 self._say(f"DVA: {world.sockets.dva}")
+            rosbridge = self._serve_ros(world)
             if not ending.is_asked:
                 if world.sockets is not None:
                     world.sockets.begin()
@@ -144,7 +148,22 @@ class ConsoleSupervisor:
                 world.clock.run()
             if world.sockets is not None and world.sockets.has_lost_link:
                 raise LinkEnded("the emulated link has ended by itself")
+            if rosbridge is not None:
+                rosbridge.close()
             self._leave(world)
+
+    def _serve_ros(self, world: ConsoleWorld) -> RosbridgeServer | None:
+        """Serve the robots to clients of ROS, if that is wanted."""
+        options = self._options
+        if options.rosbridge is None:
+            return None
+        port = open_port(options.host, options.rosbridge, "--rosbridge", options.token)
+        stage = world.run.stage
+        gateway = RosGateway(stage, lambda: world.console)
+        self._say(f"rosbridge: {port.url}")
+        return RosbridgeServer(
+            *(world.clock, port.listener, gateway, stage.site), port.token, world.note
+        )
 
     def _leave(self, world: ConsoleWorld) -> None:
         """Everybody who drives is stopped, and a moment is left for the word of it."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from dva_sim.kernel.errors import DvaSimError, error_line
 from dva_sim.live.options import PATHS, LiveOptions
 from dva_sim.live.process import run_part
+from dva_sim.ros.options import OpenPort
 from dva_sim.serving.pipes import PipeEnd
 
 
@@ -30,6 +31,7 @@ def main(argument: str) -> int:
             told["epoch"],
             supervised=True,
             outlet=told["outlet"],
+            door=OpenPort.received(*told["door"]) if told["door"] else None,
         )
     except DvaSimError as error:
         print(error_line(error), file=sys.stderr)

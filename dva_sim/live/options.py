@@ -24,6 +24,7 @@ from dva_sim.simulation.full import rehearse
 from dva_sim.simulation.scenario import Scenario, build, load
 
 PARTS = ("dva", "world", "operator")
+ROSBRIDGE = "rosbridge"  # part for clients of ROS, which is never run alone
 PATHS = ("keys", "record", "state")  # options that name files
 CAMERA_PORT = 8764  # of the robots' pictures; if it is taken, any that is free
 TRACED = {None: "*", "dva": "dva", "world": "robot-*", "operator": ""}  # by who is run alone
@@ -52,6 +53,8 @@ class LiveOptions:
         camera_port: Port of the robots' pictures; None: the usual one, and with keys none.
         emulated: The scenario's link is emulated between the robots and everybody else.
         transport: What carries the messages, as on the command line; see `carrier_of`.
+        rosbridge: Port for clients of ROS; None: there is none.
+        token: Whether such clients have to show a token.
     """
 
     scenario: str
@@ -69,6 +72,8 @@ class LiveOptions:
     camera_port: int | None = None
     emulated: bool = False
     transport: tuple[str, ...] = ()
+    rosbridge: int | None = None
+    token: bool = True
 
     @property
     def carrier(self) -> RunCarrier:
@@ -129,6 +134,8 @@ class LiveOptions:
             DvaSimError: this process may open too few files for the team.
         """
         scenario, document = self.read(), load(self.scenario)
+        if part is not None and self.rosbridge is not None:
+            raise ConfigError("--rosbridge is for whole runs: leave out --only")
         if self.emulated:
             self._check_emulated(scenario, part)
         check_room_for(scenario.robot.count + scenario.guard.count + scenario.operator.count)

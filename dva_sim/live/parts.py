@@ -26,10 +26,14 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either
 from dva_sim.live.open_files import devices_that_fit
-from dva_sim.live.options import PARTS, LiveOptions, trace_of
+from dva_sim.live.options import PARTS, ROSBRIDGE, LiveOptions, trace_of
 from dva_sim.live.recording import LiveRecorder, TraceFile, TraceLines, event_facts
 from dva_sim.network.messaging import Transport
+from dva_sim.network.realtime import LiveClock
 from dva_sim.protocol.exchange import LOW_BITS
+from dva_sim.ros.gateway import RosGateway
+from dva_sim.ros.options import OpenPort
+from dva_sim.ros.server import RosbridgeServer
 from dva_sim.simulation.full.control_room import add_dispatcher, add_dva, add_operator
 from dva_sim.simulation.full.dva_trace import traced
 from dva_sim.simulation.full.observations import STANDS, FactLog, motion_of, page_of
@@ -320,12 +324,51 @@ class OperatorPart:
         self._agent.put_down()
 
 
-def make_part(name: str, stage: Stage, options: LiveOptions, number: int) -> LivePart:
+class RosbridgePart:
+    """Serves the robots of the run to clients of ROS, by what their messages say."""
+
+    def __init__(self, stage: Stage, door: OpenPort) -> None:
+        clock = stage.clock
+        assert isinstance(clock, LiveClock)
+        self._gateway = RosGateway(stage)
+        recorder = stage.recorder
+        self._server = RosbridgeServer(
+            *(clock, door.listener, self._gateway, stage.site),
+            token=door.token,
+            tell=lambda what: recorder.tell(clock.now, ROSBRIDGE, what, "link"),
+        )
+
+    def rows(self) -> list[Row]:
+        """See `LivePart`: nothing; its devices are on the DVA's list."""
+        return []
+
+    def keep(self, recorder: LiveRecorder) -> None:
+        """See `LivePart`: how the drives of clients stand."""
+        recorder.catch_up()
+
+    def settled(self) -> bool:
+        """See `LivePart`: no client is in control."""
+        return not self._gateway.is_driving
+
+    def has_company(self) -> bool:
+        """See `LivePart`: the DVA has answered."""
+        return bool(self._gateway.device.round_trips)
+
+    def finish(self) -> None:
+        """See `LivePart`: what clients drive is stopped."""
+        self._server.close()
+
+
+def make_part(
+    name: str, stage: Stage, options: LiveOptions, number: int, door: OpenPort | None = None
+) -> LivePart:
     """The part of that name; `number` says which operator.
 
     Raises:
         ConfigError: the scenario has no such operator, or no place for its team.
     """
+    if name == ROSBRIDGE and door is not None:
+        return RosbridgePart(stage, door)
     if name not in PARTS:
         raise ConfigError(f"--only {name!r} should be {either(PARTS)}")
     if name == "operator" and not 1 <= number <= stage.scenario.operator.count:

@@ -26,6 +26,7 @@ from dva_sim.network.mqtt import open_broker
 from dva_sim.network.real_network import RealNetwork
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import split_address
+from dva_sim.ros.options import OpenPort
 from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation.full.stage import DVA, Stage, id_of, team_of
 from dva_sim.simulation.full.verdicts import Verdict
@@ -76,6 +77,7 @@ def run_part(
     epoch: float | None = None,
     supervised: bool = False,
     outlet: int | None = None,
+    door: OpenPort | None = None,
 ) -> list[Verdict]:
     """Be one part until the end of the run, Ctrl-C, SIGTERM, or the end of standard input.
 
@@ -91,6 +93,7 @@ def run_part(
         supervised: End when standard input does: whoever started this process is gone.
         outlet: Number of the open file that takes what is recorded, and judged. None: this part
             does both alone.
+        door: Port for clients of other makes, if this part serves them.
 
     Returns:
         How the safety rules have fared, as far as this part can tell; none with an outlet.
@@ -112,6 +115,7 @@ def run_part(
             epoch=epoch,
             supervised=supervised,
             out=out,
+            door=door,
         )
     finally:
         out.close()
@@ -129,6 +133,7 @@ def _run_part(
     epoch: float | None,
     supervised: bool,
     out: PipeEnd,
+    door: OpenPort | None,
 ) -> None:
     scenario = options.read()
     ring = None if options.keys is None else KeyRing(options.keys)
@@ -165,8 +170,8 @@ def _run_part(
         )
         if options.dva is not None and name != "dva":
             network.introduce(DVA, options.dva)
-        part = make_part(name, stage, options, number)
-        recorder.here(device.id_tag for device in stage.devices)
+        part = make_part(name, stage, options, number, door)
+        recorder.here(d.id_tag for d in stage.devices if recorder.is_own(d.id_tag))
         if service is not None and isinstance(part, WorldPart):
             part.film(service)
         gc.freeze()  # what stays for the whole run is not looked through again and again

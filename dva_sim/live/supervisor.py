@@ -15,13 +15,14 @@ from dataclasses import dataclass, field
 from typing import IO, Any
 
 from dva_sim.kernel.errors import ERROR, DvaSimError, ExitCode, RunsFailed
-from dva_sim.live.options import PATHS, LiveOptions
+from dva_sim.live.options import PATHS, ROSBRIDGE, LiveOptions
 from dva_sim.live.process import Report
 from dva_sim.live.recording import RunKeeping
 from dva_sim.network.carriers import DEFAULT_PORT, free_port
 from dva_sim.network.emulator.forwarder import FAR, NEAR
 from dva_sim.network.emulator.process import ADDRESSES, LinkEnded, LinkProcess
 from dva_sim.network.emulator.report import LinkReport
+from dva_sim.ros.options import OpenPort
 from dva_sim.simulation.full.verdicts import Verdict, broken_rules
 from dva_sim.simulation.scenario import Scenario
 
@@ -72,10 +73,16 @@ class Supervisor:
     Args:
         options: What to run and how.
         hear: Takes each report of each part.
+        rosbridge: Port for clients of ROS; None: there is none.
     """
 
-    def __init__(self, options: LiveOptions, hear: Callable[[str, Report], object]) -> None:
-        self._options, self._hear = options, hear
+    def __init__(
+        self,
+        options: LiveOptions,
+        hear: Callable[[str, Report], object],
+        rosbridge: OpenPort | None = None,
+    ) -> None:
+        self._options, self._hear, self._rosbridge = options, hear, rosbridge
         self._children: list[_Child] = []
         self._selector = selectors.DefaultSelector()
         self._epoch = time.monotonic()
@@ -123,6 +130,8 @@ class Supervisor:
                 self._start("world", "world", address, port=next(ports))
                 for number in range(1, scenario.operator.count + 1):
                     self._start(f"operator-{number}", "operator", address, number, next(ports))
+                if self._rosbridge is not None:
+                    self._start(ROSBRIDGE, ROSBRIDGE, address)
             return self._watch(limit)
         finally:
             self._end_all()
@@ -137,15 +146,18 @@ class Supervisor:
         """Start a part; it ends when its standard input does, whatever happens to us."""
         assert self._keeping is not None
         outlet = self._keeping.inlet()
-        told = self._arguments(part, dva, number, port, outlet)
+        door = self._rosbridge.passed() if self._rosbridge and part == ROSBRIDGE else ()
+        told = self._arguments(part, dva, number, port, outlet, door)
         words = [sys.executable, "-m", "dva_sim.live", told]
+        passed = outlet, *door
         pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
         if self._link is None:
             # In a new session Ctrl-C reaches us alone; we end the parts in good order.
-            process = subprocess.Popen(words, start_new_session=True, pass_fds=(outlet,), **pipes)
+            process = subprocess.Popen(words, start_new_session=True, pass_fds=passed, **pipes)
         else:
-            process = self._link.start(_end_of(part), words, pass_fds=(outlet,), **pipes)
-        os.close(outlet)
+            process = self._link.start(_end_of(part), words, pass_fds=passed, **pipes)
+        for file in (outlet, *door[1:]):
+            os.close(file)
         child = _Child(name, process)
         self._children.append(child)
         for stream, take in ((process.stdout, self._take_line), (process.stderr, self._take_error)):
@@ -153,13 +165,27 @@ class Supervisor:
             os.set_blocking(stream.fileno(), False)
             self._selector.register(stream, selectors.EVENT_READ, (child, take))
 
-    def _arguments(self, part: str, dva: str | None, number: int, port: int, outlet: int) -> str:
+    def _arguments(
+        self,
+        part: str,
+        dva: str | None,
+        number: int,
+        port: int,
+        outlet: int,
+        door: tuple[int, ...],
+    ) -> str:
         told = {**vars(self._options), "dva": dva, "port": port}
         if self._link is not None:
             told["host"] = ADDRESSES[_end_of(part)]
         for key in PATHS:
             told[key] = None if told[key] is None else str(told[key])
-        about = {"part": part, "number": number, "epoch": self._epoch, "outlet": outlet}
+        about = {
+            "part": part,
+            "number": number,
+            "epoch": self._epoch,
+            "outlet": outlet,
+            "door": door,
+        }
         return json.dumps(about | {"options": told})
 
     def _address_of_broker(self) -> str:

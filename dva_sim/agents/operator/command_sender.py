@@ -116,6 +116,12 @@ class CommandSender:
                 return
         self.clock.call_at(self._phone.next_look(now, self.rate_hz), self._look)
 
+    def look_now(self) -> None:
+        """Look between two periods: what makes the commands has something new."""
+        made = self._make() if self._on else None
+        if made is not None:
+            self._let(self._pattern.offer, made)
+
     def _go_on(self) -> None:
         """A reply has come, or none will: an app that waited for it looks again."""
         if not (self._is_held and self._on) or self._is_asking:

@@ -18,6 +18,7 @@ from dva_sim.agents.operator.command_sender import CommandSender
 from dva_sim.agents.operator.handheld import Console, Input, Said
 from dva_sim.agents.tilt import GivenTilt, TiltSources
 from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL
+from dva_sim.agents.tilt.velocity import GivenVelocity
 from dva_sim.kernel.recorder import DriveLog, Shown
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
@@ -342,6 +343,8 @@ class HeldRobot:
         self.steered(self._wished)
         if self.phase == "driving":
             self.app.ask(now, speed * reach.speed, turn * reach.turn_rate)
+            if isinstance(self.app, GivenVelocity) and self._sender is not None:
+                self._sender.look_now()
 
     def tilted(self, number: int, at: float) -> None:
         """So many samples of the person's phone have come, the newest taken at a time [s]."""

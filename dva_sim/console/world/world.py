@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any
 
 from dva_sim.agents.observation import Cameras
+from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.cameras.lines import FrameLine, Show, contained_line, scene_line
@@ -156,6 +157,11 @@ class ConsoleWorld(ToldWorld):
     def deafen(self, robot: str, on: bool) -> None:
         """The audit is told that a robot hears nothing, or hears again."""
         self.run.deafened(robot, on)
+
+    @property
+    def console(self) -> Console:
+        """Pattern, rate and limits of whoever drives from now on."""
+        return self._console
 
     def is_ours(self, device: str) -> bool:
         """Return True for a device of this console, whose messages are seen as they are sent."""

@@ -15,7 +15,7 @@ import shapely
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import OVER_ZMQ, Cameras
 from dva_sim.agents.operator.strategies import Reach
-from dva_sim.core.registry import CONTROL_ROOM, DETECTOR, GUARD, OPERATOR, ROBOT
+from dva_sim.core.registry import CONTROL_ROOM, DETECTOR, GUARD, OPERATOR, REMOTE, ROBOT
 from dva_sim.core.roles import ControlRoomRole
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
@@ -37,6 +37,7 @@ _ROOMS = {
     "console": 5,
     "phone": 6,
     "control-room": 7,
+    "ros": 8,
     "fake": 15,
 }
 
@@ -98,6 +99,7 @@ TYPES = {
     "console": OPERATOR,
     "phone": OPERATOR,
     "control-room": CONTROL_ROOM,
+    "ros": REMOTE,
 }
 
 

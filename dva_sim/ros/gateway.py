@@ -1,0 +1,277 @@
+"""Robots of a DVA as clients of ROS find them: heard over the network, driven by permission.
+
+Nothing here looks at a robot itself: what is known of one has come by its messages, over the link
+of the run. Each client that takes control is a device of its own, with a session of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Final
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.observation import FRAME, CameraFrame
+from dva_sim.agents.operator.handheld import Console, Said
+from dva_sim.agents.operator.person_at_console import PersonAgent
+from dva_sim.agents.operator.steps import ask_emergency, give_back, start
+from dva_sim.agents.robot.sensors import sensor_topic
+from dva_sim.agents.tilt.velocity import GivenVelocity
+from dva_sim.core.registry import ROBOT
+from dva_sim.network.messaging import Subscription
+from dva_sim.protocol import messages as m
+from dva_sim.ros.published import namespace_of
+from dva_sim.simulation.full.control_room import console_of
+from dva_sim.simulation.full.stage import Stage
+
+LOOK_AROUND: Final = 2.0  # design: between two looks at who is there [s]
+MOST_ROBOTS: Final = 64
+MOST_DRIVERS: Final = 8  # clients that may be in control at a time
+SCAN_HZ: Final = 5.0
+RENEW: Final = 30.0  # design: of a subscription to a sensor [s]
+LIDAR: Final = "lidar"
+
+Heard = Callable[[str, object], object]
+
+
+class KnownRobot:
+    """What is known of a robot.
+
+    Attributes:
+        id_tag: Its id.
+        name: Its namespace.
+        label: Its name for people.
+    """
+
+    def __init__(self, id_tag: str, name: str, label: str) -> None:
+        self.id_tag, self.name, self.label = id_tag, name, label
+        self.frames: Subscription | None = None
+        self.scan: ScanReader | None = None
+
+
+class ScanReader:
+    """Reads the lidar of a robot, with a permission to do so, until `end`.
+
+    Args:
+        device: Who reads.
+        robot: By its id.
+        take: Takes ranges [m].
+    """
+
+    def __init__(
+        self, device: AgentDevice, robot: str, take: Callable[[tuple[float, ...]], object]
+    ) -> None:
+        self._device, self._robot, self._take = device, robot, take
+        self._session, self._is_over = 0, False
+        topic = sensor_topic(LIDAR, device.id_tag)
+        self._heard = device.network.subscribe(device.id_tag, robot, topic, self._on_value)
+        self._ask()
+
+    def _ask(self) -> None:
+        if not self._is_over:
+            wish = m.PermissionRequest(self._robot, "sensors", (LIDAR,))
+            self._device.ask(self._device.dva, wish, self._answered)
+            self._device.clock.call_after(RENEW, self._ask)
+
+    def _answered(self, reply: m.Reply) -> None:
+        if not isinstance(reply.content, m.Permission):
+            return
+        self._session = reply.content.session
+        if self._is_over:
+            give_back(self._device, self._robot, self._session)
+            return
+        start(
+            self._device,
+            self._robot,
+            m.DevSub(LIDAR, SCAN_HZ),
+            lambda: self._session,
+            wanted=lambda: not self._is_over,
+            begun=lambda: None,
+            refused=lambda _: None,
+            lost=lambda: None,
+        )
+
+    def _on_value(self, data: bytes) -> None:
+        message = self._device.read(data, self._robot)
+        if message is not None and isinstance(message.body, m.SensorValue):
+            self._take(message.body.values)
+
+    def end(self) -> None:
+        """Give the permission back."""
+        self._is_over = True
+        self._heard.close()
+        if self._session:
+            self._device.ask(self._robot, m.DevSub(LIDAR, 0.0), session=self._session)
+            give_back(self._device, self._robot, self._session)
+
+
+class RosDriver:
+    """A client that is in control of robots, or was.
+
+    Args:
+        device: Its own.
+        console: Gives pattern, rate and limits of the next drive.
+    """
+
+    def __init__(self, device: AgentDevice, console: Callable[[], Console]) -> None:
+        phone = console().phone
+        self._person = PersonAgent(device, console(), lambda: GivenVelocity(phone))
+        self._console, self._number = console, 0
+        device.register()
+
+    @property
+    def device(self) -> AgentDevice:
+        """Its device."""
+        return self._person.device
+
+    def take(self, robot: str, said: Said) -> None:
+        """Ask the DVA for a robot, and the robot to be driven."""
+
+        def taken(done: bool, text: str) -> None:
+            held = self._person.robots.get(robot)
+            if not done or held is None:
+                said(False, text)
+            elif held.is_driven:
+                said(True, text)
+            else:
+                held.start(partial(self._begun, robot, said))
+
+        self._person.attended, self._person.console = True, self._console()
+        self._person.take([robot], taken)
+
+    def _begun(self, robot: str, said: Said, done: bool, text: str) -> None:
+        if not done and (held := self._person.robots.get(robot)) is not None:
+            held.give_back()
+        said(done, text)
+
+    def release(self, robot: str, said: Said) -> None:
+        """Stop a robot, and give it back."""
+        held = self._person.robots.get(robot)
+        if held is None:
+            said(False, "it is not yours")
+            return
+        held.give_back()
+        said(True, "given back")
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether it has a robot in hand."""
+        return bool(self._person.robots)
+
+    def release_all(self) -> None:
+        """Stop and give back everything: the client is gone."""
+        self._person.release(lambda *_: None)
+
+    def drive(self, robot: str, speed: float, turn_rate: float) -> str:
+        """Command a speed [m/s] and a turn rate [rad/s]; return why not, or an empty text."""
+        held = self._person.robots.get(robot)
+        if held is None or not held.is_driven:
+            why = self._person.alert
+            return f"it is not yours{f' ({why})' if why else ''}: call take_control first"
+        reach = self._person.console.reach(robot)
+        self._number += 1
+        held.want(self._number, max(0.0, speed) / reach.speed, turn_rate / reach.turn_rate)
+        return ""
+
+
+class RosGateway:
+    """The devices through which clients of ROS hear and drive robots.
+
+    Args:
+        stage: Where they are made.
+        console: Gives pattern, rate and limits of the next drive; None: those of the scenario.
+
+    Attributes:
+        robots: Those that the DVA has on its list, by their namespace.
+        on_frame: Takes what has arrived of a robot: the robot, an observation, and when it was
+            captured [s].
+        on_scan: Takes the robot, and ranges [m].
+    """
+
+    def __init__(self, stage: Stage, console: Callable[[], Console] | None = None) -> None:
+        self._stage, self.clock = stage, stage.clock
+        self._console = console or (lambda: console_of(stage, stage.scenario))
+        self.device = stage.device("ros", 1)
+        self.device.call("rosbridge")
+        self.device.serve(lambda message: m.Reply(message.message_id, m.NOT_SUPPORTED, ""))
+        self.robots: dict[str, KnownRobot] = {}
+        self._free: list[RosDriver] = []
+        self._drivers: list[RosDriver] = []
+        self.on_frame: Callable[[KnownRobot, CameraFrame], object] = lambda *_: None
+        self.on_scan: Callable[[KnownRobot, tuple[float, ...]], object] = lambda *_: None
+        self.device.register(self._look_around)
+
+    # --- who is there --------------------------------------------------------------------
+
+    def _look_around(self) -> None:
+        self.device.ask(self.device.dva, m.GetDeviceList(), self._listed)
+        self.clock.call_after(LOOK_AROUND, self._look_around)
+
+    def _listed(self, reply: m.Reply) -> None:
+        if not isinstance(reply.content, m.DeviceList):
+            return
+        known = {robot.id_tag for robot in self.robots.values()}
+        for device in reply.content.devices:
+            if device.device_type != ROBOT or len(self.robots) >= MOST_ROBOTS:
+                continue
+            self.device.introduce(device.id_tag, device.address)
+            if device.id_tag not in known:
+                name = namespace_of(device.label)
+                while name in self.robots:
+                    name += "_"
+                self.robots[name] = KnownRobot(device.id_tag, name, device.label)
+                self.device.connect(device.id_tag)  # an emergency does not wait for that
+
+    # --- what is heard -------------------------------------------------------------------
+
+    def listen(self, name: str, frames: bool, scan: bool) -> None:
+        """Subscribe to what clients want of a robot, and to nothing else."""
+        robot = self.robots[name]
+        if frames and robot.frames is None:
+            hear = partial(self._on_frame, robot)
+            robot.frames = self.device.network.subscribe(
+                self.device.id_tag, robot.id_tag, FRAME, hear
+            )
+        elif not frames and robot.frames is not None:
+            robot.frames.close()
+            robot.frames = None
+        if scan and robot.scan is None:
+            robot.scan = ScanReader(self.device, robot.id_tag, partial(self._on_scan, robot))
+        elif not scan and robot.scan is not None:
+            robot.scan.end()
+            robot.scan = None
+
+    def _on_frame(self, robot: KnownRobot, came: CameraFrame | bytes) -> None:
+        frame = came if isinstance(came, CameraFrame) else CameraFrame.unpack(came)
+        if frame is not None and math.isfinite(frame.captured):
+            self.on_frame(robot, frame)
+
+    def _on_scan(self, robot: KnownRobot, ranges: tuple[float, ...]) -> None:
+        self.on_scan(robot, ranges)
+
+    # --- who drives ----------------------------------------------------------------------
+
+    def driver(self) -> RosDriver | None:
+        """Return a driver for a client; None: too many are in control."""
+        if self._free:
+            return self._free.pop()
+        number = 2 + len(self._drivers)
+        if len(self._drivers) >= MOST_DRIVERS:
+            return None
+        self._drivers.append(RosDriver(self._stage.device("ros", number), self._console))
+        return self._drivers[-1]
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether any client has a robot in hand."""
+        return any(driver.is_driving for driver in self._drivers)
+
+    def retire(self, driver: RosDriver) -> None:
+        """Stop what a client drove that is gone; the next one gets its device."""
+        driver.release_all()
+        self._free.append(driver)
+
+    def emergency(self, name: str, said: Said) -> None:
+        """Stop a robot, whoever drives it."""
+        ask_emergency(self.device, self.robots[name].id_tag, 0, said)

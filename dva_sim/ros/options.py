@@ -1,0 +1,64 @@
+"""What is asked of a server for clients of other makes, and how its address is told."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import socket
+from dataclasses import dataclass
+
+from dva_sim.serving.listening import listen
+
+
+@dataclass(frozen=True)
+class OpenPort:
+    """A port for clients of other makes.
+
+    Attributes:
+        listener: Listening socket.
+        token: That clients have to show; empty: anybody may come.
+        host: Address of this machine that it listens on.
+    """
+
+    listener: socket.socket
+    token: str
+    host: str
+
+    def passed(self) -> tuple[int, int]:
+        """Return open files for another process: the listener, and a pipe that holds the token.
+
+        Words of a command would show the token to everybody on this machine.
+        """
+        reader, writer = os.pipe()
+        os.write(writer, self.token.encode())
+        os.close(writer)
+        return self.listener.fileno(), reader
+
+    @classmethod
+    def received(cls, listener: int, token: int) -> OpenPort:
+        """Return the port that another process has passed."""
+        with os.fdopen(token, "rb") as pipe:
+            return cls(socket.socket(fileno=listener), pipe.read().decode(), "")
+
+    @property
+    def url(self) -> str:
+        """Return its address, with the token."""
+        shown = f"[{self.host}]" if ":" in self.host else self.host
+        query = f"/?token={self.token}" if self.token else ""
+        return f"ws://{shown}:{self.listener.getsockname()[1]}{query}"
+
+
+def open_port(host: str, port: int, option: str, has_token: bool = True) -> OpenPort:
+    """Open a port.
+
+    Args:
+        host: Address of this machine to listen on.
+        port: Which; 0 for any that is free.
+        option: Of the command, which names the port.
+        has_token: Whether clients need a token, which is drawn.
+
+    Raises:
+        ConfigError: the address is not of this machine, or taken.
+    """
+    token = secrets.token_urlsafe(24) if has_token else ""
+    return OpenPort(listen(host, port, option), token, host)

@@ -1,0 +1,195 @@
+"""One client of a rosbridge server: what it subscribed to, may do, and does too often."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Final, Protocol
+
+from dva_sim.ros.gateway import RosDriver
+from dva_sim.ros.rosbridge import BadOperation, decode, encode, name_in, number_in, plain_type
+from dva_sim.ros.websocket import TOO_SLOW, WebSocketConnection
+
+Json = dict[str, Any]
+
+PER_SECOND: Final = 200.0  # design: operations that are taken; a joystick makes 50
+BURST: Final = 400.0  # design: at once
+MOST_DROPPED: Final = 20_000  # design: operations of a flood, after which it is cut off
+MOST_TOPICS: Final = 256
+MOST_BEHIND: Final = 200_000  # design: with so much on its way a peer gets no more readings [B]
+SAY_AGAIN: Final = 5.0  # design: the same refusal is said no more often [s]
+ALIASES: Final = frozenset({"geometry_msgs/Twist", "geometry_msgs/TwistStamped"})
+
+
+class PeerHost(Protocol):
+    """What a client may ask of its server."""
+
+    def now(self) -> float:
+        """Return the time [s]."""
+
+    def type_of(self, topic: str) -> str | None:
+        """Return the type of a topic that is served; None: there is none."""
+
+    def subscribed(self, peer: RosPeer, topic: str) -> None:
+        """A client wants a topic from now on."""
+
+    def changed(self) -> None:
+        """A client wants less than before."""
+
+    def command(self, peer: RosPeer, topic: str, speed: float, turn_rate: float) -> str:
+        """Return why a command is refused; empty if it is obeyed."""
+
+    def call(self, peer: RosPeer, service: str, args: Any, answer: Callable[..., object]) -> None:
+        """Call a service; `answer(ok, values)` takes the result."""
+
+    def tell(self, what: str) -> None:
+        """Add a line to the story."""
+
+
+class Wanted:
+    """One subscription: time between two messages [s], and when the last one went [s]."""
+
+    def __init__(self, period: float) -> None:
+        self.period, self.sent_at = period, -math.inf
+
+
+class RosPeer:
+    """A client.
+
+    Args:
+        name: For people.
+        connection: To it.
+        host: Its server.
+
+    Attributes:
+        wants: What it subscribed to.
+        driver: Its device, from when it first takes control.
+    """
+
+    def __init__(self, name: str, connection: WebSocketConnection, host: PeerHost) -> None:
+        self.name, self._connection, self._host = name, connection, host
+        self.wants: dict[str, Wanted] = {}
+        self.driver: RosDriver | None = None
+        self._room, self._filled_at, self._dropped = BURST, host.now(), 0
+        self._said: dict[str, float] = {}
+
+    def take(self, data: bytes) -> None:
+        """Take a message, unless too many have come."""
+        if not self._has_room():
+            self._drop()
+            return
+        try:
+            operation = decode(data)
+            self._do(operation)
+        except BadOperation as error:
+            self.say(str(error))
+
+    def _has_room(self) -> bool:
+        now = self._host.now()
+        self._room = min(BURST, self._room + PER_SECOND * (now - self._filled_at))
+        self._filled_at = now
+        if self._room < 1.0:
+            return False
+        self._room -= 1.0
+        return True
+
+    def _drop(self) -> None:
+        self._dropped += 1
+        if self._dropped == 1:
+            self.say(f"more than {PER_SECOND:g} messages a second: the rest is dropped")
+            self._host.tell(f"{self.name} floods: more than {PER_SECOND:g} messages a second")
+        elif self._dropped == MOST_DROPPED:
+            self._connection.close(TOO_SLOW, "a flood of messages")
+
+    def _do(self, operation: Json) -> None:
+        match operation["op"]:
+            case "subscribe":
+                self._subscribe(operation)
+            case "unsubscribe":
+                self.wants.pop(name_in(operation, "topic"), None)
+                self._host.changed()
+            case "advertise":
+                self._advertise(operation)
+            case "publish":
+                self._publish(operation)
+            case "call_service":
+                self._call(operation)
+            case "unadvertise" | "status" | "set_level" | "auth":
+                pass
+            case other:
+                raise BadOperation(f"op {other[:40]!r} is not supported")
+
+    def _subscribe(self, operation: Json) -> None:
+        topic = name_in(operation, "topic")
+        known = self._host.type_of(topic)
+        if known is None:
+            raise BadOperation(f"topic {topic!r} is not served; see /rosapi/topics")
+        kind = operation.get("type")
+        if kind is not None and plain_type(name_in(operation, "type")) != known:
+            raise BadOperation(f"topic {topic!r} is of type {known}, not {kind}")
+        if operation.get("compression", "none") not in ("none", None):
+            self.say("compression is not supported: messages come as JSON")
+        number_in(operation, "queue_length", 1e9)
+        period = number_in(operation, "throttle_rate", 3_600_000) / 1000
+        if len(self.wants) >= MOST_TOPICS:
+            raise BadOperation(f"{MOST_TOPICS} topics are all that a client may have")
+        self.wants[topic] = Wanted(period)
+        self._host.subscribed(self, topic)
+
+    def _advertise(self, operation: Json) -> None:
+        topic = name_in(operation, "topic")
+        if not topic.endswith("/cmd_vel"):
+            raise BadOperation(f"topic {topic!r} is not read; cmd_vel of a robot is")
+        if plain_type(name_in(operation, "type")) not in ALIASES:
+            raise BadOperation(f"topic {topic!r} takes geometry_msgs/Twist or TwistStamped")
+
+    def _publish(self, operation: Json) -> None:
+        topic, message = name_in(operation, "topic"), operation.get("msg")
+        twist = message.get("twist", message) if isinstance(message, dict) else None
+        try:
+            speed, turn_rate = twist["linear"]["x"], twist["angular"]["z"]  # type: ignore[index]
+        except (TypeError, KeyError):
+            raise BadOperation(f"{topic}: no Twist with linear.x and angular.z") from None
+        for what, value in (("linear.x", speed), ("angular.z", turn_rate)):
+            is_number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not is_number or not math.isfinite(value):
+                raise BadOperation(f"{topic}: {what} is {str(value)[:40]}, not a finite number")
+        if why := self._host.command(self, topic, float(speed), float(turn_rate)):
+            raise BadOperation(f"{topic}: {why}")
+
+    def _call(self, operation: Json) -> None:
+        service, number = name_in(operation, "service"), operation.get("id")
+
+        def answer(ok: bool, values: Any) -> None:
+            reply = {"op": "service_response", "service": service, "values": values, "result": ok}
+            self._send(reply | ({} if number is None else {"id": number}))
+
+        self._host.call(self, service, operation.get("args"), answer)
+
+    # --- what it is sent -----------------------------------------------------------------
+
+    def offer(self, topic: str, data: bytes) -> None:
+        """Send a reading, unless it wants it later or has not taken the last ones."""
+        wanted, now = self.wants.get(topic), self._host.now()
+        if wanted is None or now < wanted.sent_at + wanted.period - 1e-6:
+            return
+        if self._connection.waiting <= MOST_BEHIND:
+            wanted.sent_at = now
+            self._connection.send(data)
+
+    def say(self, what: str) -> None:
+        """Say what was refused; the same no more than once in a while."""
+        now = self._host.now()
+        if now - self._said.get(what, -math.inf) >= SAY_AGAIN:
+            if len(self._said) > MOST_TOPICS:
+                self._said.clear()
+            self._said[what] = now
+            self._send({"op": "status", "level": "error", "msg": what})
+
+    def _send(self, operation: Json) -> None:
+        if self._connection.waiting <= MOST_BEHIND:
+            self._connection.send(encode(operation))
+
+    def close(self) -> None:
+        """End the connection."""
+        self._connection.close(reason="the run is over")

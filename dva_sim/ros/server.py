@@ -1,0 +1,304 @@
+"""A rosbridge server of a run: topics and services of its robots, for clients of ROS."""
+
+from __future__ import annotations
+
+import hmac
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+from http import HTTPStatus
+from typing import Any, Final
+from urllib.parse import parse_qs, urlsplit
+
+from dva_sim.agents.observation import CameraFrame
+from dva_sim.network.realtime import LiveClock
+from dva_sim.ros import published
+from dva_sim.ros.gateway import KnownRobot, RosGateway
+from dva_sim.ros.peers import RosPeer
+from dva_sim.ros.rosbridge import encode
+from dva_sim.ros.websocket import WebSocketConnection
+from dva_sim.worlds.site import Site
+
+Json = dict[str, Any]
+Answer = Callable[[bool, Json], object]
+
+MOST_PEERS: Final = 16
+LARGEST: Final = 100_000  # design: of a message of a client; a Twist has 200 [B]
+CLOCK_PERIOD: Final = 0.1  # [s]
+SHAKES_WITHIN: Final = 5.0  # design: from TCP to WebSocket [s]
+TYPES: Final = {
+    "odom": "nav_msgs/Odometry",
+    "scan": "sensor_msgs/LaserScan",
+    "image/compressed": "sensor_msgs/CompressedImage",
+    "cmd_vel": "geometry_msgs/Twist",
+}
+SHARED: Final = {
+    "/tf": "tf2_msgs/TFMessage",
+    "/clock": "rosgraph_msgs/Clock",
+    "/map": "nav_msgs/OccupancyGrid",
+}
+CONTROL: Final = "take_control", "release_control", "emergency_stop"
+TRIGGER: Final = "std_srvs/Trigger"
+ROSAPI: Final = {
+    "/rosapi/topics": "rosapi/Topics",
+    "/rosapi/topic_type": "rosapi/TopicType",
+    "/rosapi/topics_for_type": "rosapi/TopicsForType",
+    "/rosapi/services": "rosapi/Services",
+    "/rosapi/service_type": "rosapi/ServiceType",
+    "/rosapi/services_for_type": "rosapi/ServicesForType",
+    "/rosapi/nodes": "rosapi/Nodes",
+    "/rosapi/get_time": "rosapi/GetTime",
+}
+
+
+class RosbridgeServer:
+    """Serves the robots that a gateway hears.
+
+    Args:
+        clock: Polls the sockets.
+        listener: Listening socket.
+        gateway: The robots.
+        site: For the map.
+        token: That clients have to show to drive; empty: anybody may.
+        tell: Adds a line to the story.
+    """
+
+    def __init__(
+        self,
+        clock: LiveClock,
+        listener: socket.socket,
+        gateway: RosGateway,
+        site: Site,
+        token: str,
+        tell: Callable[[str], object],
+    ) -> None:
+        self._clock, self._listener, self._gateway, self._site = clock, listener, gateway, site
+        self._token, self._tell = token, tell
+        self._peers: dict[WebSocketConnection, RosPeer | None] = {}
+        self._count, self._map = 0, b""
+        gateway.on_frame, gateway.on_scan = self._on_frame, self._on_scan
+        clock.watch(listener.fileno(), self._accept)
+        clock.every(CLOCK_PERIOD, self._tick)
+
+    @property
+    def port(self) -> int:
+        """Return the port that it listens on."""
+        return int(self._listener.getsockname()[1])
+
+    def tell(self, what: str) -> None:
+        """See `PeerHost`."""
+        self._tell(what)
+
+    def now(self) -> float:
+        """See `PeerHost`."""
+        return self._clock.now
+
+    # --- connections ---------------------------------------------------------------------
+
+    def _accept(self) -> None:
+        from websockets.server import ServerProtocol  # late: start-up
+
+        with suppress(OSError):
+            sock, _ = self._listener.accept()
+            if len(self._peers) >= MOST_PEERS:
+                sock.close()
+                return
+            protocol = ServerProtocol(max_size=LARGEST)
+            connection = WebSocketConnection(
+                self._clock,
+                sock,
+                protocol,
+                lambda data: self._take(connection, data),
+                lambda why: self._ended(connection, why),
+            )
+            connection.on_event = lambda event: self._greet(connection, protocol, event)
+            self._peers[connection] = None
+            self._clock.call_after(SHAKES_WITHIN, self._give_up, connection)
+
+    def _give_up(self, connection: WebSocketConnection) -> None:
+        if self._peers.get(connection, self) is None:
+            connection.end("does not speak WebSocket")
+
+    def _greet(self, connection: WebSocketConnection, protocol: Any, request: Any) -> None:
+        """Answer the opening handshake."""
+        if protocol.handshake_exc is not None:
+            return
+        refusal = self._refusal(request)
+        if refusal is not None:
+            protocol.send_response(protocol.reject(*refusal))
+            connection.push()
+            connection.end(refusal[1])
+            return
+        protocol.send_response(protocol.accept(request))
+        if protocol.handshake_exc is None:
+            self._count += 1
+            name = f"ROS client {self._count}"
+            self._peers[connection] = RosPeer(name, connection, self)
+            self.tell(f"{name} has come")
+
+    def _refusal(self, request: Any) -> tuple[HTTPStatus, str] | None:
+        """Return why a client is not let in: a page of another site, or no token."""
+        origin = request.headers.get("Origin")
+        host = request.headers.get("Host", "")
+        if (
+            origin is not None
+            and urlsplit(origin).netloc.rpartition(":")[0] != host.rpartition(":")[0]
+        ):
+            return HTTPStatus.FORBIDDEN, "a page of another site may not ask here\n"
+        shown = parse_qs(urlsplit(request.path).query).get("token", [""])[0]
+        bearer = request.headers.get("Authorization", "")
+        shown = shown or bearer.removeprefix("Bearer ")
+        if not hmac.compare_digest(shown.encode("utf-8", "replace"), self._token.encode()):
+            return HTTPStatus.UNAUTHORIZED, "the token is missing or wrong: ws://...?token=...\n"
+        return None
+
+    def _take(self, connection: WebSocketConnection, data: bytes) -> None:
+        peer = self._peers.get(connection)
+        if peer is not None:
+            peer.take(data)
+
+    def _ended(self, connection: WebSocketConnection, why: str) -> None:
+        peer = self._peers.pop(connection, None)
+        if peer is None:
+            return
+        self.tell(f"{peer.name} has gone: {why}")
+        if peer.driver is not None:
+            self._gateway.retire(peer.driver)
+            peer.driver = None
+        self.changed()
+
+    def close(self) -> None:
+        """End all connections; what clients drove is stopped."""
+        self._clock.unwatch(self._listener.fileno())
+        self._listener.close()
+        for connection in list(self._peers):
+            connection.close(reason="the run is over")
+
+    # --- what there is -------------------------------------------------------------------
+
+    def topics(self) -> dict[str, str]:
+        """Return all topics with their types."""
+        own = {
+            f"/{name}/{topic}": kind
+            for name in self._gateway.robots
+            for topic, kind in TYPES.items()
+        }
+        return own | SHARED
+
+    def services(self) -> dict[str, str]:
+        """Return all services with their types."""
+        own = {f"/{name}/{word}": TRIGGER for name in self._gateway.robots for word in CONTROL}
+        return own | ROSAPI
+
+    def type_of(self, topic: str) -> str | None:
+        """See `PeerHost`; of a robot that may still come, what it would be."""
+        name, _, rest = topic.lstrip("/").partition("/")
+        return SHARED.get(topic) or (TYPES.get(rest) if name else None)
+
+    def subscribed(self, peer: RosPeer, topic: str) -> None:
+        """See `PeerHost`."""
+        self.changed()
+        if topic == "/map":
+            self._map = self._map or self._packed("/map", published.occupancy(self._site.grid))
+            peer.offer(topic, self._map)
+
+    def changed(self) -> None:
+        """See `PeerHost`: hear of each robot what somebody wants, and no more."""
+        wanted = {
+            topic for peer in self._peers.values() if peer is not None for topic in peer.wants
+        }
+        for name in self._gateway.robots:
+            frames = bool(wanted & {f"/{name}/odom", "/tf", f"/{name}/image/compressed"})
+            self._gateway.listen(name, frames, f"/{name}/scan" in wanted)
+
+    def _tick(self) -> None:
+        self.changed()  # robots may have come
+        self._send("/clock", lambda: published.clock(self._clock.now))
+
+    # --- readings ------------------------------------------------------------------------
+
+    def _on_frame(self, robot: KnownRobot, frame: CameraFrame) -> None:
+        name, seen, at = robot.name, frame.observation, frame.captured
+        self._send(f"/{name}/odom", lambda: published.odometry(name, seen, at))
+        self._send("/tf", lambda: published.transform(name, seen, at))
+
+    def _on_scan(self, robot: KnownRobot, ranges: tuple[float, ...]) -> None:
+        name, now = robot.name, self._clock.now
+        self._send(f"/{name}/scan", lambda: published.scan(name, ranges, now))
+
+    def _send(self, topic: str, make: Callable[[], Json]) -> None:
+        """Send a message to all who want it; without any it is not made."""
+        peers = [p for p in self._peers.values() if p is not None and topic in p.wants]
+        if peers:
+            data = self._packed(topic, make())
+            for peer in peers:
+                peer.offer(topic, data)
+
+    @staticmethod
+    def _packed(topic: str, message: Json) -> bytes:
+        return encode({"op": "publish", "topic": topic, "msg": message})
+
+    # --- control -------------------------------------------------------------------------
+
+    def command(self, peer: RosPeer, topic: str, speed: float, turn_rate: float) -> str:
+        """See `PeerHost`."""
+        name, _, rest = topic.lstrip("/").partition("/")
+        robot = self._gateway.robots.get(name)
+        if rest != "cmd_vel" or robot is None:
+            return "no robot has this topic; see /rosapi/topics"
+        if peer.driver is None:
+            return "it is not yours: call take_control first"
+        return peer.driver.drive(robot.id_tag, speed, turn_rate)
+
+    def call(self, peer: RosPeer, service: str, args: Any, answer: Answer) -> None:
+        """See `PeerHost`."""
+        if service in ROSAPI:
+            values = self._rosapi(service, args if isinstance(args, dict) else {})
+            answer(True, values)
+            return
+        name, _, word = service.lstrip("/").partition("/")
+        robot = self._gateway.robots.get(name)
+        if robot is None or word not in CONTROL:
+            answer(False, {"message": f"there is no service {service}; see /rosapi/services"})
+            return
+
+        def said(done: bool, text: str) -> None:
+            answer(True, {"success": done, "message": text})
+
+        if word == "emergency_stop":
+            self._gateway.emergency(name, said)
+        elif word == "take_control":
+            self._let_take(peer, robot, said)
+        elif peer.driver is None:
+            said(False, "it is not yours")
+        else:
+            peer.driver.release(robot.id_tag, said)
+
+    def _let_take(
+        self, peer: RosPeer, robot: KnownRobot, said: Callable[[bool, str], object]
+    ) -> None:
+        peer.driver = peer.driver or self._gateway.driver()
+        if peer.driver is None:
+            said(False, "too many clients are in control")
+            return
+        peer.driver.take(robot.id_tag, said)
+
+    def _rosapi(self, service: str, args: Json) -> Json:
+        topics, services, kind = self.topics(), self.services(), str(args.get("type", ""))
+        match service.rpartition("/")[2]:
+            case "topics":
+                return {"topics": list(topics), "types": list(topics.values())}
+            case "topic_type":
+                return {"type": topics.get(str(args.get("topic")), "")}
+            case "topics_for_type":
+                return {"topics": [name for name, each in topics.items() if each == kind]}
+            case "services":
+                return {"services": list(services)}
+            case "service_type":
+                return {"type": services.get(str(args.get("service")), "")}
+            case "services_for_type":
+                return {"services": [name for name, each in services.items() if each == kind]}
+            case "nodes":
+                return {"nodes": ["/dva_sim"]}
+            case _:
+                return {"time": published.time_of(self._clock.now)}
