@@ -51,11 +51,11 @@ test-browser: $(DEV)  ## the console's pages in the system's Chromium
 	@echo "Running the tests in a browser ..."
 	@$(PYTEST) tests/console/browser
 
-test-extras: $(EXTRAS)  ## what needs extras: every transport over its real middleware, environments for learners
+test-extras: $(EXTRAS)  ## what needs extras: every transport over its real middleware, environments for learners, a client of ROS
 	@$(BIN)/python -c 'import shutil, sys; sys.exit(shutil.which("mosquitto") is None)' \
 	  || echo "MQTT is left out: the program mosquitto is missing; try: apt-get install mosquitto"
 	@$(PYTEST) -m "system or not system" tests/testing/test_transports.py tests/network/middleware tests/simulation/middleware \
-	  tests/network/test_mqtt.py tests/live/test_over_mqtt.py tests/live/test_taking_over.py tests/contracts tests/envs
+	  tests/network/test_mqtt.py tests/live/test_over_mqtt.py tests/live/test_taking_over.py tests/contracts tests/envs tests/ros/test_with_roslibpy.py
 
 test-long: $(DEV)  ## long searches and whole studies, the same cases each time
 	@echo "Running the long tests ..."
@@ -108,7 +108,7 @@ $(DEV): pyproject.toml constraints.txt | $(VENV)
 
 $(EXTRAS): $(DEV)
 	@echo "Installing the extras: middleware for transports, Gymnasium ..."
-	@$(PIP) install -c constraints.txt -e '.[dev,mqtt,zenoh,webrtc,dds,rl]'
+	@$(PIP) install -c constraints.txt -e '.[dev,mqtt,zenoh,webrtc,dds,rl,ros,foxglove]'
 	@touch $@ $(DEV) $(RUNTIME)
 
 $(BENCH): $(DEV)

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from typing import Any
+from urllib.parse import parse_qs, urlsplit
 
 from dva_sim.cameras.children import ChildFailed
 from dva_sim.console.audit.audit_keeper import auditing
@@ -160,6 +161,8 @@ class ConsoleSupervisor:
         port = open_port(options.host, options.rosbridge, "--rosbridge", options.token)
         stage = world.run.stage
         gateway = RosGateway(stage, lambda: world.console)
+        look = urlsplit(str(self._processes.serving.get("look", "")))
+        gateway.camera_token = parse_qs(look.query).get("token", [""])[0]
         self._say(f"rosbridge: {port.url}")
         return RosbridgeServer(
             *(world.clock, port.listener, gateway, stage.site), port.token, world.note

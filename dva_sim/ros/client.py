@@ -65,6 +65,7 @@ class RosbridgeClient:
         self._dialer: WebSocketDialer | None = None
         self.is_connected = False
         self.counters: Counter[str] = Counter()
+        self._calls: dict[str, Callable[[bool, str], object]] = {}
         clock.every(1.0, self._look)
 
     def connect(self) -> None:
@@ -87,6 +88,11 @@ class RosbridgeClient:
             return False
         connection.send(encode({"op": "publish", "topic": topic, "msg": message}))
         return self.is_connected
+
+    def call(self, service: str, answered: Callable[[bool, str], object]) -> None:
+        """Call a service without arguments; `answered` takes success and text, once it comes."""
+        self._calls[service] = answered
+        self._send({"op": "call_service", "service": service, "id": service, "args": {}})
 
     def renew(self, why: str) -> None:
         """Drop the connection, with all that waits in it, and connect again."""
@@ -158,8 +164,18 @@ class RosbridgeClient:
             wanted = self._topics.get(str(operation.get("topic")))
             if wanted is not None:
                 wanted.take(operation.get("msg"))
+        elif operation["op"] == "service_response":
+            self._answered(operation)
         elif operation["op"] == "status" and operation.get("level") in ("error", "warning"):
             self._refuse("", f"the server says: {str(operation.get('msg'))[:120]}")
+
+    def _answered(self, operation: dict[str, Any]) -> None:
+        answered = self._calls.pop(str(operation.get("id")), None)
+        values = operation.get("values")
+        if answered is not None:
+            told = values if isinstance(values, dict) else {"message": values}
+            done = operation.get("result") is not False and told.get("success") is True
+            answered(done, str(told.get("message", ""))[:120])
 
     def _topic_of(self, data: bytes) -> str:
         """Return the topic of a message that may be too large to be read."""

@@ -31,7 +31,7 @@ class Fitness:
         self._bridge, self._refused = NO_BRIDGE, ""
         self._heard, self._best, self._at, self._behind = -math.inf, math.inf, 0.0, 0.0
         self._late_since = math.inf
-        self._does_not_stop = False
+        self._does_not_stop, self._disabled = False, ""
 
     def connected(self) -> None:
         """The bridge is there; what came over an earlier connection says nothing any more."""
@@ -56,6 +56,10 @@ class Fitness:
         """Odometry has come that says nothing of use."""
         self._refused = why
 
+    def disabled(self, why: str) -> None:
+        """It has to be enabled, and is not yet; empty: it is."""
+        self._disabled = why
+
     def obeys(self, now: float, stopped_at: float, has_stood: bool) -> None:
         """It was told to stand at a time [s], and has stood since or not."""
         self._does_not_stop = not has_stood and now - stopped_at > self._limits.stands_within_s
@@ -72,6 +76,8 @@ class Fitness:
             why = f": {self._refused}" if self._refused else ""
             return f"odometry is more than {late:g} s late{why}"
         self._late_since = math.inf
+        if self._disabled:
+            return f"it is not enabled: {self._disabled}"
         if self._does_not_stop:
             return f"it does not stop within {self._limits.stands_within_s:g} s"
         return ""

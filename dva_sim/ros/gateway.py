@@ -20,7 +20,9 @@ from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.agents.tilt.velocity import GivenVelocity
 from dva_sim.core.registry import ROBOT
 from dva_sim.network.messaging import Subscription
+from dva_sim.network.realtime import LiveClock
 from dva_sim.protocol import messages as m
+from dva_sim.ros.mjpeg import MjpegReader
 from dva_sim.ros.published import namespace_of
 from dva_sim.simulation.full.control_room import console_of
 from dva_sim.simulation.full.stage import Stage
@@ -31,8 +33,6 @@ MOST_DRIVERS: Final = 8  # clients that may be in control at a time
 SCAN_HZ: Final = 5.0
 RENEW: Final = 30.0  # design: of a subscription to a sensor [s]
 LIDAR: Final = "lidar"
-
-Heard = Callable[[str, object], object]
 
 
 class KnownRobot:
@@ -48,6 +48,8 @@ class KnownRobot:
         self.id_tag, self.name, self.label = id_tag, name, label
         self.frames: Subscription | None = None
         self.scan: ScanReader | None = None
+        self.pictures: MjpegReader | None = None
+        self.is_asked = False
 
 
 class ScanReader:
@@ -187,6 +189,8 @@ class RosGateway:
         on_frame: Takes what has arrived of a robot: the robot, an observation, and when it was
             captured [s].
         on_scan: Takes the robot, and ranges [m].
+        on_picture: Takes the robot, a JPEG, and when it was captured [s].
+        camera_token: Shown to servers of pictures; empty: none.
     """
 
     def __init__(self, stage: Stage, console: Callable[[], Console] | None = None) -> None:
@@ -200,6 +204,8 @@ class RosGateway:
         self._drivers: list[RosDriver] = []
         self.on_frame: Callable[[KnownRobot, CameraFrame], object] = lambda *_: None
         self.on_scan: Callable[[KnownRobot, tuple[float, ...]], object] = lambda *_: None
+        self.on_picture: Callable[[KnownRobot, bytes, float], object] = lambda *_: None
+        self.camera_token = ""
         self.device.register(self._look_around)
 
     # --- who is there --------------------------------------------------------------------
@@ -225,9 +231,10 @@ class RosGateway:
 
     # --- what is heard -------------------------------------------------------------------
 
-    def listen(self, name: str, frames: bool, scan: bool) -> None:
+    def listen(self, name: str, *, frames: bool, scan: bool, pictures: bool) -> None:
         """Subscribe to what clients want of a robot, and to nothing else."""
         robot = self.robots[name]
+        self._look(robot, pictures)
         if frames and robot.frames is None:
             hear = partial(self._on_frame, robot)
             robot.frames = self.device.network.subscribe(
@@ -241,6 +248,31 @@ class RosGateway:
         elif not scan and robot.scan is not None:
             robot.scan.end()
             robot.scan = None
+
+    def _look(self, robot: KnownRobot, pictures: bool) -> None:
+        """Open the stream of a robot's camera, whose address it gives, or close it."""
+        if not pictures and robot.pictures is not None:
+            robot.pictures.close()
+            robot.pictures = None
+        if not pictures or robot.pictures is not None or robot.is_asked:
+            return
+        robot.is_asked = True
+
+        def answered(reply: m.Reply) -> None:
+            robot.is_asked = False
+            if isinstance(reply.content, m.SensorInfo) and robot.pictures is None:
+                take = partial(self._on_jpeg, robot)
+                url = reply.content.camera_url
+                assert isinstance(self.clock, LiveClock)
+                robot.pictures = MjpegReader(self.clock, url, self.camera_token, take)
+
+        def unanswered() -> None:
+            robot.is_asked = False
+
+        self.device.ask(robot.id_tag, m.GetSensorInfo(), answered, unanswered)
+
+    def _on_jpeg(self, robot: KnownRobot, jpeg: bytes, captured: float | None) -> None:
+        self.on_picture(robot, jpeg, self.clock.now if captured is None else captured)
 
     def _on_frame(self, robot: KnownRobot, came: CameraFrame | bytes) -> None:
         frame = came if isinstance(came, CameraFrame) else CameraFrame.unpack(came)

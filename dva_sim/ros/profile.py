@@ -20,6 +20,12 @@ Positive = Annotated[float, Field(gt=0)]
 _NAME = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*")
 
 
+def _checked(name: str | None) -> str | None:
+    if name is not None and not _NAME.fullmatch(name):
+        raise ValueError("should be a ROS name, as in odom or /robot/odom")
+    return name
+
+
 class RosTopics(Config):
     """Topics, below the namespace unless they begin with a slash; null: not used.
 
@@ -42,9 +48,7 @@ class RosTopics(Config):
     @field_validator("*")
     @classmethod
     def _is_a_name(cls, name: str | None) -> str | None:
-        if name is not None and not _NAME.fullmatch(name):
-            raise ValueError("should be a ROS name, as in odom or /robot/odom")
-        return name
+        return _checked(name)
 
 
 class RosFrames(Config):
@@ -122,6 +126,8 @@ class RosProfile(Config):
         ros: Version of ROS, which says how types and times are written.
         command: Type of the velocity commands.
         command_hz: How often a command in force is repeated.
+        enable: Service (std_srvs/Trigger) that is called until it succeeds before the robot can be
+            driven, as motors or a server of commands may need; null: none.
         site: Site of the DVA, whose frame positions are in.
         origin: Where on that site the odometry begins.
         radius_m: Of a circle around the robot.
@@ -135,6 +141,7 @@ class RosProfile(Config):
     topics: RosTopics = Field(default_factory=RosTopics)
     command: Literal["Twist", "TwistStamped"] = "Twist"
     command_hz: Annotated[float, Field(ge=2, le=50)] = 10.0
+    enable: str | None = None
     frames: RosFrames = Field(default_factory=RosFrames)
     units: RosUnits = Field(default_factory=RosUnits)
     site: SiteConfig = Field(default_factory=SiteConfig)
@@ -144,6 +151,11 @@ class RosProfile(Config):
     camera_deg: Annotated[float, Field(gt=0, le=360)] = 60.0
     frame_hz: Annotated[float, Field(gt=0, le=30)] = 10.0
     largest_picture_bytes: Annotated[int, Field(ge=1000, le=10_000_000)] = 1_000_000
+
+    @field_validator("enable")
+    @classmethod
+    def _enable_is_a_name(cls, name: str | None) -> str | None:
+        return _checked(name)
 
     @model_validator(mode="after")
     def _command_outlives_its_period(self) -> RosProfile:

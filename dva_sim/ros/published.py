@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import math
 import re
 from collections.abc import Sequence
@@ -82,7 +83,7 @@ def scan(name: str, ranges: Sequence[float], now: float) -> Json:
         "scan_time": 0.0,
         "range_min": 0.0,
         "range_max": REACH_M,
-        "ranges": list(ranges),
+        "ranges": [min(value, REACH_M) for value in ranges],  # noise may exceed it
         "intensities": [],
     }
 
@@ -92,9 +93,10 @@ def clock(now: float) -> Json:
     return {"clock": time_of(now)}
 
 
-def picture(name: str, jpeg_base64: str, captured: float) -> Json:
+def picture(name: str, jpeg: bytes, captured: float) -> Json:
     """Return sensor_msgs/CompressedImage."""
-    return {"header": _header(captured, f"{name}/camera"), "format": "jpeg", "data": jpeg_base64}
+    data = base64.b64encode(jpeg).decode()
+    return {"header": _header(captured, f"{name}/camera"), "format": "jpeg", "data": data}
 
 
 def occupancy(grid: OccupancyGrid) -> Json:

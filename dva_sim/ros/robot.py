@@ -28,6 +28,7 @@ PICTURES_MS: Final = 50  # design: nor pictures [ms]
 SMALL: Final = 100_000  # design: of a message that is no picture and no scan [B]
 SCANS: Final = 1_000_000  # design: of a scan [B]
 TELL_AGAIN: Final = 10.0  # design: a refusal of the same topic is told no more often [s]
+ENABLE_AGAIN: Final = 2.0  # design: after it was refused [s]
 SENSOR_HZ: Final = 10.0
 RANGE_M: Final = 12.0  # assumed: of the camera; nothing in its pictures is recognised
 
@@ -44,6 +45,7 @@ class RosRobot:
 
     Attributes:
         agent: What obeys the DVA and the driver.
+        bridge: To its rosbridge server.
         on_picture: Takes each picture, as JPEG.
     """
 
@@ -60,7 +62,7 @@ class RosRobot:
         self._told: dict[str, float] = {}
         self._is_registered = False
         self.on_picture: Callable[[bytes], object] = lambda _: None
-        self._bridge = RosbridgeClient(
+        self.bridge = RosbridgeClient(
             clock,
             url,
             self._topics(),
@@ -149,12 +151,12 @@ class RosRobot:
 
     def begin(self) -> None:
         """Connect to the bridge; the robot registers once its odometry is as it should be."""
-        self._bridge.connect()
+        self.bridge.connect()
 
     def close(self) -> None:
         """Tell the robot to stand, and end the connection."""
         self.body.stand()
-        self._bridge.close()
+        self.bridge.close()
 
     # --- what the robot says -------------------------------------------------------------
 
@@ -215,12 +217,12 @@ class RosRobot:
             "angular": {"x": 0.0, "y": 0.0, "z": turn_rate / units.radians},
         }
         if self._profile.command == "Twist":
-            return self._bridge.publish(self._command, twist)
+            return self.bridge.publish(self._command, twist)
         # A stamp of zero: this clock is not the robot's.
         names = ("secs", "nsecs") if self._profile.ros == 1 else ("sec", "nanosec")
         stamp = dict.fromkeys(names, 0)
         header = {"stamp": stamp, "frame_id": self._profile.frames.base}
-        return self._bridge.publish(self._command, {"header": header, "twist": twist})
+        return self.bridge.publish(self._command, {"header": header, "twist": twist})
 
     # --- whether it can be driven ---------------------------------------------------------
 
@@ -231,7 +233,23 @@ class RosRobot:
             self.fitness.connected()
             self.agent.device.tell("is connected to its bridge", "link")
             self.body.stand()  # whatever it was told before the bridge was lost
+            self._enable()
         self._look()
+
+    def _enable(self) -> None:
+        """Call the service that lets the robot be driven, until it succeeds."""
+        if self._profile.enable is None or not self.bridge.is_connected:
+            return
+        service = self._profile.topic(self._namespace, self._profile.enable)
+
+        def answered(done: bool, text: str) -> None:
+            self.fitness.disabled("" if done else f"{service} says {text!r}")
+            self._look()
+            if not done:
+                self._clock.call_after(ENABLE_AGAIN, self._enable)
+
+        self.fitness.disabled(f"{service} has not answered")
+        self.bridge.call(service, answered)
 
     def _look(self) -> None:
         now, agent, body = self._clock.now, self.agent, self.body
@@ -244,7 +262,7 @@ class RosRobot:
         elif not problem and agent.unfit:
             self._return()
         if self.fitness.needs_another_bridge(now):
-            self._bridge.renew("odometry stays late")
+            self.bridge.renew("odometry stays late")
 
     def _withdraw(self, problem: str) -> None:
         if self.agent.device.withdrawn or not self._is_registered:

@@ -16,7 +16,7 @@ from dva_sim.ros import published
 from dva_sim.ros.gateway import KnownRobot, RosGateway
 from dva_sim.ros.peers import RosPeer
 from dva_sim.ros.rosbridge import encode
-from dva_sim.ros.websocket import WebSocketConnection
+from dva_sim.ros.websocket import SHAKES_WITHIN, WebSocketConnection
 from dva_sim.worlds.site import Site
 
 Json = dict[str, Any]
@@ -25,7 +25,6 @@ Answer = Callable[[bool, Json], object]
 MOST_PEERS: Final = 16
 LARGEST: Final = 100_000  # design: of a message of a client; a Twist has 200 [B]
 CLOCK_PERIOD: Final = 0.1  # [s]
-SHAKES_WITHIN: Final = 5.0  # design: from TCP to WebSocket [s]
 TYPES: Final = {
     "odom": "nav_msgs/Odometry",
     "scan": "sensor_msgs/LaserScan",
@@ -77,6 +76,7 @@ class RosbridgeServer:
         self._peers: dict[WebSocketConnection, RosPeer | None] = {}
         self._count, self._map = 0, b""
         gateway.on_frame, gateway.on_scan = self._on_frame, self._on_scan
+        gateway.on_picture = self._on_picture
         clock.watch(listener.fileno(), self._accept)
         clock.every(CLOCK_PERIOD, self._tick)
 
@@ -208,8 +208,12 @@ class RosbridgeServer:
             topic for peer in self._peers.values() if peer is not None for topic in peer.wants
         }
         for name in self._gateway.robots:
-            frames = bool(wanted & {f"/{name}/odom", "/tf", f"/{name}/image/compressed"})
-            self._gateway.listen(name, frames, f"/{name}/scan" in wanted)
+            self._gateway.listen(
+                name,
+                frames=bool(wanted & {f"/{name}/odom", "/tf"}),
+                scan=f"/{name}/scan" in wanted,
+                pictures=f"/{name}/image/compressed" in wanted,
+            )
 
     def _tick(self) -> None:
         self.changed()  # robots may have come
@@ -225,6 +229,10 @@ class RosbridgeServer:
     def _on_scan(self, robot: KnownRobot, ranges: tuple[float, ...]) -> None:
         name, now = robot.name, self._clock.now
         self._send(f"/{name}/scan", lambda: published.scan(name, ranges, now))
+
+    def _on_picture(self, robot: KnownRobot, jpeg: bytes, captured: float) -> None:
+        name = robot.name
+        self._send(f"/{name}/image/compressed", lambda: published.picture(name, jpeg, captured))
 
     def _send(self, topic: str, make: Callable[[], Json]) -> None:
         """Send a message to all who want it; without any it is not made."""

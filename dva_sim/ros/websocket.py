@@ -6,8 +6,6 @@ bounded size; a peer that lets it fill up is disconnected.
 
 from __future__ import annotations
 
-import os
-import select
 import socket
 from collections.abc import Callable
 from contextlib import suppress
@@ -15,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.realtime import LiveClock
+from dva_sim.ros.dialling import Dialling
 
 if TYPE_CHECKING:
     from websockets.client import ClientProtocol
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 FLUSH: Final = 0.01  # design: between two attempts to send what waits [s]
 AT_ONCE: Final = 1 << 16  # design: read before other sources have their turn [B]
 MOST_WAITING: Final = 8_000_000  # design: of a peer [B]
-OPENS_WITHIN: Final = 5.0  # design: TCP connection and handshake [s]
+SHAKES_WITHIN: Final = 5.0  # design: from TCP to WebSocket [s]
 NORMAL, TOO_SLOW, GOING = 1000, 1008, 1001  # close codes of RFC 6455
 PORT: Final = 9090  # of rosbridge
 
@@ -212,47 +211,19 @@ class WebSocketDialer:
         self._clock, self._url, self._largest = clock, url, largest
         self._on_open, self._on_text, self._on_end = on_open, on_text, on_end
         self.connection: WebSocketConnection | None = None
-        self._deadline, self._is_open, self._is_over = clock.now + OPENS_WITHIN, False, False
-        try:
-            place = socket.getaddrinfo(url.host, url.port, type=socket.SOCK_STREAM)[0]
-            self._sock = socket.socket(place[0], place[1])
-            self._sock.setblocking(False)
-            self._sock.connect_ex(place[4])
-        except OSError as error:
-            clock.call_after(0.0, self._over, error.strerror or str(error))
-            return
-        clock.every(FLUSH, self._look)
+        self._is_open = self._is_over = False
+        self._dialling = Dialling(clock, url.host, url.port, self._connected, self._over)
 
-    def _look(self) -> bool:
-        """Return True while TCP is connecting."""
-        if self._is_over:
-            return False
-        if select.select([], [self._sock], [], 0.0)[1]:
-            self._connected()
-            return False
-        if self._clock.now > self._deadline:
-            self._sock.close()
-            self._over("does not answer")
-            return False
-        return True
-
-    def _connected(self) -> None:
-        code = self._sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
-        if code:
-            self._sock.close()
-            self._over(os.strerror(code))
-            return
+    def _connected(self, sock: socket.socket) -> None:
         from websockets.client import ClientProtocol  # late: start-up
 
         protocol = ClientProtocol(self._url.uri, max_size=self._largest)
-        connection = WebSocketConnection(
-            self._clock, self._sock, protocol, self._on_text, self._over
-        )
+        connection = WebSocketConnection(self._clock, sock, protocol, self._on_text, self._over)
         connection.on_event = self._answered
         self.connection = connection
         protocol.send_request(protocol.connect())
         connection.push()
-        self._clock.call_after(OPENS_WITHIN, self._give_up)
+        self._clock.call_after(SHAKES_WITHIN, self._give_up)
 
     def _give_up(self) -> None:
         if not self._is_open and self.connection is not None:
@@ -275,6 +246,6 @@ class WebSocketDialer:
         """End the connection, or the attempt."""
         if self.connection is not None:
             self.connection.close(GOING)
-        elif not self._is_over:
-            self._sock.close()
-            self._is_over = True
+        else:
+            self._dialling.cancel()
+        self._is_over = True

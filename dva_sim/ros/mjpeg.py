@@ -1,0 +1,108 @@
+"""Reads a camera's stream of JPEG pictures over HTTP, without blocking the thread of a run."""
+
+from __future__ import annotations
+
+import re
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Final
+from urllib.parse import urlsplit
+
+from dva_sim.network.realtime import LiveClock
+from dva_sim.ros.dialling import Dialling
+
+AGAIN_AFTER: Final = 3.0  # design: from the end of a stream to the next attempt [s]
+MOST: Final = 2_000_000  # design: of a picture with its headers [B]
+AT_ONCE: Final = 1 << 16  # [B]
+_LENGTH = re.compile(rb"\r\nContent-Length: (\d{1,7})\r\n", re.IGNORECASE)
+_TIME = re.compile(rb"\r\nX-Frame-Time-Ms: (\d{1,15})\r\n", re.IGNORECASE)
+
+
+class MjpegReader:
+    """Reads one stream until it is closed; one that ends is opened again.
+
+    Args:
+        clock: Polls the socket.
+        url: `http://HOST:PORT/PATH`.
+        token: Shown to the server; empty: none.
+        take: Takes each picture, and when it was captured [s]; None: not said.
+    """
+
+    def __init__(
+        self,
+        clock: LiveClock,
+        url: str,
+        token: str,
+        take: Callable[[bytes, float | None], object],
+    ) -> None:
+        self._clock, self._token, self._take = clock, token, take
+        self._parts = urlsplit(url)
+        self._sock: socket.socket | None = None
+        self._dialling: Dialling | None = None
+        self._data, self._is_over = bytearray(), False
+        self._open()
+
+    def _open(self) -> None:
+        host, port = self._parts.hostname, self._parts.port or 80
+        if self._is_over or not host or self._parts.scheme != "http":
+            return
+        self._data.clear()
+        self._dialling = Dialling(self._clock, host, port, self._ask, self._again)
+
+    def _ask(self, sock: socket.socket) -> None:
+        query = f"?token={self._token}" if self._token else ""
+        ask = f"GET {self._parts.path}{query} HTTP/1.0\r\nHost: {self._parts.netloc}\r\n\r\n"
+        self._sock = sock
+        self._clock.watch(sock.fileno(), self._read)
+        with suppress(OSError):
+            sock.send(ask.encode())  # far smaller than what the kernel takes
+
+    def _read(self) -> None:
+        assert self._sock is not None
+        try:
+            data = self._sock.recv(AT_ONCE)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        self._data += data
+        while self._picture():
+            pass
+        if not data or len(self._data) > MOST:
+            self._end()
+            self._again()
+
+    def _picture(self) -> bool:
+        """Take the first picture out of the data, if it is whole."""
+        start = self._data.find(b"\r\n\r\n")
+        head = bytes(self._data[: start + 2])
+        length = _LENGTH.search(head)
+        if start >= 0 and length is None:  # headers of the response, or an empty line
+            del self._data[: start + 4]
+            return True
+        end = start + 4 + (0 if length is None else int(length[1]))
+        if start < 0 or len(self._data) < end:
+            return False
+        time = _TIME.search(head)
+        picture = bytes(self._data[start + 4 : end])
+        del self._data[:end]
+        if not self._is_over:
+            self._take(picture, None if time is None else int(time[1]) / 1000)
+        return True
+
+    def _again(self, *_: object) -> None:
+        self._clock.call_after(AGAIN_AFTER, self._open)
+
+    def _end(self) -> None:
+        if self._sock is not None:
+            self._clock.unwatch(self._sock.fileno())
+            self._sock.close()
+            self._sock = None
+
+    def close(self) -> None:
+        """Read no more."""
+        self._is_over = True
+        if self._dialling is not None:
+            self._dialling.cancel()
+        self._end()
