@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import closing
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
@@ -18,11 +19,12 @@ from dva_sim.cli.verbosity import detail, is_verbose
 from dva_sim.core.registry import DETECTOR
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live import process
+from dva_sim.live.foxglove_server import FoxgloveServer
 from dva_sim.live.options import PARTS, LiveOptions
 from dva_sim.live.process import Report, run_part
 from dva_sim.live.supervisor import Summary, Supervisor
 from dva_sim.network.sockets import DEFAULT_PORT
-from dva_sim.ros.options import open_port
+from dva_sim.ros.options import OpenPort, open_port
 from dva_sim.simulation.full.verdicts import Verdict, refuse_broken
 from dva_sim.simulation.scenario import contradictions
 
@@ -131,11 +133,27 @@ def run_all(options: LiveOptions) -> None:
     if options.rosbridge is not None:
         door = open_port(options.host, options.rosbridge, "--rosbridge", options.token)
         _print(console, f"rosbridge: {door.url}")
+    with ExitStack() as at_end:
+        viewer = None
+        if options.foxglove is not None:
+            viewer = FoxgloveServer(options.read(), options.seed, options.foxglove)
+            at_end.callback(viewer.close)
+            _print(console, f"Foxglove: {viewer.url}")
+        summary = _watched(console, board, partial(Supervisor, options), door, viewer)
+    _conclude(console, board, summary, options)
+
+
+def _watched(
+    console: Console,
+    board: Board,
+    make: Callable[..., Supervisor],
+    door: OpenPort | None,
+    viewer: FoxgloveServer | None,
+) -> Summary:
+    """Run all parts before somebody's eyes."""
     if not console.is_terminal:
         with closing(InOrder(console, board)) as told:
-            summary = Supervisor(options, lambda _, report: told.hear(report), door).run()
-        _conclude(console, board, summary, options)
-        return
+            return make(lambda _, report: told.hear(report), door, viewer).run()
     with Live(console=console, refresh_per_second=4, transient=True) as screen:
 
         def hear(_: str, report: Report) -> None:
@@ -143,10 +161,10 @@ def run_all(options: LiveOptions) -> None:
             board.hear(report)
             screen.update(Group(board.table(), board.lines_of_story()))
 
-        summary = Supervisor(options, hear, door).run()
+        summary = make(hear, door, viewer).run()
     for line in board.story:
         _print(console, story_line(line))
-    _conclude(console, board, summary, options)
+    return summary
 
 
 def warn(console: Console, options: LiveOptions) -> None:

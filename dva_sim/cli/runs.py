@@ -61,6 +61,10 @@ _ROSBRIDGE: Any = (
     ),
     None,
 )
+_FOXGLOVE: Any = (
+    count("Port for Foxglove, on 127.0.0.1; 0: any.", metavar="PORT", most=65_535, of=int | None),
+    None,
+)
 _TO_ROBOTS = "to the robots", "from the robots"
 _CLOSED = "--keys FOLDER closes it"
 
@@ -153,6 +157,7 @@ def _show_replay(**asked: Any) -> None:
     link=(text(_LINK, metavar="KEY=VALUE|FILE", of=list[str] | None), None),
     transport=_TRANSPORT,
     rosbridge=_ROSBRIDGE,
+    foxglove=_FOXGLOVE,
     no_token=(flag("--no-token", "Let in all clients of --rosbridge."), False),
     **RUN,
 )
@@ -246,6 +251,7 @@ def live(
     keep_motion=(folder("Save motion data of phones whose users agree in this folder."), None),
     overwrite=(Overwrite, False),
     rosbridge=_ROSBRIDGE,
+    foxglove=_FOXGLOVE,
     **RUN,
 )
 def console(

@@ -41,6 +41,7 @@ class ConsoleOptions(PageOptions):
         keep_motion: Folder for the samples of phones whose person agrees, if any.
         overwrite: What is there may be replaced.
         rosbridge: Port for clients of ROS; None: there is none.
+        foxglove: Port for Foxglove; None: there is none.
     """
 
     scenario: str = DEFAULT
@@ -56,6 +57,7 @@ class ConsoleOptions(PageOptions):
     keep_motion: Path | None = None
     overwrite: bool = False
     rosbridge: int | None = None
+    foxglove: int | None = None
 
     def kept_results(self) -> KeptResults | None:
         """What makes tables of what people do, if they are wanted.

@@ -17,6 +17,8 @@ from dva_sim.console.run.recorder import keep_run
 from dva_sim.console.world.kept_results import KeptResults
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.kernel.errors import DvaSimError
+from dva_sim.live.foxglove_server import FoxgloveServer
+from dva_sim.live.pipes import Inlets
 from dva_sim.live.process import ending_when_asked
 from dva_sim.live.recording import Keeper, LiveRecorder
 from dva_sim.network.emulator.process import LinkEnded
@@ -48,6 +50,7 @@ class ConsoleSupervisor:
         self._options, self._say = options, say
         self._processes = ConsoleProcesses(options, say)
         self.packets: LinkReport | None = None
+        self._viewer: FoxgloveServer | None = None
 
     def run(self) -> None:
         """Run until Ctrl-C, SIGTERM, or the end of the web process.
@@ -106,10 +109,16 @@ class ConsoleSupervisor:
     @contextmanager
     def _recorded(self, world: ConsoleWorld) -> Iterator[None]:
         """Keep a recording of what happens, if one is wanted; in the end all is closed."""
-        options, keeper, outlet = self._options, None, None
+        options, keeper, outlet, inlets = self._options, None, None, None
+        viewer = self._viewer = self._open_foxglove(world)
+        also = None if viewer is None else viewer.keep
         if options.record is not None:
-            keeper = Keeper(options.record, world.scenario, world.seed)
-            outlet = PipeEnd(keeper.inlet())
+            keeper = Keeper(options.record, world.scenario, world.seed, also=also)
+            inlets = keeper.inlets
+        elif also is not None:
+            inlets = Inlets(also=also)
+        if inlets is not None:
+            outlet = PipeEnd(inlets.inlet())
             world.recorder.kept = LiveRecorder(world.clock, outlet)
             world.recorder.kept.is_own = world.is_ours
             keep_run(world.run, world.recorder)
@@ -126,9 +135,19 @@ class ConsoleSupervisor:
             if outlet is not None:
                 world.recorder.tidy()
                 outlet.close()
+            if viewer is not None:
+                viewer.close()
             lost = None if keeper is None else keeper.finish()
             if lost is not None and sys.exc_info()[0] is None:
                 raise DvaSimError(lost)
+
+    def _open_foxglove(self, world: ConsoleWorld) -> FoxgloveServer | None:
+        """Serve the run to Foxglove, if that is wanted."""
+        if self._options.foxglove is None:
+            return None
+        viewer = FoxgloveServer(world.scenario, world.seed, self._options.foxglove)
+        self._say(f"Foxglove: {viewer.url}")
+        return viewer
 
     def _about(self, world: ConsoleWorld) -> dict[str, Any]:
         options = self._options
@@ -142,6 +161,9 @@ class ConsoleSupervisor:
             if world.sockets is not None:
                 self._say(f"DVA: {world.sockets.dva}")
             rosbridge = self._serve_ros(world)
+            if self._viewer is not None:
+                self._viewer.camera_base = str(self._processes.serving["base"])
+                self._viewer.camera_token = self._look_token
             if not ending.is_asked:
                 if world.sockets is not None:
                     world.sockets.begin()
@@ -161,12 +183,17 @@ class ConsoleSupervisor:
         port = open_port(options.host, options.rosbridge, "--rosbridge", options.token)
         stage = world.run.stage
         gateway = RosGateway(stage, lambda: world.console)
-        look = urlsplit(str(self._processes.serving.get("look", "")))
-        gateway.camera_token = parse_qs(look.query).get("token", [""])[0]
+        gateway.camera_token = self._look_token
         self._say(f"rosbridge: {port.url}")
         return RosbridgeServer(
             *(world.clock, port.listener, gateway, stage.site), port.token, world.note
         )
+
+    @property
+    def _look_token(self) -> str:
+        """Return the token that opens pictures."""
+        look = urlsplit(str(self._processes.serving.get("look", "")))
+        return parse_qs(look.query).get("token", [""])[0]
 
     def _leave(self, world: ConsoleWorld) -> None:
         """Everybody who drives is stopped, and a moment is left for the word of it."""

@@ -54,6 +54,8 @@ class LiveOptions:
         emulated: The scenario's link is emulated between the robots and everybody else.
         transport: What carries the messages, as on the command line; see `carrier_of`.
         rosbridge: Port for clients of ROS; None: there is none.
+        foxglove: Port for Foxglove; None: there is none.
+        shows_run: Parts write all lines, though there is no recording: somebody looks at them.
         token: Whether such clients have to show a token.
     """
 
@@ -73,6 +75,8 @@ class LiveOptions:
     emulated: bool = False
     transport: tuple[str, ...] = ()
     rosbridge: int | None = None
+    foxglove: int | None = None
+    shows_run: bool = False
     token: bool = True
 
     @property

@@ -222,6 +222,8 @@ class WorldPart:
         stage = self._stage
         run = _FilmedWorld(stage.scenario, stage.clock, stage.network, self._field)
         service.film(run, stage.seed)
+        if isinstance(stage.recorder, LiveRecorder):
+            stage.recorder.put("cameras", service.base)
 
     def _sample(self, recorder: LiveRecorder, log: FactLog) -> None:
         now, field = self._stage.clock.now, self._field

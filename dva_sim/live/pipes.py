@@ -19,12 +19,16 @@ class Inlets:
     Args:
         keep: Takes whole lines; None: nobody keeps them.
         judge: Likewise.
+        also: Likewise, after them.
     """
 
     def __init__(
-        self, keep: Callable[[bytes], object] | None = None, judge: LiveJudge | None = None
+        self,
+        keep: Callable[[bytes], object] | None = None,
+        judge: LiveJudge | None = None,
+        also: Callable[[bytes], object] | None = None,
     ) -> None:
-        self._takers = keep, judge
+        self._takers, self._also = (keep, judge), also
         self._threads: list[threading.Thread] = []
 
     def inlet(self) -> int:
@@ -49,6 +53,8 @@ class Inlets:
                 keep(whole + b"\n")
             if whole and judge is not None:
                 judge.hear(number, whole.split(b"\n"))
+            if whole and self._also is not None:
+                self._also(whole)
         os.close(reads)
         if judge is not None:
             judge.leaves(number)

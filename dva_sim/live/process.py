@@ -138,7 +138,7 @@ def _run_part(
     scenario = options.read()
     ring = None if options.keys is None else KeyRing(options.keys)
     clock = LiveClock(epoch)
-    recorder = LiveRecorder(clock, out, keeps=options.records_run)
+    recorder = LiveRecorder(clock, out, keeps=options.records_run or options.shows_run)
 
     def tell(line: str) -> None:
         recorder.tell(clock.now, name, line, "link")

@@ -275,6 +275,9 @@ class ToldRun:
     def _audited(self, row: dict[str, Any]) -> None:
         self.audit.append((float(row["time_s"]), row))
 
+    def _cameras(self, _: str) -> None:
+        """Pictures are no part of a recording."""
+
     def _trace(self, when: float, who: str, line: str) -> None:
         self.traces[who].append((when, line))
 

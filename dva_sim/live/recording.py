@@ -282,6 +282,7 @@ class Keeper:
         scenario: What is run.
         seed: With which seed.
         judge: Judges it by the safety rules meanwhile; None: somebody else does that.
+        also: Takes whole lines, too; None: nobody does.
 
     Attributes:
         inlets: Where parts write.
@@ -291,7 +292,12 @@ class Keeper:
     """
 
     def __init__(
-        self, target: Path, scenario: Scenario, seed: int, judge: LiveJudge | None = None
+        self,
+        target: Path,
+        scenario: Scenario,
+        seed: int,
+        judge: LiveJudge | None = None,
+        also: Callable[[bytes], object] | None = None,
     ) -> None:
         self._target, self.path = target, target.with_name(target.name + PART)
         start = {"format": FORMAT, "scenario": scenario.model_dump(mode="json"), "seed": seed}
@@ -299,7 +305,7 @@ class Keeper:
         self.problem: str | None = None
         self._room = MOST_BYTES
         self._file = _emptied(self.path)
-        self.inlets = Inlets(self.keep, judge)
+        self.inlets = Inlets(self.keep, judge, also)
         self._lock = threading.Lock()
         self.keep(json.dumps(start).encode() + b"\n")
 
@@ -356,17 +362,25 @@ class RunKeeping:
     Args:
         options: Options of the run.
         scenario: The scenario that is run.
+        also: Takes whole lines, too; None: nobody does.
 
     Raises:
         ConfigError: the recording cannot be written.
     """
 
-    def __init__(self, options: LiveOptions, scenario: Scenario) -> None:
+    def __init__(
+        self,
+        options: LiveOptions,
+        scenario: Scenario,
+        also: Callable[[bytes], object] | None = None,
+    ) -> None:
         self._judge = LiveJudge(terms_of(scenario))
         self._keeper: Keeper | None = None
-        self._inlets = Inlets(judge=self._judge)
+        self._inlets = Inlets(judge=self._judge, also=also)
         if options.records_run and options.record is not None:
-            self._keeper = Keeper(options.record, scenario, options.seed, self._judge)
+            self._keeper = Keeper(
+                options.record, scenario, options.seed, judge=self._judge, also=also
+            )
             self._inlets = self._keeper.inlets
 
     def inlet(self) -> int:

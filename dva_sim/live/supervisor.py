@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from typing import IO, Any
 
 from dva_sim.kernel.errors import ERROR, DvaSimError, ExitCode, RunsFailed
+from dva_sim.live.foxglove_server import FoxgloveServer
 from dva_sim.live.options import PATHS, ROSBRIDGE, LiveOptions
 from dva_sim.live.process import Report
 from dva_sim.live.recording import RunKeeping
@@ -74,6 +75,7 @@ class Supervisor:
         options: What to run and how.
         hear: Takes each report of each part.
         rosbridge: Port for clients of ROS; None: there is none.
+        foxglove: Server that shows the run; None: there is none.
     """
 
     def __init__(
@@ -81,7 +83,9 @@ class Supervisor:
         options: LiveOptions,
         hear: Callable[[str, Report], object],
         rosbridge: OpenPort | None = None,
+        foxglove: FoxgloveServer | None = None,
     ) -> None:
+        self._foxglove = foxglove
         self._options, self._hear, self._rosbridge = options, hear, rosbridge
         self._children: list[_Child] = []
         self._selector = selectors.DefaultSelector()
@@ -100,7 +104,9 @@ class Supervisor:
             ConfigError: the scenario cannot be run live.
         """
         scenario = self._options.check()
-        keeping = self._keeping = RunKeeping(self._options, scenario)
+        keeping = self._keeping = RunKeeping(
+            self._options, scenario, None if self._foxglove is None else self._foxglove.keep
+        )
         try:
             why = self._run(scenario)
         except DvaSimError as error:
@@ -175,6 +181,7 @@ class Supervisor:
         door: tuple[int, ...],
     ) -> str:
         told = {**vars(self._options), "dva": dva, "port": port}
+        told["shows_run"] = self._foxglove is not None
         if self._link is not None:
             told["host"] = ADDRESSES[_end_of(part)]
         for key in PATHS:

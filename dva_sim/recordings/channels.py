@@ -19,13 +19,15 @@ from numpy.typing import NDArray
 
 from dva_sim.agents.observation import CameraFrame
 from dva_sim.core.audit import Fact
-from dva_sim.kernel.recorder import Sent, TrackPoint
+from dva_sim.core.events import Event
+from dva_sim.kernel.recorder import Moment, Sent, TrackPoint
 from dva_sim.recordings import messages
 from dva_sim.recordings.messages import FRAME, HERE, XML, ChannelMessage, stamped
 from dva_sim.simulation.full import Playback
 from dva_sim.simulation.full.hazards import RunHazard
 from dva_sim.simulation.full.observation_json import as_plain
 from dva_sim.worlds.hazards import Hazard, Raster
+from dva_sim.worlds.site import Site
 
 POSE, ACTIVITY, FIX, SEEN = "pose", "activity", "fix", "seen"  # last parts of topics
 ALIVE_S = 1.0  # who stands still is told of so often, on whole multiples [s]
@@ -39,11 +41,15 @@ def poses(playback: Playback) -> Iterator[ChannelMessage]:
         key=lambda entry: entry[0],
     )
     for time, group in groupby(every, key=lambda entry: entry[0]):
-        moved = [(name, point) for _, name, point in group]
-        for name, p in moved:
-            yield _pose(name, POSE, p)
-        transforms = [_transform(name, p) for name, p in moved]
-        yield ChannelMessage(time, "/tf", "foxglove.FrameTransforms", {"transforms": transforms})
+        yield from placed(time, [(name, point) for _, name, point in group])
+
+
+def placed(time: float, moved: Sequence[tuple[str, TrackPoint]]) -> Iterator[ChannelMessage]:
+    """Where those are who moved at a moment, by name."""
+    for name, p in moved:
+        yield _pose(name, POSE, p)
+    transforms = [_transform(name, p) for name, p in moved]
+    yield ChannelMessage(time, "/tf", "foxglove.FrameTransforms", {"transforms": transforms})
 
 
 def sparse(track: Sequence[TrackPoint]) -> Iterator[TrackPoint]:
@@ -64,8 +70,12 @@ def activities(playback: Playback) -> Iterator[ChannelMessage]:
     """What everybody does, told when it changes."""
     for name, track in playback.recorder.tracks.items():
         for mode, points in groupby(track, key=lambda p: p.mode):
-            time = next(points).time
-            yield stamped(time, f"/{name}/{ACTIVITY}", "dva_sim.Activity", activity=mode)
+            yield active(next(points).time, name, mode)
+
+
+def active(time: float, name: str, mode: str) -> ChannelMessage:
+    """What somebody does from now on."""
+    return stamped(time, f"/{name}/{ACTIVITY}", "dva_sim.Activity", activity=mode)
 
 
 def beliefs(playback: Playback) -> Iterator[ChannelMessage]:
@@ -173,52 +183,74 @@ def bodies(playback: Playback) -> Iterator[ChannelMessage]:
     """Everybody, in a frame that moves with them; those who leave vanish."""
     tracks = playback.recorder.tracks
     for name, track in tracks.items():
-        yield _update(track[0].time, _body(playback, name, track[0].time))
+        robot = playback.robot_named(name)
+        radius = PERSON if robot is None else playback.radii[robot]
+        yield body(track[0].time, name, radius)
     gone = [(t[-1].time, n) for n, t in tracks.items() if t[-1].time < playback.duration]
     for time, name in sorted(gone):
-        yield _removal(time, name)
+        yield removal(time, name)
 
 
 def ground(playback: Playback) -> Iterator[ChannelMessage]:
     """The site, which stands still."""
-    site, middles = playback.site, [(r.name, r.polygon.mean(axis=0)) for r in playback.site.rooms]
+    yield plan(playback.site)
+
+
+def plan(site: Site) -> ChannelMessage:
+    """Walls, exits and names of rooms."""
+    middles = [(r.name, r.polygon.mean(axis=0)) for r in site.rooms]
     lines = [_lines(site.walls.tolist(), WALL), _lines([e.ends for e in site.exits], EXIT)]
     texts = [_words(name, float(x), float(y)) for name, (x, y) in middles]
     entity = _entity(0.0, "site", FRAME, lines=[line for line in lines if line["points"]])
-    yield _update(0.0, entity | {"texts": texts})
+    return _update(0.0, entity | {"texts": texts})
 
 
 def hazards(playback: Playback) -> Iterator[ChannelMessage]:
     """What is real, from when it begins until it is dealt with or the run ends."""
     for number, incident, until in _real(playback):
-        name, drawn = f"hazard-{number}", -math.inf
+        drawn = -math.inf
         for time in _steps(incident.start, until):
             radius = incident.hazard.radius(time)
             if radius - drawn >= LEAST_GROWTH:
                 drawn = radius
-                yield _update(time, _disc(name, time, incident.hazard, radius))
+                yield disc(time, number, incident.hazard)
         if until < playback.duration:
-            yield _removal(until, name)
+            yield contained(until, number)
+
+
+def disc(time: float, number: int, hazard: Hazard) -> ChannelMessage:
+    """A hazard as it is drawn, by its number from 1."""
+    return _update(time, _disc(f"hazard-{number}", time, hazard, hazard.radius(time)))
+
+
+def contained(time: float, number: int) -> ChannelMessage:
+    """A hazard is drawn no longer."""
+    return removal(time, f"hazard-{number}")
 
 
 def states(playback: Playback) -> Iterator[ChannelMessage]:
     """The same hazards as numbers, once a second."""
     for number, incident, until in _real(playback):
-        x, y = incident.hazard.position
         for time in _steps(incident.start, until):
-            yield stamped(
-                time,
-                HAZARDS,
-                "dva_sim.Hazard",
-                number=number,
-                kind=incident.kind,
-                room=incident.room,
-                x_m=round(x, messages.PLACES),
-                y_m=round(y, messages.PLACES),
-                radius_m=round(incident.hazard.radius(time), 3),
-                danger_radius_m=round(incident.hazard.danger_radius(time), 3),
-                severity=round(incident.hazard.severity(time), 4),
-            )
+            yield state(time, number, incident)
+
+
+def state(time: float, number: int, incident: RunHazard) -> ChannelMessage:
+    """How a hazard is, by its number from 1."""
+    x, y = incident.hazard.position
+    return stamped(
+        time,
+        HAZARDS,
+        "dva_sim.Hazard",
+        number=number,
+        kind=incident.kind,
+        room=incident.room,
+        x_m=round(x, messages.PLACES),
+        y_m=round(y, messages.PLACES),
+        radius_m=round(incident.hazard.radius(time), 3),
+        danger_radius_m=round(incident.hazard.danger_radius(time), 3),
+        severity=round(incident.hazard.severity(time), 4),
+    )
 
 
 def _real(playback: Playback) -> Iterator[tuple[int, RunHazard, float]]:
@@ -238,7 +270,8 @@ def _update(time: float, entity: dict[str, Any]) -> ChannelMessage:
     return ChannelMessage(time, TOPIC, SCHEMA, {"deletions": [], "entities": [entity]})
 
 
-def _removal(time: float, name: str) -> ChannelMessage:
+def removal(time: float, name: str) -> ChannelMessage:
+    """Somebody or something is drawn no longer."""
     deletion = {"timestamp": messages.stamp(time), "type": 0, "id": name}
     return ChannelMessage(time, TOPIC, SCHEMA, {"deletions": [deletion], "entities": []})
 
@@ -256,10 +289,11 @@ def _entity(time: float, name: str, frame: str, **parts: list[Any]) -> dict[str,
     }
 
 
-def _body(playback: Playback, name: str, time: float) -> dict[str, Any]:
-    kind, robot = name.rpartition("-")[0], playback.robot_named(name)
-    radius = PERSON if robot is None else playback.radii[robot]
-    tall, paint = TALL[kind], messages.colour(BODIES[kind])
+def body(time: float, name: str, radius: float = PERSON) -> ChannelMessage:
+    """Somebody, in a frame that moves with them: `robot-1` is drawn as a robot."""
+    kind = name.rpartition("-")[0]
+    known = kind if kind in TALL else "robot"
+    tall, paint = TALL[known], messages.colour(BODIES[known])
     arrow = {
         "pose": messages.pose(0.0, 0.0, z=tall),
         "shaft_length": radius,
@@ -269,9 +303,8 @@ def _body(playback: Playback, name: str, time: float) -> dict[str, Any]:
         "color": messages.colour(INK),
     }
     label = _words(name, 0.0, 0.0, tall + 0.3)
-    return _entity(
-        time, name, name, cylinders=[_cylinder(radius, tall, paint)], arrows=[arrow], texts=[label]
-    )
+    parts = {"cylinders": [_cylinder(radius, tall, paint)], "arrows": [arrow], "texts": [label]}
+    return _update(time, _entity(time, name, name, **parts))
 
 
 def _disc(name: str, time: float, hazard: Hazard, radius: float) -> dict[str, Any]:
@@ -323,25 +356,35 @@ LEVELS = {"safety": 3, "mode": 1, "link": 1}  # of Foxglove's log; all else is f
 def told(playback: Playback) -> Iterator[ChannelMessage]:
     """The timeline."""
     for moment in playback.recorder.timeline:
-        yield stamped(
-            moment.time,
-            STORY,
-            "foxglove.Log",
-            level=LEVELS.get(moment.kind, 2),
-            message=moment.what,
-            name=moment.who,
-            file="",
-            line=0,
-            kind=moment.kind,
-        )
+        yield log(moment)
+
+
+def log(moment: Moment) -> ChannelMessage:
+    """A line of the timeline."""
+    return stamped(
+        moment.time,
+        STORY,
+        "foxglove.Log",
+        level=LEVELS.get(moment.kind, 2),
+        message=moment.what,
+        name=moment.who,
+        file="",
+        line=0,
+        kind=moment.kind,
+    )
 
 
 def facts(playback: Playback) -> Iterator[ChannelMessage]:
     """What was decided, by whom and why, where people take part; without, the story tells."""
     for fact in playback.facts if playback.people_decide else ():
-        content = {_IN_SECONDS.get(name, name): value for name, value in fact.row().items()}
-        del content["time"]
-        yield stamped(fact.time, FACTS, "dva_sim.Fact", **content)
+        yield fact_message(fact)
+
+
+def fact_message(fact: Fact) -> ChannelMessage:
+    """What was decided; `fact_of` reads it again."""
+    content = {_IN_SECONDS.get(name, name): value for name, value in fact.row().items()}
+    del content["time"]
+    return stamped(fact.time, FACTS, "dva_sim.Fact", **content)
 
 
 def fact_of(time: float, content: Mapping[str, Any]) -> Fact:
@@ -365,12 +408,13 @@ def said(playback: Playback) -> Iterator[ChannelMessage]:
             word, time, told = as_plain(fact)
             yield stamped(time, f"{OBSERVED}{word}", f"dva_sim.{type(fact).__name__}", **told)
         elif (sent := next(traffic, None)) is not None:
-            yield _sent(sent, names)
+            yield sent_message(sent, names)
     for sent in traffic:
-        yield _sent(sent, names)
+        yield sent_message(sent, names)
 
 
-def _sent(sent: Sent, names: Mapping[str, str]) -> ChannelMessage:
+def sent_message(sent: Sent, names: Mapping[str, str]) -> ChannelMessage:
+    """A message as it went onto the network; of a frame, what it stands for."""
     if isinstance(sent.payload, CameraFrame):
         return _frame(sent, names)
     topic = f"{MESSAGES}/{names[sent.source]}/{names[sent.destination]}"
@@ -408,8 +452,15 @@ def shown(playback: Playback) -> Iterator[ChannelMessage]:
     for number, drive in enumerate(playback.recorder.drives):
         topic, whose = f"/{names[drive.operator]}/{SCREEN}", labels[drive.robot]
         for at in drive.frames:
-            said = {"drive": number, "robot": whose, "captured_s": at.captured}
-            yield stamped(at.time, topic, "dva_sim.Shown", **said)
+            yield frame_shown(at.time, topic, number, whose, captured=at.captured)
+
+
+def frame_shown(
+    time: float, topic: str, drive: int, robot: str, *, captured: float
+) -> ChannelMessage:
+    """A frame comes onto an operator's screen."""
+    said = {"drive": drive, "robot": robot, "captured_s": captured}
+    return stamped(time, topic, "dva_sim.Shown", **said)
 
 
 def commanded(playback: Playback) -> Iterator[ChannelMessage]:
@@ -438,6 +489,41 @@ def applied(playback: Playback) -> Iterator[ChannelMessage]:
                 until_s=messages.finite(a.until),
                 captured_s=messages.finite(a.captured),
             )
+
+
+EVENTS, LATENCIES, IMAGE = "/events", "/latencies", "image"
+
+
+def event_message(time: float, event: Event) -> ChannelMessage:
+    """How an event stands; of runs that go on, since a recording holds its events as a whole."""
+    return stamped(
+        time,
+        EVENTS,
+        "dva_sim.Event",
+        number=event.number,
+        kind=event.kind,
+        state=event.state.value,
+        latitude_deg=event.position.latitude,
+        longitude_deg=event.position.longitude,
+        severity=event.severity,
+        responder=event.responder,
+        operator=event.operator,
+        actor=event.actor,
+        times_s=event.times,
+    )
+
+
+def latency(time: float, robot: str, what: str, *, delay: float) -> ChannelMessage:
+    """How long a command or a picture took; a recording has `applied` and `shown` for that."""
+    told = {"robot": robot, "what": what, "delay_s": round(delay, 6)}
+    return stamped(time, LATENCIES, "dva_sim.Latency", **told)
+
+
+def picture(time: float, name: str, jpeg: bytes) -> ChannelMessage:
+    """A picture of a robot's camera."""
+    data = base64.b64encode(jpeg).decode()
+    schema = "foxglove.CompressedImage"
+    return stamped(time, f"/{name}/{IMAGE}", schema, frame_id=name, format="jpeg", data=data)
 
 
 def _frame(sent: Sent, names: Mapping[str, str]) -> ChannelMessage:

@@ -259,6 +259,13 @@ def _write(
     writer.finish()
 
 
+def schema_of_channel(name: str) -> tuple[str, str, bytes]:
+    """Return name, encoding and text of the schema that a channel's messages have."""
+    if name == XML:
+        return "dva", "xsd", resources.find("dva", "protocol", ".xsd").read_bytes()
+    return name, "jsonschema", _json(SCHEMAS[name])
+
+
 def _add_messages(
     writer: Any, playback: Playback, files: Mapping[str, bytes], decided: Sequence[ChannelMessage]
 ) -> None:
@@ -268,10 +275,7 @@ def _add_messages(
 
     @cache
     def schema_of(name: str) -> int:
-        if name == XML:
-            xsd = resources.find("dva", "protocol", ".xsd").read_bytes()
-            return int(writer.register_schema("dva", "xsd", xsd))
-        return int(writer.register_schema(name, "jsonschema", _json(SCHEMAS[name])))
+        return int(writer.register_schema(*schema_of_channel(name)))
 
     @cache
     def channel_of(topic: str, schema: str) -> int:
