@@ -138,7 +138,7 @@ def run_all(options: LiveOptions) -> None:
         if options.foxglove is not None:
             viewer = FoxgloveServer(options.read(), options.seed, options.foxglove)
             at_end.callback(viewer.close)
-            _print(console, f"Foxglove: {viewer.url}")
+            _print(console, viewer.where)
         summary = _watched(console, board, partial(Supervisor, options), door, viewer)
     _conclude(console, board, summary, options)
 

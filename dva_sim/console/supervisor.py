@@ -146,7 +146,7 @@ class ConsoleSupervisor:
         if self._options.foxglove is None:
             return None
         viewer = FoxgloveServer(world.scenario, world.seed, self._options.foxglove)
-        self._say(f"Foxglove: {viewer.url}")
+        self._say(viewer.where)
         return viewer
 
     def _about(self, world: ConsoleWorld) -> dict[str, Any]:

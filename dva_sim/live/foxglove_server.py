@@ -12,6 +12,7 @@ import threading
 import urllib.request
 from collections.abc import Iterable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, Final
 
 from dva_sim.kernel.errors import ConfigError
@@ -21,6 +22,7 @@ from dva_sim.recordings.messages import XML, ChannelMessage, nanoseconds
 from dva_sim.recordings.writing import schema_of_channel
 from dva_sim.simulation.scenario import Scenario
 
+LAYOUT: Final = Path(channels.__file__).with_name("foxglove_layout.json")  # panels of a run
 LOCALHOST: Final = "127.0.0.1"
 MISSING: Final = "--foxglove needs Foxglove's SDK: pip install 'dva-sim[foxglove]'"
 BACKLOG: Final = 4096  # messages that wait for a client; then its oldest ones are dropped
@@ -78,6 +80,11 @@ class FoxgloveServer:
     def url(self) -> str:
         """Return the address that Foxglove opens."""
         return f"ws://{LOCALHOST}:{self._server.port}"
+
+    @property
+    def where(self) -> str:
+        """Return a line that says where it is, and where a layout for it."""
+        return f"Foxglove: {self.url} (layout: {LAYOUT})"
 
     def _listener(self) -> Any:
         """What tells a viewer of the scene who comes late what stands there."""
