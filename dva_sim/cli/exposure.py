@@ -13,6 +13,7 @@ FORGERS = (
     "anybody who reaches it can register, read and forge messages, and stop or drive the robots"
 )
 DRIVERS = "anybody who reaches it can do all that the page offers"
+MOVERS = "anybody who reaches it can ask the DVA for robots and drive them"
 VIEWERS = "anybody who reaches it can watch what the robots see"
 WATCHERS = "anybody who reaches it can watch the recordings"
 
@@ -51,6 +52,18 @@ def warn_of_pictures(hosts: Iterable[str]) -> None:
     """
     if open_to := _beyond(hosts):
         _say(f"pictures are on {_named(open_to)} without a key: {VIEWERS}; leave out --camera-port")
+
+
+def warn_of_clients(hosts: Iterable[str], *, has_token: bool) -> None:
+    """Warn that clients of other makes may come from beyond this machine without a token.
+
+    Args:
+        hosts: Addresses to listen on.
+        has_token: True if clients need a token, which needs no warning.
+    """
+    open_to = [] if has_token else _beyond(hosts)
+    if open_to:
+        _say(f"rosbridge is on {_named(open_to)} without a token: {MOVERS}; leave out --no-token")
 
 
 def is_local(host: str) -> bool:

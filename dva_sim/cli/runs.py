@@ -205,6 +205,8 @@ def live(
     exposure.warn_of_devices(listens, has_keys=has_keys, close_by=_CLOSED)
     if has_keys and options.camera_port is not None and only in (None, "world"):
         exposure.warn_of_pictures([options.host])
+    if options.rosbridge is not None:
+        exposure.warn_of_clients([options.host], has_token=options.token)
     with loudness(quiet, verbose):
         if only is None:
             live_screen.run_all(options)
@@ -302,6 +304,8 @@ def console(
     if dva is not None:
         own = {"--links": asked["links"] != "modelled", "--link": link, "--phones": asked["phones"]}
         own |= {"--record": asked["record"], "-o": out}
+        own |= {"--rosbridge": asked["rosbridge"] is not None}
+        own |= {"--foxglove": asked["foxglove"] is not None}
         refuse_with_dva([name for name, given in own.items() if given])
         about = {"scenario": scenario, "changes": changes, "audit": asked["audit"]}
         where = AttachOptions(dva=dva, keys=keys, transport=carried_by, **about, **page)
@@ -322,6 +326,8 @@ def console(
     )
     pages = [host, *([options.phones_host] if options.phones else [])]
     exposure.warn_of_pages(pages, has_token=options.token)
+    if options.rosbridge is not None:
+        exposure.warn_of_clients([host], has_token=options.token)
     exposure.warn_of_devices(
         [host] if options.links == "real" else [],
         has_keys=False,

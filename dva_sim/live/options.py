@@ -140,6 +140,10 @@ class LiveOptions:
         scenario, document = self.read(), load(self.scenario)
         if part is not None and self.rosbridge is not None:
             raise ConfigError("--rosbridge is for whole runs: leave out --only")
+        if self.keys is not None and self.rosbridge is not None:
+            raise ConfigError("--rosbridge has no keys for its clients: leave out --keys")
+        if part is not None and self.foxglove is not None:
+            raise ConfigError("--foxglove is for whole runs: leave out --only")
         if self.emulated:
             self._check_emulated(scenario, part)
         check_room_for(scenario.robot.count + scenario.guard.count + scenario.operator.count)

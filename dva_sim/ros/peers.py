@@ -46,7 +46,7 @@ class PeerHost(Protocol):
         """Add a line to the story."""
 
 
-class Wanted:
+class PeerTopic:
     """One subscription: time between two messages [s], and when the last one went [s]."""
 
     def __init__(self, period: float) -> None:
@@ -68,7 +68,7 @@ class RosPeer:
 
     def __init__(self, name: str, connection: WebSocketConnection, host: PeerHost) -> None:
         self.name, self._connection, self._host = name, connection, host
-        self.wants: dict[str, Wanted] = {}
+        self.wants: dict[str, PeerTopic] = {}
         self.driver: RosDriver | None = None
         self._room, self._filled_at, self._dropped = BURST, host.now(), 0
         self._said: dict[str, float] = {}
@@ -133,7 +133,7 @@ class RosPeer:
         period = number_in(operation, "throttle_rate", 3_600_000) / 1000
         if len(self.wants) >= MOST_TOPICS:
             raise BadOperation(f"{MOST_TOPICS} topics are all that a client may have")
-        self.wants[topic] = Wanted(period)
+        self.wants[topic] = PeerTopic(period)
         self._host.subscribed(self, topic)
 
     def _advertise(self, operation: Json) -> None:
