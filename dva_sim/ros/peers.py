@@ -7,7 +7,15 @@ from collections.abc import Callable
 from typing import Any, Final, Protocol
 
 from dva_sim.ros.gateway import RosDriver
-from dva_sim.ros.rosbridge import BadOperation, decode, encode, name_in, number_in, plain_type
+from dva_sim.ros.rosbridge import (
+    BadOperation,
+    decode,
+    encode,
+    is_finite,
+    name_in,
+    number_in,
+    plain_type,
+)
 from dva_sim.ros.websocket import TOO_SLOW, WebSocketConnection
 
 Json = dict[str, Any]
@@ -151,8 +159,7 @@ class RosPeer:
         except (TypeError, KeyError):
             raise BadOperation(f"{topic}: no Twist with linear.x and angular.z") from None
         for what, value in (("linear.x", speed), ("angular.z", turn_rate)):
-            is_number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not is_number or not math.isfinite(value):
+            if not is_finite(value):
                 raise BadOperation(f"{topic}: {what} is {str(value)[:40]}, not a finite number")
         if why := self._host.command(self, topic, float(speed), float(turn_rate)):
             raise BadOperation(f"{topic}: {why}")

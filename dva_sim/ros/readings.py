@@ -17,11 +17,14 @@ from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 from dva_sim.ros.profile import RosProfile
+from dva_sim.ros.rosbridge import is_finite
 
 JPEG: Final = b"\xff\xd8\xff"
 RAYS: Final = 36  # of a scan as devices get it, the first one ahead
 MOST_RANGES: Final = 20_000  # of a scan that is read
 FASTEST: Final = 50.0  # design: a robot that says it is faster is not believed [m/s, rad/s]
+MOST_ANGLE: Final = 10.0  # of a scan [rad]
+LATEST: Final = 1 << 40  # no time is later [s]
 FARTHEST: Final = 100_000.0  # design: nor one farther from its origin [m]
 
 
@@ -50,7 +53,7 @@ def number(value: Any, what: str) -> float:
     Raises:
         BadReading: it is none.
     """
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if not is_finite(value):
         raise BadReading(f"{what} is {_shown(value)}, not a finite number")
     return float(value)
 
@@ -80,6 +83,8 @@ def stamp_of(message: Any) -> float | None:
         return None
     whole, rest = stamp.get("sec", stamp.get("secs")), stamp.get("nanosec", stamp.get("nsecs"))
     if not isinstance(whole, int) or not isinstance(rest, int) or not (whole or rest):
+        return None
+    if not 0 <= whole < LATEST or not 0 <= rest < 1e9:
         return None
     return whole + rest * 1e-9
 
@@ -188,10 +193,12 @@ class RosReader:
             raise BadReading(f"ranges is not a list of 1 to {MOST_RANGES}")
         if not 0.0 < most < FARTHEST:
             raise BadReading(f"range_max {most:g} m is no range")
+        if max(abs(first), abs(step)) > MOST_ANGLE:
+            raise BadReading(f"angles of {first:g} and {step:g} rad are none")
         nearest = [most] * RAYS
         for index, value in enumerate(ranges):
             near = 0.0 if value == -math.inf else value  # REP 117: too close to be measured
-            if isinstance(near, int | float) and math.isfinite(near) and near >= 0.0:
+            if is_finite(near) and near >= 0.0:
                 sector = round((first + index * step) / (2.0 * math.pi / RAYS)) % RAYS
                 nearest[sector] = min(nearest[sector], near * units.metres)
             elif value is not None and not isinstance(value, float):

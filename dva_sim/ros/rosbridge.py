@@ -7,6 +7,7 @@ References:
 from __future__ import annotations
 
 import json
+import math
 from typing import Any, Final
 
 MOST_NAME: Final = 256  # of a topic, a service or a type
@@ -40,6 +41,16 @@ def decode(data: bytes) -> dict[str, Any]:
     return operation
 
 
+def is_finite(value: Any) -> bool:
+    """Return True for a number, and no truth value, that is finite as a float."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        return False
+
+
 def name_in(operation: dict[str, Any], key: str) -> str:
     """Return the name of a topic, a service or a type.
 
@@ -59,7 +70,7 @@ def number_in(operation: dict[str, Any], key: str, most: float) -> float:
         BadOperation: it is no such number.
     """
     value = operation.get(key, 0)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= most:
+    if not is_finite(value) or not 0 <= value <= most:
         raise BadOperation(f"{operation['op']} has {key} {str(value)[:40]!r}: 0 to {most:g}")
     return float(value)
 
