@@ -206,6 +206,7 @@ class RosGateway:
         self.on_scan: Callable[[KnownRobot, tuple[float, ...]], object] = lambda *_: None
         self.on_picture: Callable[[KnownRobot, bytes, float], object] = lambda *_: None
         self.camera_token = ""
+        self._free.append(self._new_driver())
         self.device.register(self._look_around)
 
     # --- who is there --------------------------------------------------------------------
@@ -221,13 +222,17 @@ class RosGateway:
         for device in reply.content.devices:
             if device.device_type != ROBOT or len(self.robots) >= MOST_ROBOTS:
                 continue
-            self.device.introduce(device.id_tag, device.address)
-            if device.id_tag not in known:
+            if device.id_tag in known:
+                self.device.introduce(device.id_tag, device.address)
+            else:
                 name = namespace_of(device.label)
                 while name in self.robots:
                     name += "_"
                 self.robots[name] = KnownRobot(device.id_tag, name, device.label)
-                self.device.connect(device.id_tag)  # an emergency does not wait for that
+                # Neither an emergency nor a drive waits for a connection over a long link.
+                for each in (self.device, *(driver.device for driver in self._drivers)):
+                    each.introduce(device.id_tag, device.address)
+                    each.connect(device.id_tag)
 
     # --- what is heard -------------------------------------------------------------------
 
@@ -288,11 +293,13 @@ class RosGateway:
         """Return a driver for a client; None: too many are in control."""
         if self._free:
             return self._free.pop()
+        return self._new_driver() if len(self._drivers) < MOST_DRIVERS else None
+
+    def _new_driver(self) -> RosDriver:
         number = 2 + len(self._drivers)
-        if len(self._drivers) >= MOST_DRIVERS:
-            return None
-        self._drivers.append(RosDriver(self._stage.device("ros", number), self._console))
-        return self._drivers[-1]
+        driver = RosDriver(self._stage.device("ros", number), self._console)
+        self._drivers.append(driver)
+        return driver
 
     @property
     def is_driving(self) -> bool:
