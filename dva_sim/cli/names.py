@@ -97,6 +97,7 @@ FILES: Final = {
     "tasks": "experiments/scenarios/tasks",
     "sites": "worlds",
     "robots": "agents/robots",
+    "ros": "agents/ros",
     "phones": "agents/phones",
     "accelerometers": "agents/accelerometers",
     "people": "agents/people",

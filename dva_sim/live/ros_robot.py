@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,7 +22,6 @@ from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.ros.profile import DEFAULT, RosProfile, load_ros_profile
 from dva_sim.ros.robot import RosRobot
-from dva_sim.ros.rosbridge import plain_type
 from dva_sim.ros.websocket import WebSocketUrl
 from dva_sim.simulation.full.stage import DVA, Stage, id_of
 from dva_sim.simulation.scenario import Scenario, build
@@ -29,6 +29,7 @@ from dva_sim.simulation.scenario import Scenario, build
 LAST_WORDS: Final = 0.3  # for the last command to stand [s]
 TELL_PERIOD: Final = 0.1  # between two looks at what there is to be told [s]
 NAMESPACE: Final = "robot_1"
+_NAMESPACE = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*/?")
 EVERYWHERE: Final = "0.0.0.0", "::"
 
 Say = Callable[[str], object]
@@ -95,7 +96,11 @@ def run_ros_robot(options: RosRobotOptions, say: Say) -> None:
     if not options.dva:
         raise ConfigError("--ros needs --dva HOST:PORT: the DVA that the robot registers with")
     check_address(options.dva, "--dva ")
-    if not plain_type(f"{options.namespace}/x") or options.namespace.strip("/ ") == "":
+    if options.host in EVERYWHERE:
+        raise ConfigError(
+            f"--host {options.host}: give the address by which others find this machine"
+        )
+    if not _NAMESPACE.fullmatch(options.namespace):
         raise ConfigError(f"--namespace {options.namespace!r} should be a name, as in robot_1")
     scenario = options.scenario(profile)
     ring = None if options.keys is None else KeyRing(options.keys)

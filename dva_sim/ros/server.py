@@ -22,6 +22,7 @@ from dva_sim.worlds.site import Site
 Json = dict[str, Any]
 Answer = Callable[[bool, Json], object]
 
+LOCAL: Final = "localhost", "127.0.0.1", "::1"
 MOST_PEERS: Final = 16
 LARGEST: Final = 100_000  # design: of a message of a client; a Twist has 200 [B]
 CLOCK_PERIOD: Final = 0.1  # [s]
@@ -138,12 +139,10 @@ class RosbridgeServer:
 
     def _refusal(self, request: Any) -> tuple[HTTPStatus, str] | None:
         """Return why a client is not let in: a page of another site, or no token."""
+        # A browser names the page that asks; a name of another site may lead here (DNS rebinding).
         origin = request.headers.get("Origin")
-        host = request.headers.get("Host", "")
-        if (
-            origin is not None
-            and urlsplit(origin).netloc.rpartition(":")[0] != host.rpartition(":")[0]
-        ):
+        own = (*LOCAL, str(self._listener.getsockname()[0]))
+        if origin is not None and urlsplit(origin).hostname not in own:
             return HTTPStatus.FORBIDDEN, "a page of another site may not ask here\n"
         shown = parse_qs(urlsplit(request.path).query).get("token", [""])[0]
         bearer = request.headers.get("Authorization", "")

@@ -55,6 +55,8 @@ def test_a_profile_that_makes_no_sense_is_refused_with_file_and_key(tmp_path, ch
         ({"dva": ""}, "--dva"),
         ({"dva": "nowhere"}, "--dva"),
         ({"namespace": "/"}, "--namespace"),
+        ({"namespace": "robot 1"}, "--namespace"),
+        ({"host": "0.0.0.0"}, "--host"),
         ({"profile": "differentia"}, "differential"),
     ],
 )

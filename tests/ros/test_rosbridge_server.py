@@ -174,9 +174,13 @@ def test_without_its_token_or_from_a_page_of_another_site_nobody_is_let_in(world
     token = world.url.partition("token=")[2]
     assert world.client(bare).refused == 401
     assert world.client(f"{bare}?token=x{token[1:]}").refused == 401
-    strange = Stranger(world.url, Origin="http://evil.example")
-    world.until(lambda: strange.refused)
-    assert strange.refused == 403
+    port = bare.rpartition(":")[2]
+    for page in ({"Origin": "http://evil.example"}, {"Origin": "null"}):
+        strange = Stranger(world.url, **page)
+        world.until(lambda asked=strange: asked.refused)
+        assert strange.refused == 403
+    own = Stranger(world.url, Origin=f"http://localhost:{port}")
+    world.until(lambda: own.is_open)
     shown = Stranger(bare, Authorization=f"Bearer {token}")
     world.until(lambda: shown.is_open)
 
