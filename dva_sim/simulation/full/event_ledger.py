@@ -449,7 +449,9 @@ class EventLedger:
         since = old.since if hands == old.hands and not word.anew else now
         word.busy = word.anew = False
         debt = self._debt(event, hands, old.debt, now)
-        return Seen(found, hands, since, waits, dict(event.times), debt, not event.open)
+        return Seen(
+            found, hands, since, waits, times=dict(event.times), debt=debt, is_over=not event.open
+        )
 
     def _debt(self, event: Event, hands: tuple[str | None, ...], old: Debt, now: float) -> Debt:
         """What who has an event in hand owes; who has several orders may begin with any."""
