@@ -79,8 +79,13 @@ class ChoiceMap:
 
     @property
     def overall(self) -> Floats:
-        """Greatest regret of each choice in any situation, `(c,)`."""
-        return np.asarray(self.worst.max(axis=0))
+        """Greatest regret of each choice in any situation in which it is clearly worse, `(c,)`."""
+        return np.asarray(self.clear_worst.max(axis=0))
+
+    @property
+    def clear_worst(self) -> Floats:
+        """Greatest regret where a choice is clearly worse than the best, else 0, `(g, c)`."""
+        return np.asarray(np.where(self.is_clear, self.regret, 0.0).max(axis=2))
 
     @property
     def advised(self) -> Level:

@@ -68,7 +68,7 @@ def lead_of(found: ChoiceMap) -> str:
 
 def _cost(found: ChoiceMap, choice: int) -> str:
     worst = float(found.overall[choice])
-    where = int(np.argmax(found.worst[:, choice]))
+    where = int(np.argmax(found.clear_worst[:, choice]))
     place = level_name(found.given.name, found.given.levels[where])
     if (found.mean[where, choice] >= found.most).any():
         return f"not arriving at all ({place})"
