@@ -70,12 +70,13 @@ storms: $(RUNTIME)  ## a hundred hours of a team in which much goes wrong; goes 
 tools: $(DEV)  ## what some tests need besides Python: Chromium, node, TypeScript, Spin
 	@tests/install_tools.sh $(VENV)
 
-check: $(DEV)  ## lint, format, types, import contracts
+check: $(DEV)  ## lint, format, types, import contracts, prose
 	@echo "Checking style, types and import contracts ..."
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports --no-logo 2>/dev/null || $(BIN)/lint-imports
+	@$(BIN)/python tests/prose_lint.py
 
 same-bytes: $(DEV)  ## whether results are those of another version: make same-bytes AGAINST=COMMIT
 	@$(BIN)/python tests/same_bytes.py --against $(or $(AGAINST),HEAD)

@@ -162,7 +162,7 @@ class DvaPart:
         return [{"number": e.number, "kind": e.kind, "state": str(e.state)} for e in self._events()]
 
     def settled(self) -> bool:
-        """See `LivePart`."""
+        """Implement `LivePart`."""
         book = self._agent.desk.book
         return self._scripted or (book.total > self._settled_before and not book.open)
 
@@ -314,7 +314,7 @@ class OperatorPart:
         return sum(drive.sent for drive in self._stage.recorder.drives)
 
     def settled(self) -> bool:
-        """See `LivePart`."""
+        """Implement `LivePart`."""
         return self._agent.activity in ("done", "waiting")
 
     def has_company(self) -> bool:

@@ -19,6 +19,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Any
 
+from typing_extensions import override
+
 from dva_sim.agents.observation import CameraFrame
 from dva_sim.core.events import Event
 from dva_sim.kernel.clock import Clock
@@ -120,13 +122,13 @@ class LiveRecorder(Recorder):
         """Note the devices of this process; only this part writes down what they send."""
         self.put(HERE, self._clock.now, sorted(nodes))
 
+    @override
     def tell(self, time: float, who: str, what: str, kind: str = "event") -> None:
-        """See `Recorder`."""
         super().tell(time, who, what, kind)
         self.put("told", time, who, what, kind)
 
+    @override
     def view(self, time: float, robot: str, x: float, y: float, heading: float) -> None:
-        """See `Recorder`."""
         self.put("view", robot, [time, x, y, heading])
 
     def message(self, node: str, payload: Any, sent: bool) -> None:
@@ -310,7 +312,7 @@ class Keeper:
         self.keep(json.dumps(start).encode() + b"\n")
 
     def inlet(self) -> int:
-        """See `Inlets`."""
+        """Implement `Inlets`."""
         return self.inlets.inlet()
 
     def keep(self, lines: bytes) -> None:
@@ -384,7 +386,7 @@ class RunKeeping:
             self._inlets = self._keeper.inlets
 
     def inlet(self) -> int:
-        """See `Inlets`."""
+        """Implement `Inlets`."""
         return self._inlets.inlet()
 
     def news(self) -> list[Moment]:

@@ -457,7 +457,7 @@ class _Wire:
             self._network.counters["replies of another form"] += 1
 
     def close(self) -> None:
-        """See `Wire`."""
+        """Implement `Wire`."""
         self._node.wires.pop(self._id, None)
 
 
@@ -494,7 +494,7 @@ class _Subscription:
             self._network.counters["not taken: too many messages wait"] += 1
 
     def close(self) -> None:
-        """See `Subscription`."""
+        """Implement `Subscription`."""
         if self._over:
             return
         self._over = True
@@ -506,11 +506,11 @@ class _Subscription:
         self._node.say_wants(self._publisher)
 
     def pause(self) -> None:
-        """See `Subscription`."""
+        """Implement `Subscription`."""
         self._paused = True
 
     def resume(self) -> None:
-        """See `Subscription`."""
+        """Implement `Subscription`."""
         self._paused = False
         while self._held and not self._paused and not self._over:
             data = self._held.popleft()

@@ -12,6 +12,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Final, Protocol
 
+from typing_extensions import override
+
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.plugins import Plugins
 from dva_sim.network.request_window import MOST, RequestWindow
@@ -134,13 +136,13 @@ class Requested(Pattern):
     answered = True
     waiting: Command | None = None
 
+    @override
     def begin(self, line: Line) -> None:
-        """See `Pattern`."""
         super().begin(line)
         line.open_requests()
 
+    @override
     def offer(self, command: Command) -> None:
-        """See `Pattern`."""
         if not self.line.busy:
             self.line.request(command, self._answered, self.line.lost)
             return
@@ -173,8 +175,8 @@ class Pipelined(Requested):
     sockets = "DEALER to ROUTER"
     when_slow = "commands become older, by a window at most"
 
+    @override
     def begin(self, line: Line) -> None:
-        """See `Pattern`."""
         self.line = line
         line.open_requests(line.window)
 
@@ -188,13 +190,13 @@ class Paced(Requested):
     title, label, colour = "paced requests", "paced", "brown"
     sockets, when_slow = "DEALER to ROUTER", "commands become rarer"
 
+    @override
     def begin(self, line: Line) -> None:
-        """See `Pattern`."""
         self.line, self._window = line, RequestWindow(line.rate_hz)
         line.open_requests(MOST)
 
+    @override
     def offer(self, command: Command) -> None:
-        """See `Pattern`."""
         if self._window.is_open and not self.line.busy:
             self._ask(command)
             return

@@ -50,7 +50,7 @@ class RealNetwork(ABC):
         self._services: dict[str, Service] = {}
 
     def introduce(self, node: str, address: str) -> None:
-        """See `Transport`."""
+        """Implement `Transport`."""
         self._addresses[node] = address
 
     def forget(self, node: str) -> None:

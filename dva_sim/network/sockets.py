@@ -68,11 +68,11 @@ class SocketWire:
         """Set the options of this kind of socket."""
 
     def send(self, tag: int, data: bytes) -> None:
-        """See `Wire`."""
+        """Implement `Wire`."""
         raise NotImplementedError
 
     def close(self) -> None:
-        """See `Wire`."""
+        """Implement `Wire`."""
         self._network.close_client(self._socket, self._peer)
 
     def _replies(self) -> None:
@@ -121,8 +121,8 @@ class DealerWire(SocketWire):
 
     kind = zmq.DEALER
 
+    @override
     def send(self, tag: int, data: bytes) -> None:
-        """See `Wire`."""
         self._network.note(self._node, data)
         self._network.send(self._socket, [tag.to_bytes(8, "big"), b"", data])
 
@@ -151,7 +151,7 @@ class SocketSubscription:
         network.clock.watch(self._socket, self._hear)
 
     def close(self) -> None:
-        """See `Subscription`."""
+        """Implement `Subscription`."""
         self._paused = self._over = True
         self._network.close_client(self._socket, self._peer, soon=True)
 
@@ -161,7 +161,7 @@ class SocketSubscription:
         self._network.clock.unwatch(self._socket)
 
     def resume(self) -> None:
-        """See `Subscription`."""
+        """Implement `Subscription`."""
         if self._paused and not self._over:
             self._paused = False
             self._network.clock.watch(self._socket, self._hear)

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from typing_extensions import override
+
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.connections import AnyConnection, Connector
 from dva_sim.network.link import Link
@@ -69,7 +71,7 @@ class VirtualNetwork:
         """See `Transport`."""
 
     def serve(self, node: str, service: Service) -> None:
-        """See `Transport`."""
+        """Implement `Transport`."""
         self._services[node] = service
 
     def service(self, node: str) -> Service | None:
@@ -81,7 +83,7 @@ class VirtualNetwork:
         return VirtualWire(self, node, peer, on_reply)
 
     def publish(self, node: str, topic: str, payload: Any, size: int) -> None:
-        """See `Transport`."""
+        """Implement `Transport`."""
         total = size + FRAMING + len(topic) + 2
         for subscription in self._subscribers(node, topic):
             send = subscription.send
@@ -101,7 +103,7 @@ class VirtualNetwork:
     def subscribe(
         self, node: str, publisher: str, topic: str, handler: Callable[[Any], object]
     ) -> VirtualSubscription:
-        """See `Transport`."""
+        """Implement `Transport`."""
         return VirtualSubscription(self, node, publisher, topic, handler)
 
     def leave(self, node: str) -> None:
@@ -205,7 +207,7 @@ class VirtualWire(VirtualClient):
         super().__init__(network, node, peer)
 
     def send(self, tag: int, data: bytes) -> None:
-        """See `Wire`."""
+        """Implement `Wire`."""
         self._waiting.append((tag, data))
         self._go_on()
 
@@ -304,15 +306,15 @@ class VirtualSubscription(VirtualClient):
         super().__init__(network, node, publisher)
 
     def pause(self) -> None:
-        """See `Subscription`."""
+        """Implement `Subscription`."""
         self.connection.opener.pause()
 
     def resume(self) -> None:
-        """See `Subscription`."""
+        """Implement `Subscription`."""
         self.connection.opener.resume()
 
+    @override
     def drop(self) -> None:
-        """See `VirtualClient`."""
         super().drop()
         self.send = None
 

@@ -22,6 +22,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final, Generic, Protocol, TypeVar
 
+from typing_extensions import override
+
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.link import Link
 from dva_sim.network.tcp import TcpConnection, TcpEndpoint, TcpOptions
@@ -121,8 +123,8 @@ class ReceivePipe(Pipe[T]):
             self.flow.pause()
         return taken
 
+    @override
     def take(self) -> T | None:
-        """See `Pipe`."""
         was_full = self.full
         item = super().take()
         if was_full and not self.full and self.flow is not None:

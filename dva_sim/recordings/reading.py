@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pydantic
 from numpy.typing import NDArray
+from typing_extensions import override
 
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.errors import ConfigError
@@ -57,16 +58,16 @@ class RecordedHazard(Hazard):
     times: tuple[float, ...]
     sizes: tuple[tuple[float, float, float], ...]
 
+    @override
     def radius(self, time: float) -> float:
-        """See `Hazard`."""
         return self._size(time)[0]
 
+    @override
     def danger_radius(self, time: float) -> float:
-        """See `Hazard`."""
         return self._size(time)[1]
 
+    @override
     def severity(self, time: float) -> float:
-        """See `Hazard`."""
         return self._size(time)[2]
 
     def _size(self, time: float) -> tuple[float, float, float]:

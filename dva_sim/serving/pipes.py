@@ -14,6 +14,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from typing_extensions import override
+
 if TYPE_CHECKING:
     import asyncio
 
@@ -171,8 +173,8 @@ class WatchedEnd(PipeEnd):
                 self._loop.remove_writer(self._end)
         return done
 
+    @override
     def close(self) -> None:
-        """See `PipeEnd`."""
         if self._end >= 0:
             self._loop.remove_reader(self._end)
             self._loop.remove_writer(self._end)

@@ -191,7 +191,7 @@ class TriedDrive:
     def open_requests(
         self, window: int = 1, *, timeout: float | None = None, attempts: int | None = None
     ) -> None:
-        """See `Line`."""
+        """Implement `Line`."""
         timeout = self.timeout if timeout is None else timeout
         attempts = self.attempts if attempts is None else attempts
         self._requester = Requester(self.network, self.node, self.robot, timeout, attempts, window)
@@ -199,7 +199,7 @@ class TriedDrive:
 
     @property
     def busy(self) -> bool:
-        """See `Line`."""
+        """Implement `Line`."""
         return self._asking().busy
 
     def request(
@@ -220,7 +220,7 @@ class TriedDrive:
         return self._requester
 
     def publish(self, command: Any) -> None:
-        """See `Line`."""
+        """Implement `Line`."""
         if not self.pattern.published:
             self.wrong.append(("publishes, and says that it does not", f"at {self.clock.now:g} s"))
         data = self._send(command)
@@ -231,11 +231,11 @@ class TriedDrive:
         return command
 
     def supersede(self, command: Any) -> None:
-        """See `Line`."""
+        """Implement `Line`."""
         self.superseded.append(command.number)
 
     def code_of(self, reply: bytes) -> int | None:
-        """See `Line`."""
+        """Implement `Line`."""
         try:
             body = decode(reply).body
         except ProtocolError:
@@ -243,7 +243,7 @@ class TriedDrive:
         return body.code if isinstance(body, m.Reply) else None
 
     def lost(self, why: str = "") -> None:
-        """See `Line`."""
+        """Implement `Line`."""
         self.told.append((self.clock.now, why))
 
     # --- the robot -------------------------------------------------------------------------

@@ -164,13 +164,13 @@ def test_results_are_told_shown_and_exported(results, tmp_path, capsys):
 def test_a_new_study_is_written_and_registered(tmp_path):
     path = dva_sim.new(tmp_path / "mine")
     assert path == tmp_path / "mine.yaml"
-    with pytest.raises(ConfigError, match="is there already"):
+    with pytest.raises(ConfigError, match="already exists"):
         dva_sim.new(path)
     path.write_text(REGISTERED)
     made = dva_sim.register(path)
     assert made.study == "mine"
     assert made.hash in (tmp_path / "mine.registration.yaml").read_text()
-    with pytest.raises(ConfigError, match="is there already"):
+    with pytest.raises(ConfigError, match="already exists"):
         dva_sim.register(path)
     assert dva_sim.register(path, again=True).earlier == (made.hash,)
 

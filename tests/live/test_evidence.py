@@ -371,6 +371,6 @@ def test_what_holds_no_lines_ends_in_one_line(tmp_path, data):
         lambda: recorded_lines.record(part, tmp_path / "made"),
         lambda: dva_sim.replay(part),
     ):
-        with pytest.raises(ConfigError, match=r"run\.mcap\.part: holds no lines"):
+        with pytest.raises(ConfigError, match=r"run\.mcap\.part: contains no lines"):
             make()
     assert part.exists()

@@ -55,7 +55,7 @@ def test_keys_that_are_there_are_kept(tmp_path):
     ["", "robot", "robot-0", "robot-01", "robot-10000", "dva-1", "cat-1", "70:1a:04:f9:81:d6"],
 )
 def test_a_name_that_stands_for_nothing_is_refused(tmp_path, name):
-    with pytest.raises(ConfigError, match=f"{name!r} is no device"):
+    with pytest.raises(ConfigError, match=f"{name!r} is neither a device"):
         make_keys(tmp_path / "keys", ["robot-1", name])
     assert not (tmp_path / "keys").exists()
 

@@ -38,7 +38,7 @@ from dva_sim.simulation import scenario as scenarios
         (["--record", "traces", "--only", "world"], "traces/robot-1.trace.jsonl would be replaced"),
         (["--record", "/proc/run.mcap"], "nothing can be written in folder '/proc'"),
         (["--record", "full.mcap", "--overwrite"], "full.mcap.part: cannot be written"),
-        (["--record", "/proc/traces"], "/proc/traces: is no folder for traces"),
+        (["--record", "/proc/traces"], "/proc/traces: cannot be a folder for traces"),
         (["--record", "/proc"], "nothing can be written in folder '/proc'"),
     ],
 )

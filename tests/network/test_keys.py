@@ -88,7 +88,7 @@ def test_what_is_missing_is_named(folder, tmp_path):
     assert "dva-sim keys" in refused(tmp_path / "nowhere")
     assert "public key of robot-9" in refused(folder, "robot-9")
     (tmp_path / "empty").mkdir()
-    assert "holds no keys" in refused(tmp_path / "empty")
+    assert "contains no keys" in refused(tmp_path / "empty")
 
 
 @pytest.mark.parametrize(
@@ -112,14 +112,14 @@ def test_a_broken_file_is_named(folder, content, problem):
 def test_two_devices_cannot_have_one_key(folder):
     text = (folder / PUBLIC).read_text()
     (folder / "public" / "copy.key").write_text(text)
-    assert f"second key of {ROBOT}" in refused(folder)
+    assert f"another key of {ROBOT}" in refused(folder)
     (folder / "public" / "copy.key").write_text(text.replace(ROBOT, "robot-9"))
     assert "have the same key" in refused(folder)
 
 
 def test_a_secret_does_not_belong_among_the_public_keys(folder):
     shutil.copy(folder / SECRET, folder / PUBLIC)
-    assert "holds a secret key" in refused(folder)
+    assert "contains a secret key" in refused(folder)
 
 
 def test_keys_that_are_no_pair_are_refused(folder, tmp_path):
@@ -132,7 +132,7 @@ def test_keys_that_are_no_pair_are_refused(folder, tmp_path):
     stranger = zmq.curve_keypair()[0].decode()
     public = KeyRing(tmp_path / "other").public(ROBOT).decode()
     (folder / SECRET).write_text(text.replace(public, stranger))
-    assert "are no pair" in refused(folder, ROBOT)
+    assert "do not match" in refused(folder, ROBOT)
 
 
 @pytest.mark.parametrize("id_", ["", "../robot", "a b", "-", 'x"', "é", "x" * 65, "a\n"])

@@ -96,7 +96,7 @@ PLANTED: dict[str, tuple[tuple[str, ...], int, str]] = {
     "the end cut": (("DELETE FROM audit WHERE number>3",), 4, "the end was cut"),
     "all removed": (("DELETE FROM audit",), 1, "the end was cut"),
     "another format": (("UPDATE about SET value='9' WHERE name='format'",), 1, "of format 1"),
-    "no table": (("DROP TABLE audit",), 1, "is no audit log"),
+    "no table": (("DROP TABLE audit",), 1, "is not an audit log"),
 }
 
 
@@ -106,7 +106,7 @@ def test_what_was_done_by_hand_is_found_at_the_first_row_that_is_wrong(log, faul
     by_hand(log, *commands)
 
     assert place_of(verify(log), words) == (number, True)
-    with pytest.raises(ConfigError, match="no audit log"):
+    with pytest.raises(ConfigError, match="not an audit log"):
         AuditLog(log)
 
 
@@ -226,7 +226,7 @@ def test_a_file_that_is_something_else_is_left_as_it_is(tmp_path):
     path = tmp_path / "audit.sqlite"
     path.write_text("notes")
 
-    with pytest.raises(ConfigError, match="is no audit log"):
+    with pytest.raises(ConfigError, match="is not an audit log"):
         AuditLog(path)
     assert path.read_text() == "notes"
 

@@ -50,7 +50,7 @@ SIDES = ["--side-by-side", "req-rep,pub-sub"]
     [
         (["replay", "none.mcap"], "none.mcap: "),
         (["replay", "{drive}", "--still", "a.png", "--at", "31"], "--at 31 "),
-        (["replay", "{drive}", "--ros2", "."], "is there already"),
+        (["replay", "{drive}", "--ros2", "."], "already exists"),
         (["episode", "fire-drill", "--record", "run.bag"], "end in .mcap"),
         (["episode", "fire-drill", "--record", "no/run.mcap"], "folder 'no'"),
         (["episode", "fire-drill", "--record", "{drive}"], "drive.mcap would be replaced"),

@@ -80,5 +80,5 @@ def test_the_story_is_in_the_log(bag):
 
 
 def test_a_bag_that_is_there_is_kept(tmp_path):
-    with pytest.raises(ConfigError, match="is there already"):
+    with pytest.raises(ConfigError, match="already exists"):
         write_bag(drive(), tmp_path)

@@ -83,7 +83,7 @@ class Player:
         """See `ConsoleSubject`: pages know by the robots' labels."""
 
     def begin(self) -> None:
-        """See `ConsoleSubject`."""
+        """Implement `ConsoleSubject`."""
         self._tell_scene()
         self.clock.pulse(POSITIONS, self._tell_positions)
         self.clock.pulse(ROWS, self._tell_rows)
@@ -108,7 +108,7 @@ class Player:
             self.show(contained_line(number, when))
 
     def note(self, text: str) -> None:
-        """See `ConsoleSubject`."""
+        """Implement `ConsoleSubject`."""
         self.tell({"k": "pictures", "t": round(1000 * self.now), "ok": False, "text": text})
 
     def close(self) -> None:

@@ -44,7 +44,7 @@ class OwnStation:
         robot.device.address = self._own_address()
 
     def line(self) -> StationShown:
-        """See `RobotStation`."""
+        """Implement `RobotStation`."""
         return {
             "state": self.state,
             "address": self._robot.device.address,

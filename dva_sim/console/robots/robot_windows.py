@@ -48,7 +48,7 @@ class AlwaysListening:
         self._robot = robot
 
     def line(self) -> StationShown:
-        """See `RobotStation`."""
+        """Implement `RobotStation`."""
         device = self._robot.device
         state = "listening" if self._robot.body.powered else "off"
         return {"state": state, "address": device.address, "dva": None, "problem": ""}

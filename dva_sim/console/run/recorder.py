@@ -6,6 +6,8 @@ from collections import OrderedDict
 from collections.abc import Callable, Container
 from typing import Any
 
+from typing_extensions import override
+
 from dva_sim.kernel.recorder import DriveLog, Recorder
 from dva_sim.live.recording import LiveRecorder, event_facts
 from dva_sim.simulation.full.observations import FactLog, motion_of, page_of
@@ -44,21 +46,21 @@ class ConsoleRecorder(Recorder):
         self._known = 0
         self._done: dict[int, list[float]] = {}  # up to when a drive was kept [s]
 
+    @override
     def tell(self, time: float, who: str, what: str, kind: str = "event") -> None:
-        """See `Recorder`."""
         super().tell(time, who, what, kind)
         if self.kept is not None:
             self.kept.put("told", time, who, what, kind)
 
+    @override
     def view(self, time: float, robot: str, x: float, y: float, heading: float) -> None:
-        """See `Recorder`."""
         if self.kept is not None:
             self.kept.view(time, robot, x, y, heading)
 
+    @override
     def message_sent(
         self, time: float, source: str, destination: str, size: int, payload: Any
     ) -> None:
-        """See `Recorder`."""
         super().message_sent(time, source, destination, size, payload)
         if destination in self.robots and isinstance(payload, bytes):
             self._sent.setdefault(payload, time)  # one sent again counts from the first time on
@@ -76,13 +78,13 @@ class ConsoleRecorder(Recorder):
         if self.kept is not None:
             self.kept.message(node, payload, sent=False)
 
+    @override
     def command_applied(self, drive: DriveLog, *about: Any, **more: Any) -> None:
-        """See `Recorder`."""
         super().command_applied(drive, *about, **more)
         self.on_applied(drive)
 
+    @override
     def drive_ordered(self, drive: DriveLog) -> None:
-        """See `Recorder`."""
         super().drive_ordered(drive)
         self._known += 1
         self._numbers[id(drive)] = self._known

@@ -181,11 +181,11 @@ class RobotWorld:
     # --- what a console shows: see `ConsoleSubject` ------------------------------------------
 
     def serve_cameras(self, base: str) -> None:
-        """See `ConsoleSubject`."""
+        """Implement `ConsoleSubject`."""
         self.robot.controller.camera_url = camera_url(base, self.robot.device.label)
 
     def begin(self) -> None:
-        """See `ConsoleSubject`."""
+        """Implement `ConsoleSubject`."""
         scene = scene_of(
             *(self.scenario, self.stage.site, (), self.feed.things.all, LINK),
             name=f"robot {self.scenario.robot.profile}",
@@ -202,12 +202,12 @@ class RobotWorld:
         self.clock.pulse(TIDY, self.recorder.tidy)
 
     def show_scene(self) -> None:
-        """See `ConsoleSubject`."""
+        """Implement `ConsoleSubject`."""
         scenario = self.scenario.model_dump(mode="json")
         self.show(scene_line(scenario, self.seed))
 
     def note(self, text: str) -> None:
-        """See `ConsoleSubject`."""
+        """Implement `ConsoleSubject`."""
         self.recorder.tell(self.clock.now, "console", text, "link")
 
     # --- what is told ----------------------------------------------------------------------

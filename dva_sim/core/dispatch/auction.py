@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from typing_extensions import override
 
 from dva_sim.core.dispatch.greedy import Free, waiting
 from dva_sim.core.dispatch.situation import (
@@ -33,8 +34,8 @@ class Auction(Policy):
 
     auctions = True
 
+    @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        """See `Policy`."""
         free = Free(situation)
         chosen: list[Advice] = []
         for task in waiting(situation):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from typing_extensions import override
 
 from dva_sim.core.dispatch.greedy import Free, serve, waiting
 from dva_sim.core.dispatch.situation import Advice, Cover, Floats, Policy, Relocation, Situation
@@ -40,8 +41,8 @@ class Coverage(Policy):
         self.gain_s = options.number("gain_s", gain_s, above=0)
         self.there_s = options.number("there_s", there_s, least=0)
 
+    @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        """See `Policy`."""
         chosen = serve(waiting(situation), situation.eta, Free(situation))
         if situation.cover is None or not situation.cover.stations:
             return chosen

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import override
 
 from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
 
@@ -85,8 +86,8 @@ def serve(tasks: Iterable[int], cost: Floats, free: Free) -> list[Assignment]:
 class NearestIdle(Policy):
     """Oldest task first; the shortest way, whoever walks or drives it."""
 
+    @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        """See `Policy`."""
         cost = reachable(situation, situation.distance)
         return serve(waiting(situation), cost, Free(situation))
 
@@ -94,8 +95,8 @@ class NearestIdle(Policy):
 class MinEta(Policy):
     """Oldest task first; the earliest expected arrival: path length, speed and mobilisation."""
 
+    @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        """See `Policy`."""
         return serve(waiting(situation), situation.eta, Free(situation))
 
 
@@ -106,8 +107,8 @@ class Preference(Policy):
     order of registration decides, as it does among equals on a list.
     """
 
+    @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        """See `Policy`."""
         listed = situation.preference.size > 0
         rank = situation.preference if listed else np.zeros_like(situation.eta)
         return serve(waiting(situation), reachable(situation, rank), Free(situation))
@@ -116,8 +117,8 @@ class Preference(Policy):
 class RandomChoice(Policy):
     """Any idle responder that can get there: the floor that other policies must beat."""
 
+    @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        """See `Policy`."""
         free, chosen = Free(situation), []
         for task in waiting(situation):
             able = free.able(situation.eta[task])

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import override
 
 from dva_sim.core.dispatch.greedy import waiting
 from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
@@ -39,8 +40,8 @@ class BatchOptimal(Policy):
         self.ageing_per_s = options.number("ageing_per_s", ageing_per_s, least=0)
         self.operator_worth = 0.0
 
+    @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        """See `Policy`."""
         tasks = np.array(waiting(situation), dtype=np.intp)
         team = situation.responders
         idle = np.array([r for r, who in enumerate(team) if who.engaged is None], dtype=np.intp)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from typing_extensions import override
 
 from dva_sim.core.dispatch.greedy import Free, waiting
 from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
@@ -172,8 +173,8 @@ class OraclePolicy(Policy):
         self.plan = plan
         self.devices = tuple(devices)
 
+    @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        """See `Policy`."""
         tasks = {situation.tasks[place].event - 1: place for place in waiting(situation)}
         places = {who.device: place for place, who in enumerate(situation.responders)}
         free, chosen = Free(situation), []

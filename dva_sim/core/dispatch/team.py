@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 import numpy as np
+from typing_extensions import override
 
 from dva_sim.core.dispatch.greedy import Free, serve, waiting
 from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
@@ -38,8 +39,8 @@ class HazardTeam(Policy):
         self.extra_s = options.number("extra_s", extra_s, least=0)
         self._by_robot: dict[int, bool] = {}  # event: whether a robot looks at it
 
+    @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        """See `Policy`."""
         free = Free(situation)
         chosen: list[Assignment] = []
         for task in waiting(situation):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from typing_extensions import override
 
 from dva_sim.core.dispatch.greedy import Free, serve, waiting
 from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
@@ -28,8 +29,8 @@ class PriorityEta(Policy):
     def __init__(self, ageing_per_s: float = 0.002) -> None:
         self.ageing_per_s = options.number("ageing_per_s", ageing_per_s, least=0)
 
+    @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        """See `Policy`."""
         order = _most_urgent_first(situation, self.ageing_per_s)
         return serve(order, situation.eta, Free(situation))
 
@@ -60,8 +61,8 @@ class Preemptive(Policy):
         self.gain_s = options.number("gain_s", gain_s, least=0)
         self.ageing_per_s = options.number("ageing_per_s", ageing_per_s, least=0)
 
+    @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        """See `Policy`."""
         eta, free, left_behind = situation.eta, Free(situation), _left_behind(situation)
         chosen = []
         for task in _most_urgent_first(situation, self.ageing_per_s):

@@ -17,6 +17,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Generic, TypeVar
 
+from typing_extensions import override
+
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.emulator.report import Durations, LinkFlow, LinkReport
 from dva_sim.network.link import Link, LinkConfig, make_link, part_links
@@ -133,8 +135,8 @@ class Forwarder(EmulatedLink[int]):
         up, down = self._flows
         self._ways = {tuns[0]: (up, tuns[1]), tuns[1]: (down, tuns[0])}
 
+    @override
     def run(self, watched: Sequence[int], deadline: float) -> int | None:
-        """See `EmulatedLink`."""
         tuns = list(self._ways)
         while (now := time.monotonic()) < deadline:
             until = self._release(now, deadline)
@@ -146,8 +148,8 @@ class Forwarder(EmulatedLink[int]):
                 self._take(file)
         return None
 
+    @override
     def close(self) -> None:
-        """See `EmulatedLink`."""
         for tun in self._ways:
             os.close(tun)
 

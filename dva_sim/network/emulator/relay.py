@@ -15,6 +15,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
+from typing_extensions import override
+
 from dva_sim.network.emulator.forwarder import EmulatedLink, Links
 from dva_sim.network.emulator.report import LinkFlow
 
@@ -82,8 +84,8 @@ class Proxy(EmulatedLink[RelayedStream]):
         """Where the operator connects."""
         return f"tcp://127.0.0.1:{self._listener.getsockname()[1]}"
 
+    @override
     def run(self, watched: Sequence[int], deadline: float) -> int | None:
-        """See `EmulatedLink`."""
         while (now := time.monotonic()) < deadline:
             until = self._release(now, deadline)
             self._forget_closed()
@@ -105,8 +107,8 @@ class Proxy(EmulatedLink[RelayedStream]):
                     self._take(sources[file])
         return None
 
+    @override
     def close(self) -> None:
-        """See `EmulatedLink`."""
         self._listener.close()
         for stream in self._streams:
             stream.source.close()

@@ -13,6 +13,7 @@ from statistics import fmean, pstdev
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
+from typing_extensions import override
 
 from dva_sim.kernel.config import Config
 from dva_sim.kernel.streams import Streams
@@ -48,7 +49,7 @@ class ConstantDelay(Config):
         """Any delay will do."""
 
     def moments(self, delay: float) -> tuple[float, float]:
-        """See `_Law`."""
+        """Implement `_Law`."""
         return delay, 0.0
 
     def play(self, delay: float, streams: Streams, name: str, make: MakeNumbers) -> None:
@@ -111,12 +112,12 @@ class Normal(_Law):
                 f"{delay:g}; gamma has no such limit"
             )
 
+    @override
     def moments(self, delay: float) -> tuple[float, float]:
-        """See `_Law`."""
         return delay, self.sd_s
 
+    @override
     def quantile(self, delay: float) -> Quantile:
-        """See `_Law`."""
         sd = self.sd_s
         return lambda u: max(-delay, sd * normal_quantile(u))
 
@@ -128,16 +129,16 @@ class GammaDelay(_Law):
     sd_s: PositiveSeconds
     least_s: Seconds = 0.0
 
+    @override
     def check(self, delay: float) -> None:
-        """See `_Law`."""
         _above_least(self.least_s, delay)
 
+    @override
     def moments(self, delay: float) -> tuple[float, float]:
-        """See `_Law`."""
         return delay, self.sd_s
 
+    @override
     def quantile(self, delay: float) -> Quantile:
-        """See `_Law`."""
         from scipy.special import gammaincinv  # late: few runs need it, and it is slow to import
 
         above = delay - self.least_s
@@ -151,16 +152,16 @@ class ShiftedExponential(_Law):
     law: Literal["shifted_exponential"]
     least_s: Seconds
 
+    @override
     def check(self, delay: float) -> None:
-        """See `_Law`."""
         _above_least(self.least_s, delay)
 
+    @override
     def moments(self, delay: float) -> tuple[float, float]:
-        """See `_Law`."""
         return delay, delay - self.least_s
 
+    @override
     def quantile(self, delay: float) -> Quantile:
-        """See `_Law`."""
         above = delay - self.least_s
         return lambda u: -above * (1.0 + math.log(max(1.0 - u, 1e-16)))
 

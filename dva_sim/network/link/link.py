@@ -13,6 +13,8 @@ from fnmatch import fnmatchcase
 from functools import partial
 from typing import Any, Protocol
 
+from typing_extensions import override
+
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.suggestions import hint
@@ -257,12 +259,12 @@ class PartedLink(Link):
     def __getattr__(self, name: str) -> Any:
         return getattr(self._whole, name)
 
+    @override
     def is_ideal(self) -> bool:
-        """See `Link`."""
         return False
 
+    @override
     def carry(self, now: float, size: int) -> float | None:
-        """See `Link`."""
         if any(gap.covers(now) for gap in self._gaps):
             self._whole.offered += 1
             self._whole.lost += 1
@@ -276,12 +278,12 @@ class PartedLink(Link):
             return None
         return self._whole.carry_train(now, packets, size)
 
+    @override
     def backlog_bytes(self, now: float) -> float:
-        """See `Link`."""
         return self._whole.backlog_bytes(now)
 
+    @override
     def has_room(self, now: float, size: int) -> bool:
-        """See `Link`."""
         return self._whole.has_room(now, size)
 
 
@@ -366,8 +368,8 @@ class RadioLink(Link):
         self._air, self._air_room = ConstantRate(way.rate_bps), way.queue_bytes
         self._newest = 0.0
 
+    @override
     def _take(self, way: LinkConfig) -> None:
-        """See `Link`."""
         super()._take(way)
         self._law = None if way.jitter_s else self._wobble
         if self._law is not None:
@@ -377,8 +379,8 @@ class RadioLink(Link):
         """See `Link`: the next place may have no reception."""
         return False
 
+    @override
     def carry(self, now: float, size: int) -> float | None:
-        """See `Link`."""
         here = self._reception()
         if here is not None and self._full(now, size, here.rate_bps):
             self.offered += 1
@@ -401,8 +403,8 @@ class RadioLink(Link):
         """See `Link`: in the air each packet has a fate of its own."""
         return None
 
+    @override
     def backlog_bytes(self, now: float) -> float:
-        """See `Link`."""
         return max(super().backlog_bytes(now), self._air.backlog_bytes(now))
 
     def _noted(self, now: float) -> float:

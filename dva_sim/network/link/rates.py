@@ -7,6 +7,7 @@ from collections import deque
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import override
 
 OPPORTUNITY_BYTES = 1500  # what one line of a Mahimahi trace lets through
 
@@ -55,17 +56,17 @@ class ConstantRate(Serialiser):
         self.rate_bps, self._seconds_per_byte = rate_bps, 8.0 / rate_bps
         self._free_at = now + waiting * self._seconds_per_byte
 
+    @override
     def backlog_bytes(self, now: float) -> float:
-        """See `Serialiser`."""
         free_at = self._free_at
         return (free_at - now) / self._seconds_per_byte if free_at > now else 0.0
 
+    @override
     def last_departure(self) -> float:
-        """See `Serialiser`."""
         return self._free_at
 
+    @override
     def depart(self, now: float, size: int) -> float:
-        """See `Serialiser`."""
         start = now if now > self._free_at else self._free_at
         self._free_at = start + size * self._seconds_per_byte
         return self._free_at
@@ -116,8 +117,8 @@ class TraceRate(Serialiser):
         laps, inside = divmod(index, len(self._times))
         return laps * self._period + float(self._times[inside]) - self._offset
 
+    @override
     def backlog_bytes(self, now: float) -> float:
-        """See `Serialiser`."""
         queued = self._queued
         while queued and queued[0][0] <= now:
             self._backlog -= queued.popleft()[1]
@@ -127,8 +128,8 @@ class TraceRate(Serialiser):
         """See `Serialiser`: at the opportunity that was used last."""
         return self._time_of(self._index)
 
+    @override
     def depart(self, now: float, size: int) -> float:
-        """See `Serialiser`."""
         first = self._first_at(now)
         if first > self._index:
             self._index, self._left = first, OPPORTUNITY_BYTES
@@ -156,16 +157,16 @@ class PacketQueue(Serialiser):
         self._leaving: deque[float] = deque()
         self.rate_bps = line.rate_bps
 
+    @override
     def backlog_bytes(self, now: float) -> float:
-        """See `Serialiser`."""
         return self._line.backlog_bytes(now)
 
+    @override
     def last_departure(self) -> float:
-        """See `Serialiser`."""
         return self._line.last_departure()
 
+    @override
     def depart(self, now: float, size: int) -> float:
-        """See `Serialiser`."""
         left_at = self._line.depart(now, size)
         self._leaving.append(left_at)
         return left_at

@@ -33,11 +33,11 @@ class Replay:
         self._offset = offset
 
     def deviation(self, now: float) -> float:
-        """See `Wobble`."""
+        """Implement `Wobble`."""
         return float(self._delays[self._at(now)])
 
     def takes(self, now: float, left_at: float) -> bool:
-        """See `Fate`."""
+        """Implement `Fate`."""
         return bool(self._lost[self._at(now)])
 
     def _at(self, now: float) -> int:

@@ -50,7 +50,7 @@ class Weather:
         self._slot, self._count = -1, 0
 
     def draw(self, now: float) -> float:
-        """See `UniformNumbers`."""
+        """Implement `UniformNumbers`."""
         slot = int(now / SLOT_S)
         self._count = self._count + 1 if slot == self._slot else 0
         self._slot = slot
@@ -81,7 +81,7 @@ class PacketNumbers:
         self._place, self._block = -1, np.empty(0)
 
     def draw(self, now: float) -> float:
-        """See `UniformNumbers`."""
+        """Implement `UniformNumbers`."""
         place, inside = divmod(self._number(), _BLOCK)
         if place != self._place:
             self._place = place
@@ -126,7 +126,7 @@ class SlowWeather:
         self._block: list[float] = []
 
     def draw(self, now: float) -> float:
-        """See `UniformNumbers`."""
+        """Implement `UniformNumbers`."""
         number, inside = divmod(int(now / SLOT_S), _BLOCK)
         while self._number < number:
             self._go_on()

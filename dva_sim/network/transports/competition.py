@@ -19,6 +19,7 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
+from typing_extensions import override
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.config import Config, Key
@@ -98,19 +99,19 @@ class SharedLine(Serialiser):
         self.rate_bps, self._line = rate_bps, ConstantRate(rate_bps)
         self._ends: deque[float] = deque()
 
+    @override
     def backlog_bytes(self, now: float) -> float:
-        """See `Serialiser`."""
         return self._line.backlog_bytes(now)
 
+    @override
     def depart(self, now: float, size: int) -> float:
-        """See `Serialiser`."""
         self.next_end(now)
         end = self._line.depart(now, size)
         self._ends.append(end)
         return end
 
+    @override
     def last_departure(self) -> float:
-        """See `Serialiser`."""
         return self._line.last_departure()
 
     def next_end(self, now: float) -> float:
@@ -139,15 +140,15 @@ class Passing(Serialiser):
         """See `Serialiser`; packets without priority make way, so only these count."""
         return max(0.0, self._free_at - now) / self._seconds_per_byte
 
+    @override
     def depart(self, now: float, size: int) -> float:
-        """See `Serialiser`."""
         start = self._free_at if self._free_at > now else self._line.next_end(now)
         self._line.depart(now, size)
         self._free_at = start + size * self._seconds_per_byte
         return self._free_at
 
+    @override
     def last_departure(self) -> float:
-        """See `Serialiser`."""
         return self._free_at
 
 

@@ -15,6 +15,8 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
+from typing_extensions import override
+
 
 class RateLaw(Protocol):
     """How often a datagram may be sent."""
@@ -57,20 +59,20 @@ class Aimd:
 
     @property
     def gap(self) -> float:
-        """See `RateLaw`."""
+        """Implement `RateLaw`."""
         return 1.0 / self.rate if self.rate else math.inf
 
     def begin(self, round_trip: float) -> None:
-        """See `RateLaw`."""
+        """Implement `RateLaw`."""
         self.rate = 1.0 / round_trip
 
     def passed(self, round_trip: float, held: bool) -> None:
-        """See `RateLaw`."""
+        """Implement `RateLaw`."""
         if held:
             self.rate += self.increase / round_trip
 
     def lost(self) -> None:
-        """See `RateLaw`."""
+        """Implement `RateLaw`."""
         self.rate *= 1.0 - self.decrease
 
 
@@ -114,15 +116,15 @@ class ThreeTerms(Aimd):
         super().__init__(linear, decrease)
         self.linear, self.square, self._passed = linear, square, 0
 
+    @override
     def passed(self, round_trip: float, held: bool) -> None:
-        """See `RateLaw`."""
         if held:
             self._passed += 1
             odd = 2 * self._passed - 1  # from one square to the next
             self.rate += (self.linear + self.square * odd) / round_trip
 
+    @override
     def lost(self) -> None:
-        """See `RateLaw`."""
         super().lost()
         self._passed = 0
 
@@ -163,11 +165,11 @@ class LeastRoundTrip:
         self.gap = math.inf
 
     def begin(self, round_trip: float) -> None:
-        """See `RateLaw`."""
+        """Implement `RateLaw`."""
         self.least, self.gap = round_trip, min(round_trip, self.longest)
 
     def passed(self, round_trip: float, held: bool) -> None:
-        """See `RateLaw`."""
+        """Implement `RateLaw`."""
         self.least = min(self.least, round_trip)
         if round_trip - self.least > self.tolerance:
             self.lost()
@@ -175,5 +177,5 @@ class LeastRoundTrip:
             self.gap /= self.narrow
 
     def lost(self) -> None:
-        """See `RateLaw`."""
+        """Implement `RateLaw`."""
         self.gap = min(self.gap * self.widen, self.longest)

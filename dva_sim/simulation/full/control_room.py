@@ -145,7 +145,7 @@ class _Ways:
     def __call__(
         self, starts: Sequence[Start], goals: Sequence[m.Position]
     ) -> tuple[Floats, Floats]:
-        """See `Travel`."""
+        """Implement `Travel`."""
         speed = np.array([self._paces[s.kind][0] for s in starts])
         ready = np.array([0.0 if s.under_way else self._paces[s.kind][1] for s in starts])
         ways = [[self._length(s.position, goal) for s in starts] for goal in goals]

@@ -360,7 +360,7 @@ class FactLog:
             self._put(Sent(now, source, to, 0, payload))
 
     def delivered(self, now: float, source: str, to: str, payload: Any) -> None:
-        """See `Observer`."""
+        """Implement `Observer`."""
         if not isinstance(payload, bytes) or not (to == self._dva or to in self._robots):
             return
         if not any(quiet in payload for quiet in _QUIET):
@@ -369,11 +369,11 @@ class FactLog:
             self._heard[source] = None
 
     def accepted(self, command: Accepted) -> None:
-        """See `Observer`."""
+        """Implement `Observer`."""
         self._put(command)
 
     def by_hand(self, done: ByHand) -> None:
-        """See `Observer`."""
+        """Implement `Observer`."""
         self._note_motions(done.time, {done.robot: self._look(done.robot)})
         self._put(done)
 
@@ -398,18 +398,18 @@ class FactLog:
             self._put(PlaceNews(now, new))
 
     def shows(self, now: float, page: Page) -> None:
-        """See `Observer`."""
+        """Implement `Observer`."""
         if self._heard:
             self._put(Heard(now, tuple(self._heard)))
             self._heard.clear()
         self._put(self._book.news(now, page))
 
     def deafened(self, now: float, robot: str, deaf: bool) -> None:
-        """See `Observer`."""
+        """Implement `Observer`."""
         self._put(Deafened(now, robot, deaf))
 
     def slowed(self, now: float, processing: float) -> None:
-        """See `Observer`."""
+        """Implement `Observer`."""
         self._put(Slowed(now, processing))
 
 

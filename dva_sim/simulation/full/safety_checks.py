@@ -248,7 +248,7 @@ class SafetyAudit:
         witness.unanswered.clear()
 
     def slowed(self, now: float, processing: float) -> None:
-        """See `Observer`."""
+        """Implement `Observer`."""
         self._obeys_within = OBEYS_WITHIN + 10 * processing
         for witness in self._witnesses.values():
             witness.obeys_within = max(witness.obeys_within, self._obeys_within)
@@ -263,7 +263,7 @@ class SafetyAudit:
     # --- what is seen on the network -------------------------------------------------------
 
     def delivered(self, now: float, source: str, to: str, payload: Any) -> None:
-        """See `Observer`."""
+        """Implement `Observer`."""
         if to in self._motors:
             if to not in self._deaf:
                 self._reaches_robot(now, source, to, payload)
@@ -282,7 +282,7 @@ class SafetyAudit:
         self._ledger.is_heard(device, now)
 
     def kept_nothing_for(self, seconds: float) -> None:
-        """See `EventLedger.kept_nothing_for`."""
+        """Implement `EventLedger.kept_nothing_for`."""
         self._ledger.kept_nothing_for(seconds)
 
     def _reaches_robot(self, now: float, source: str, robot: str, data: bytes) -> None:
@@ -308,7 +308,7 @@ class SafetyAudit:
             witness.given(grant.session, Held(grant.holder, grant.level, grant.sensors))
 
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:
-        """See `Observer`."""
+        """Implement `Observer`."""
         if source == self._dva:
             if isinstance(payload, bytes) and self._ledger.waits_for(payload):
                 self._ledger.says(_read(payload))
@@ -485,7 +485,7 @@ class SafetyAudit:
     # --- twice a second, or more often -----------------------------------------------------
 
     def moves(self, now: float, motions: Mapping[str, RobotMotion]) -> None:
-        """See `Observer`."""
+        """Implement `Observer`."""
         for robot, motion in motions.items():
             witness, limits = self.witness(robot), self._motors[robot]
             self._overdue(witness, motion, now)
@@ -496,7 +496,7 @@ class SafetyAudit:
             witness.looked = now
 
     def shows(self, now: float, page: Page) -> None:
-        """See `Observer`."""
+        """Implement `Observer`."""
         self._report([*self._ledger.check(now, page)], now, self._dva)
         self._report([*self._hands_over(page, now)], now, self._dva)
 

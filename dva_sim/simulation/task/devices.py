@@ -16,6 +16,8 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 
+from typing_extensions import override
+
 from dva_sim.agents.population import Person
 from dva_sim.agents.tilt.accelerometer import GRAVITY, Accelerometer, load_part
 from dva_sim.agents.tilt.filters import load_guarded_filter
@@ -87,15 +89,15 @@ class Mouse(HandDevice):
         self._noise = noise_of(person, streams, dt)
         self._velocity = self._place = (0.0, 0.0)
 
+    @override
     def move(self, dt: float) -> None:
-        """See `HandDevice`."""
         (ax, ay), (vx, vy), (x, y), keep = self._aim, self._velocity, self._place, self._keep
         self._velocity = vx, vy = ax + (vx - ax) * keep, ay + (vy - ay) * keep
         nx, ny = shaken(vx, vy, self._noise)
         self._place = x + nx * dt, y + ny * dt
 
+    @override
     def reading(self) -> Pair:
-        """See `HandDevice`."""
         return self._place
 
 
@@ -110,20 +112,20 @@ class Joystick(HandDevice):
         self._hand = self._shown = (0.0, 0.0)
         self._most = 0.0
 
+    @override
     def aim(self, vx: float, vy: float) -> None:
-        """See `HandDevice`."""
         self._aim = clamped(vx / self.top, 1.0), clamped(vy / self.top, 1.0)
 
+    @override
     def move(self, dt: float) -> None:
-        """See `HandDevice`."""
         (ax, ay), (x, y), keep = self._aim, self._hand, self._keep
         self._hand = x, y = ax + (x - ax) * keep, ay + (y - ay) * keep
         x, y = shaken(x, y, self._noise)
         self._shown = x, y = clamped(x, 1.0), clamped(y, 1.0)
         self._most = max(self._most, abs(x), abs(y))
 
+    @override
     def reading(self) -> Pair:
-        """See `HandDevice`."""
         return self._shown
 
     def farthest(self) -> dict[str, float]:
@@ -191,12 +193,12 @@ class TiltPosition(Tilt):
         self.top = self._gain * MAX_SPEED
         self._rate = 0.0, 0.0
 
+    @override
     def aim(self, vx: float, vy: float) -> None:
-        """See `HandDevice`."""
         self._rate = vx / self._gain, vy / self._gain
 
+    @override
     def move(self, dt: float) -> None:
-        """See `HandDevice`."""
         limit, (x, y), (vx, vy) = self._limit, self._aim, self._rate
         self._aim = clamped(x + vx * dt, limit), clamped(y + vy * dt, limit)
 

@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies import (
@@ -116,8 +117,8 @@ class DriveTrial(Trial[Observation]):
             self._up = RecordedChannel(recording.up, begin, 0.0)
             self._frames = RecordedChannel(recording.down, begin, self._late)
 
+    @override
     def sight(self) -> Observation:
-        """See `Trial`."""
         at = self.plant
         tick = round(1000 * self.now)
         return Observation(
@@ -130,8 +131,8 @@ class DriveTrial(Trial[Observation]):
             hazards=(),
         )
 
+    @override
     def decide(self, driver: Driver, seen: Observation, now: float) -> None:
-        """See `Trial`."""
         delay = self.seat.delay
         delay.see(now, seen.speed, seen.turn_rate)
         if isinstance(driver, Oracle):
@@ -150,8 +151,8 @@ class DriveTrial(Trial[Observation]):
             heading=seen.heading + person.heading_error * next(error),
         )
 
+    @override
     def advance(self, dt: float) -> None:
-        """See `Trial`."""
         plant = self.plant
         speed, turn = self.commanded(dt)
         wanted = Intent(speed * self._top[0], turn * self._top[1])
@@ -226,8 +227,8 @@ class HeadingTrial(DriveTrial):
         self._steered.append(-self._side * self.device.reading()[1])
         return 1.0, turn
 
+    @override
     def advance(self, dt: float) -> None:
-        """See `Trial`."""
         super().advance(dt)
         self.over = self.now + dt >= self._watched
 

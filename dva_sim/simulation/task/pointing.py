@@ -15,6 +15,8 @@ from abc import ABC, abstractmethod
 from collections import deque
 from typing import Any, NamedTuple
 
+from typing_extensions import override
+
 from dva_sim.agents.operator.strategies import (
     Driver,
     Oracle,
@@ -194,8 +196,8 @@ class CursorTrial(Trial[Sighting]):
             tolerance=self.goal.tolerance,
         )
 
+    @override
     def decide(self, driver: Driver, seen: Sighting, now: float) -> None:
-        """See `Trial`."""
         delay = self.seat.delay
         delay.see(now, seen.vx, seen.vy, self._summed)
         vx, vy = self._ask(driver, seen, now, delay.value)
@@ -214,8 +216,8 @@ class CursorTrial(Trial[Sighting]):
             return driver.point(PointView(now, seen, delay))
         return driver.follow(PathView(now, seen, delay, path))
 
+    @override
     def advance(self, dt: float) -> None:
-        """See `Trial`."""
         now, plant, goal, wanted = self.now, self.plant, self.goal, self.commanded(dt)
         if self.scenario.automation:
             wanted = goal.corrected(self.scenario.automation, now, plant, wanted)

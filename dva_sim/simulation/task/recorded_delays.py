@@ -13,6 +13,7 @@ from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import override
 
 from dva_sim.simulation.task.delays import EARLY, Channel, T
 
@@ -69,15 +70,15 @@ class RecordedChannel(Channel[T]):
         self._numbers, self._newest = count(), -1
         self._coming: list[tuple[float, int, T]] = []
 
+    @override
     def put(self, now: float, item: T) -> None:
-        """See `Channel`."""
         delay = self._stream.delay_at(self._begin + now)
         if math.isfinite(delay):
             arrival = now + delay + self._extra
             heapq.heappush(self._coming, (arrival, next(self._numbers), item))
 
+    @override
     def take(self, now: float) -> list[T]:
-        """See `Channel`."""
         out, due = [], now + EARLY
         while self._coming and self._coming[0][0] <= due:
             _, number, item = heapq.heappop(self._coming)

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from dva_sim.agents.operator.strategies import (
     Sighting,
@@ -105,8 +106,8 @@ class PointGoal(ToTarget):
         self._end, self._off, self._left = 0.0, 0.0, 0
         self._touched: list[Pair] = []
 
+    @override
     def target(self, now: float) -> Pair:
-        """See `Goal`."""
         return self._way.at(now)
 
     def notice(self, now: float, seen: Sighting, delay: float) -> None:
@@ -119,8 +120,8 @@ class PointGoal(ToTarget):
             self._pressed_at = now + self._press
             self._presses += 1
 
+    @override
     def check(self, now: float, x: float, y: float, dt: float) -> bool:
-        """See `Goal`."""
         (tx, ty), axis = self.target(now), self._way.axis
         dx, dy = x - tx, y - ty
         inside = dx * dx + dy * dy <= self.tolerance * self.tolerance
@@ -160,8 +161,8 @@ class PointGoal(ToTarget):
             "overshoots": self._left,
         }
 
+    @override
     def draw(self, trace: Trace) -> None:
-        """See `Goal`."""
         trace.marks.append((*self._way.at(0.0), 0.5 * self.width))
         trace.touched += self._touched
 
@@ -184,8 +185,8 @@ class TrackGoal(ToTarget):
         self._cursors: list[float] = []
         self._steps, self._dt, self._told = 0, 0.0, 0.0
 
+    @override
     def target(self, now: float) -> Pair:
-        """See `Goal`."""
         return (0.0 if self.stands else self._sum(now)), 0.0
 
     def pushed(self, now: float, wanted: Velocity) -> Velocity:
@@ -247,8 +248,8 @@ class ReachGoal(ToTarget):
         self._left = 0
         self._touched: list[Pair] = []
 
+    @override
     def target(self, now: float) -> Pair:
-        """See `Goal`."""
         stop = self._task.stops[min(self._at, len(self._task.stops) - 1)]
         return stop.swing_m, stop.reach_m
 
@@ -256,8 +257,8 @@ class ReachGoal(ToTarget):
         """While the work is done, the tip stays."""
         return now < self._works_until
 
+    @override
     def check(self, now: float, x: float, y: float, dt: float) -> bool:
-        """See `Goal`."""
         if self.holds(now):
             return False
         if self._works_until > 0.0:
@@ -277,8 +278,8 @@ class ReachGoal(ToTarget):
             self._works_until = now + self._task.stops[self._at].work_s + dt
         return False
 
+    @override
     def row(self, trial: CursorTrial) -> dict[str, Any]:
-        """See `Goal`."""
         work = sum(stop.work_s for stop in self._task.stops[: self._at])
         return {
             "movement_time_s": trial.now,
@@ -288,7 +289,7 @@ class ReachGoal(ToTarget):
             "overshoots": self._left,
         }
 
+    @override
     def draw(self, trace: Trace) -> None:
-        """See `Goal`."""
         trace.marks += [(s.swing_m, s.reach_m, self.tolerance) for s in self._task.stops]
         trace.touched += self._touched

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from typing_extensions import override
 
 from dva_sim.agents.operator.strategies import (
     Velocity,
@@ -58,8 +59,8 @@ class TunnelGoal(Goal):
         laps = round((self._along / radius - turned) / (2.0 * math.pi))
         return radius * (turned + 2.0 * math.pi * laps), radius - far, (-dy / far, dx / far)
 
+    @override
     def check(self, now: float, x: float, y: float, dt: float) -> bool:
-        """See `Goal`."""
         self._along, offset, _ = self.place(x, y)
         self._time += dt
         inside = self._kept.note(offset, (x, y), dt)
@@ -73,8 +74,8 @@ class TunnelGoal(Goal):
         aside = (1.0 - share) * aside - share * MACHINE_GAIN * offset
         return forward * tx - aside * ty, forward * ty + aside * tx
 
+    @override
     def row(self, trial: CursorTrial) -> dict[str, Any]:
-        """See `Goal`."""
         through = self._along >= self.length
         return {
             "steering_id": movement_laws.steering_id(self.length, self.width),
@@ -83,8 +84,8 @@ class TunnelGoal(Goal):
             **self._kept.row(self._time),
         }
 
+    @override
     def draw(self, trace: Trace) -> None:
-        """See `Goal`."""
         for side in (-self.tolerance, self.tolerance):
             trace.walls.append([(x, y) for x, y in self._line(side).tolist()])
         trace.touched += self._kept.touched

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
+from typing_extensions import override
 
 from dva_sim.kernel.config import Config
 
@@ -48,17 +49,17 @@ class Constant(_Law):
     mean_s: Seconds
 
     @property
+    @override
     def mean(self) -> float:
-        """See `Law`."""
         return self.mean_s
 
     @property
+    @override
     def second(self) -> float:
-        """See `Law`."""
         return self.mean_s**2
 
+    @override
     def sample(self, rng: np.random.Generator, count: int) -> Floats:
-        """See `Law`."""
         return np.full(count, self.mean_s)
 
 
@@ -69,8 +70,8 @@ class _OfMean(_Law):
     mean_s: PositiveSeconds
 
     @property
+    @override
     def mean(self) -> float:
-        """See `Law`."""
         return self.mean_s
 
 
@@ -80,12 +81,12 @@ class Exponential(_OfMean):
     law: Literal["exponential"]
 
     @property
+    @override
     def second(self) -> float:
-        """See `Law`."""
         return 2.0 * self.mean_s**2
 
+    @override
     def sample(self, rng: np.random.Generator, count: int) -> Floats:
-        """See `Law`."""
         return self.mean_s * rng.standard_exponential(count)
 
 
@@ -103,17 +104,17 @@ class Uniform(_Law):
         return self
 
     @property
+    @override
     def mean(self) -> float:
-        """See `Law`."""
         return 0.5 * (self.low_s + self.high_s)
 
     @property
+    @override
     def second(self) -> float:
-        """See `Law`."""
         return (self.low_s**2 + self.low_s * self.high_s + self.high_s**2) / 3.0
 
+    @override
     def sample(self, rng: np.random.Generator, count: int) -> Floats:
-        """See `Law`."""
         return self.low_s + (self.high_s - self.low_s) * rng.random(count)
 
 
@@ -124,12 +125,12 @@ class Erlang(_OfMean):
     phases: Annotated[int, Field(ge=1, le=1000)]
 
     @property
+    @override
     def second(self) -> float:
-        """See `Law`."""
         return self.mean_s**2 * (1.0 + 1.0 / self.phases)
 
+    @override
     def sample(self, rng: np.random.Generator, count: int) -> Floats:
-        """See `Law`."""
         return self.mean_s / self.phases * rng.standard_gamma(float(self.phases), count)
 
 
@@ -149,12 +150,12 @@ class Hyperexponential(_OfMean):
         return 0.5 * (1.0 + math.sqrt((self.squared_cv - 1.0) / (self.squared_cv + 1.0)))
 
     @property
+    @override
     def second(self) -> float:
-        """See `Law`."""
         return self.mean_s**2 * (1.0 + self.squared_cv)
 
+    @override
     def sample(self, rng: np.random.Generator, count: int) -> Floats:
-        """See `Law`."""
         fast = rng.random(count) < self.share
         means = np.where(fast, 0.5 / self.share, 0.5 / (1.0 - self.share))
         return np.asarray(self.mean_s * means * rng.standard_exponential(count))
@@ -189,17 +190,17 @@ class Lognormal(_Law):
         return self.mean_s * math.exp(-0.5 * self.spread**2)
 
     @property
+    @override
     def mean(self) -> float:
-        """See `Law`."""
         return self.median * math.exp(0.5 * self.spread**2)
 
     @property
+    @override
     def second(self) -> float:
-        """See `Law`."""
         return self.median**2 * math.exp(2.0 * self.spread**2)
 
+    @override
     def sample(self, rng: np.random.Generator, count: int) -> Floats:
-        """See `Law`."""
         return np.asarray(self.median * np.exp(self.spread * rng.standard_normal(count)))
 
 
@@ -210,12 +211,12 @@ class Gamma(_OfMean):
     shape: Shape
 
     @property
+    @override
     def second(self) -> float:
-        """See `Law`."""
         return self.mean_s**2 * (1.0 + 1.0 / self.shape)
 
+    @override
     def sample(self, rng: np.random.Generator, count: int) -> Floats:
-        """See `Law`."""
         return self.mean_s / self.shape * rng.standard_gamma(self.shape, count)
 
 
@@ -230,12 +231,12 @@ class Weibull(_OfMean):
         return self.mean_s / math.gamma(1.0 + 1.0 / self.shape)
 
     @property
+    @override
     def second(self) -> float:
-        """See `Law`."""
         return self._scale**2 * math.gamma(1.0 + 2.0 / self.shape)
 
+    @override
     def sample(self, rng: np.random.Generator, count: int) -> Floats:
-        """See `Law`."""
         return self._scale * rng.weibull(self.shape, count)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from typing_extensions import override
 
 from dva_sim.core.dispatch import Policy
 from dva_sim.core.dispatch.oracle import Instance, OraclePolicy, solve
@@ -18,8 +19,8 @@ MOST_EVENTS, MOST_UNITS = 12, 4  # an exact plan for more takes too long
 class _Nobody(Policy):
     """Lets everything happen, and sends nobody."""
 
+    @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> list[Advice]:
-        """See `Policy`."""
         return []
 
 

@@ -13,6 +13,7 @@ from functools import lru_cache
 from typing import Literal, Protocol
 
 import numpy as np
+from typing_extensions import override
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
@@ -205,8 +206,8 @@ class Plane(Terrain):
         self._straight = straight
         self._centres: dict[int, Place] = {}
 
+    @override
     def event_place(self, zone: int, u: float, v: float) -> Place:
-        """See `Terrain`."""
         left, low, right, high = self._boxes[zone] if zone >= 0 else self._whole
         x, y = left + u * (right - left), low + v * (high - low)
         place = self.place(x, y, zone if zone >= 0 else self._zone_at(x, y))
@@ -218,15 +219,15 @@ class Plane(Terrain):
                 return zone
         return -1
 
+    @override
     def centre(self, zone: int) -> Place:
-        """See `Terrain`."""
         if zone not in self._centres:
             left, low, right, high = self._boxes[zone]
             self._centres[zone] = self.fix(0.5 * (left + right), 0.5 * (low + high), zone)
         return self._centres[zone]
 
+    @override
     def anywhere(self, rng: np.random.Generator) -> Place:
-        """See `Terrain`."""
         u, v = rng.random(2).tolist()
         return self.fix(u * self._whole[2], v * self._whole[3])
 
@@ -239,12 +240,12 @@ class Plane(Terrain):
         left, low, right, high = self._boxes[zone]
         return (right - left) * (high - low)
 
+    @override
     def length(self, a: Place, b: Place) -> float:
-        """See `Terrain`."""
         return math.hypot(a.x - b.x, a.y - b.y) if self._straight else 0.0
 
+    @override
     def along(self, a: Place, b: Place, gone: float) -> Place:
-        """See `Terrain`."""
         whole = self.length(a, b)
         if gone >= whole:
             return b
@@ -369,15 +370,15 @@ class Rooms(Terrain):
 
     # --- places ------------------------------------------------------------------------
 
+    @override
     def event_place(self, zone: int, u: float, v: float) -> Place:
-        """See `Terrain`."""
         if zone < 0:
             zone, u = int(u * len(self._spots)), u * len(self._spots) % 1.0
         spots = self._spots[zone]
         return self.apart(spots[int(u * len(spots))])
 
+    @override
     def named(self, name: str, number: int) -> Place:
-        """See `Terrain`."""
         what, _, given = name.partition("-")
         if name in self.zones or what not in ("post", "robot_base"):
             return super().named(name, number)
@@ -395,23 +396,23 @@ class Rooms(Terrain):
         """See `Terrain`: the first of its places."""
         return self._spots[zone][0]
 
+    @override
     def spots(self, zone: int) -> list[Place]:
-        """See `Terrain`."""
         return self._spots[zone]
 
+    @override
     def anywhere(self, rng: np.random.Generator) -> Place:
-        """See `Terrain`."""
         x, y = self.site.sample_free(rng, CLEARANCE)
         return self.fix(x, y)
 
+    @override
     def default_base(self, kind: str) -> str | None:
-        """See `Terrain`."""
         return "post" if kind == "guard" else "robot_base"
 
     # --- ways --------------------------------------------------------------------------
 
+    @override
     def length(self, a: Place, b: Place) -> float:
-        """See `Terrain`."""
         if self._way == "straight":
             return math.hypot(a.x - b.x, a.y - b.y)
         if self._way != "path":
@@ -436,8 +437,8 @@ class Rooms(Terrain):
         ]
         return min(ways) if ways else planner.distance(start, end)
 
+    @override
     def along(self, a: Place, b: Place, gone: float) -> Place:
-        """See `Terrain`."""
         if gone >= self.length(a, b):
             return b
         if gone <= 0.0:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
+from typing_extensions import override
 
 from dva_sim.worlds.hazards.building import NOWHERE, Building, Floats, SitePoints
 from dva_sim.worlds.hazards.conditions import (
@@ -152,8 +153,8 @@ class Fire(Hazard):
         """See `Hazard`: heat release, of the 1055 kW that define the growth classes."""
         return min(1.0, self.heat_release(time) / FULL_GROWTH_KW)
 
+    @override
     def field(self, site: Site) -> FireField:
-        """See `Hazard`."""
         return FireField(self, site)
 
     def sprite(self, time: float, ceiling: float) -> Sprite | None:
@@ -172,8 +173,8 @@ class Fire(Hazard):
         frame = int(time * FLAME_RATE + 3 * self.position[0]) % FLAME_FRAMES
         return flames(frame)._replace(size=size)
 
+    @override
     def light(self, time: float) -> float:
-        """See `Hazard`."""
         return min(1.0, 0.35 + self.radius(time))
 
 
@@ -307,8 +308,8 @@ class FireField(SolvedField):
         self._layers: dict[int, Layer | None] = {}  # at the moment that was asked for last
         self._layers_at = math.nan, math.nan
 
+    @override
     def at(self, x: float, y: float, time: float) -> Conditions:
-        """See `HazardField`."""
         if time < self._fire.start:
             return CLEAR
         heat = 0.0
@@ -405,8 +406,8 @@ class FireField(SolvedField):
             march.hazy[number] = hazy
         return hazy
 
+    @override
     def haze(self, places: SitePoints, time: float) -> Floats:
-        """See `HazardField`."""
         return np.asarray(self.extinctions(time)[places.spaces])
 
     def alarm(self, detector: str, x: float, y: float) -> DetectorAlarm:
@@ -431,8 +432,8 @@ class FireField(SolvedField):
         gap = round(math.dist(fire.position, (x, y)), 2)
         return _jet(detector, fire.growth, fire.peak, gap, site.compartments[room].ceiling)
 
+    @override
     def picture(self, what: str, places: SitePoints, time: float) -> Floats | None:
-        """See `HazardField`."""
         if what in ("smoke", "layer"):
             where = "mean" if what == "smoke" else "layer"
             return np.asarray(self.extinctions(time, where)[places.spaces])
@@ -449,8 +450,8 @@ class FireField(SolvedField):
         strength = self._fire.heat_flux(time, (x + 100.0, y)) * 1e4
         return np.asarray(strength / np.maximum(squared, nearest) * self._seen[1])
 
+    @override
     def solve(self) -> tuple[March, Step]:
-        """See `SolvedField`."""
         return _smoke(self.building, self._fire.growth, self._fire.peak, self.room)
 
 

@@ -18,6 +18,7 @@ from typing import Annotated
 
 import numpy as np
 from pydantic import Field
+from typing_extensions import override
 
 from dva_sim.worlds.hazards.building import NOWHERE, Building, Floats, SitePoints, Spaces
 from dva_sim.worlds.hazards.conditions import CLEAR, Conditions
@@ -77,8 +78,8 @@ class Flood(Hazard):
         """See `Hazard`: the water that has come."""
         return min(1.0, self.volume(time) / FULL_VOLUME)
 
+    @override
     def field(self, site: Site) -> FloodField:
-        """See `Hazard`."""
         return FloodField(self, site)
 
 
@@ -160,8 +161,8 @@ class FloodField(SolvedField):
         super().__init__(flood, site)
         self._flood = flood
 
+    @override
     def at(self, x: float, y: float, time: float) -> Conditions:
-        """See `HazardField`."""
         space = self.building.space_at(x, y)
         if space == NOWHERE or self.room == NOWHERE or time <= self._flood.start:
             return CLEAR
@@ -173,8 +174,8 @@ class FloodField(SolvedField):
             level = FILM if wet else 0.0
         return Conditions(water=level)
 
+    @override
     def picture(self, what: str, places: SitePoints, time: float) -> Floats | None:
-        """See `HazardField`."""
         if what != "water":
             return None
         if self.room == NOWHERE or time <= self._flood.start:
@@ -190,6 +191,6 @@ class FloodField(SolvedField):
             depth = np.where(here, np.where(wet, FILM, 0.0), depth)
         return np.asarray(depth)
 
+    @override
     def solve(self) -> tuple[March, Step]:
-        """See `SolvedField`."""
         return _water(self.building, self._flood.inflow, self.room)

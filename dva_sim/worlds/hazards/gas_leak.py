@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
+from typing_extensions import override
 
 from dva_sim.worlds.hazards.air_mesh import MIXED_HEIGHT, mesh_in
 from dva_sim.worlds.hazards.building import NOWHERE, Floats, SitePoints
@@ -141,16 +142,16 @@ class GasLeak(Hazard):
         cloud = self.release * max(0.0, time - self.start) / self.kind_of_gas.danger
         return min(1.0, cloud / FULL_CLOUD)
 
+    @override
     def field(self, site: Site) -> LeakField:
-        """See `Hazard`."""
         return LeakField(self, site)
 
     def noticed_by(self) -> tuple[str, ...]:
         """See `Hazard`: carbon monoxide has detectors of its own."""
         return ("co",) if self.gas == "carbon_monoxide" else self.detectors
 
+    @override
     def explodes_at(self) -> float:
-        """See `Hazard`."""
         return self.kind_of_gas.lower
 
     def sprite(self, time: float, ceiling: float) -> Sprite | None:
@@ -275,8 +276,8 @@ class LeakField(SolvedField):
             draught = Draught(supply, exhaust, leak.draught)
         return air_in(self.building, leak.diffusivity, leak.air_changes / HOUR, draught)
 
+    @override
     def picture(self, what: str, places: SitePoints, time: float) -> Floats | None:
-        """See `HazardField`."""
         if what != "gas":
             return None
         if time <= self._leak.start:
@@ -293,8 +294,8 @@ class LeakField(SolvedField):
         shares = [self._outdoors(x, y, time) for x, y in places.points.reshape(-1, 2).tolist()]
         return np.array(shares).reshape(places.spaces.shape)
 
+    @override
     def solve(self) -> tuple[March, Step]:
-        """See `SolvedField`."""
         air, node = self._air, mesh_in(self.building).nearest(*self._leak.position)
         march = _gas(air, node, self._leak.release)
         return march, lambda state, _, dt: air.step(state, node, 0.0, dt)

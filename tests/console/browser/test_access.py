@@ -77,8 +77,8 @@ def test_a_page_says_so_when_the_world_has_ended(own_world, browser):
     expect(page.get_by_role("region", name="Map")).to_be_visible()
     end()
 
-    expect(page.locator(".warnings")).to_contain_text("The world has ended")
+    expect(page.locator(".warnings")).to_contain_text("The simulation has ended")
     page.wait_for_timeout(600)  # longer than the first try to reach it again
-    expect(page.locator(".warnings")).to_contain_text("The world has ended")
+    expect(page.locator(".warnings")).to_contain_text("The simulation has ended")
     expect(page.locator(".stale")).to_contain_text("s ago")
     page.context.close()

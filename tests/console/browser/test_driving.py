@@ -130,7 +130,7 @@ def test_what_interrupts_stops_at_once_and_a_held_key_does_not_go_on(page, inter
         page.keyboard.down("ArrowUp")  # the repeat of a key that is still down
         page.wait_for_timeout(200)
         assert len(inputs(page)) == count
-        expect(page.locator(".hint")).to_contain_text("take hold again")
+        expect(page.locator(".hint")).to_contain_text("hold again")
 
 
 def test_a_new_press_drives_again_after_an_interruption(page):

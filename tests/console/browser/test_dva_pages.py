@@ -176,7 +176,7 @@ def test_who_may_only_look_sees_lines_and_nothing_to_act_with(fake, visit):
     expect(page.get_by_role("button", name="Stop server")).to_be_disabled()
     expect(page.get_by_role("link", name="Export")).to_have_count(0)
     page.get_by_role("table", name="Requests").get_by_role("button").first.click()
-    expect(page.get_by_role("region", name="Message")).to_contain_text("need the address")
+    expect(page.get_by_role("region", name="Message")).to_contain_text("Open the address")
     page.get_by_role("link", name="Devices").click()
     expect(page.get_by_role("button", name="Add fake device")).to_have_count(0)
 
@@ -200,8 +200,8 @@ def test_on_modelled_links_a_stopped_server_is_silent_starts_again_and_permits_a
     page = visit.open(started(programs, *QUICK)[1], "main")
     state = page.get_by_role("status", name="Server state")
 
-    expect(state).to_contain_text("Listens on")
-    expect(page.get_by_text("no port of this machine is open")).to_be_visible()
+    expect(state).to_contain_text("Listening on")
+    expect(page.get_by_text("no port of this computer is open")).to_be_visible()
     page.get_by_role("button", name="Stop server").click()
     expect(state).to_contain_text("Stopped")
     page.get_by_role("link", name="Drive").click()
@@ -268,7 +268,7 @@ def test_on_real_links_the_port_is_closed_and_opened(joined, visit):
     page.get_by_role("button", name="Stop server").click()
     expect(page.get_by_role("status", name="Server state")).to_contain_text("Stopped")
     page.get_by_role("button", name="Start server").click()
-    expect(page.get_by_role("status", name="Server state")).to_contain_text("Listens on")
+    expect(page.get_by_role("status", name="Server state")).to_contain_text("Listening on")
     assert peer.ask(m.Registration("back", "TeleOp", "127.0.0.1:9")).code == m.OK
 
 
@@ -290,7 +290,7 @@ def test_a_phone_that_chooses_a_fake_robot_gets_a_time_out_and_no_hang(programs,
     expect(ghost).to_have_count(1)
     device.select_option(ghost.inner_text())
     phone.get_by_role("button", name="Get Permission Level").click()
-    expect(phone.get_by_text("Permission is held")).to_be_visible()
+    expect(phone.get_by_text("You have permission")).to_be_visible()
     phone.evaluate("location.hash = '#/teleoperation'")
     phone.get_by_role("button", name="Start", exact=True).click()
     expect(phone.get_by_text("no answer at")).to_be_visible(timeout=SLOW)
@@ -396,7 +396,7 @@ def test_people_at_an_attached_console_decide_see_alarms_and_read_what_they_did(
     rows = table.get_by_role("row")
     expect(rows.filter(has_text="anasuperviseacknowledge")).to_have_count(1)
     expect(rows.filter(has_text="by itself").filter(has_text="ana")).to_have_count(1)
-    expect(page.get_by_role("status", name="Verification")).to_contain_text("The chain holds")
+    expect(page.get_by_role("status", name="Verification")).to_contain_text("Verified")
     assert faults(page) == []
     page.close()
     console.send(signal.SIGINT)

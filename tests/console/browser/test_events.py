@@ -161,7 +161,7 @@ def test_notes_and_names_that_are_html_are_shown_as_they_are(fake, shared):
     page, other = (shared(address, "events", person=who) for who in (1, 2))
     page.get_by_label("Your name").fill(evil)
     page.get_by_role("button", name="Use this name").click()
-    expect(page.get_by_text(f"The log calls you {evil}")).to_be_visible()
+    expect(page.get_by_text(f"The log shows you as {evil}")).to_be_visible()
     choose(page, 1)
     page.get_by_label("Reason or note").fill(evil)
     page.get_by_role("button", name="Note", exact=True).click()

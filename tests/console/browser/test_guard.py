@@ -126,6 +126,6 @@ def test_the_place_by_satellite_counts_where_the_site_lies_there(world, visits, 
         assert asked["y_m"] == pytest.approx(ymin + 5, abs=0.1)
         assert asked["x_m"] == pytest.approx(0, abs=0.1)
     else:
-        expect(page.get_by_role("alert")).to_contain_text("not at the site")
+        expect(page.get_by_role("alert")).to_contain_text("not at this scenario’s site")
         assert said(page, "guard_place") == []
     tap(page, "Leave")

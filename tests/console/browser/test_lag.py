@@ -97,6 +97,6 @@ def test_nothing_can_be_asked_for_until_the_socket_for_driving_is_open(fake, pag
     sockets[-1].close()
 
     expect(button).to_be_disabled()
-    expect(page.locator(".hint")).to_contain_text("being opened")
+    expect(page.locator(".hint")).to_contain_text("Connecting")
     page.clock.run_for(1500)
     expect(button).to_be_enabled()

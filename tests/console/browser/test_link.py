@@ -64,7 +64,7 @@ def test_the_pattern_of_a_robot_changes(page):
 def test_a_page_that_may_only_look_says_so_and_offers_nothing(fake, visits):
     page = visits().open(fake(*SMALL).look, "drive")
 
-    expect(page.get_by_text("This address may only look.")).to_be_visible()
+    expect(page.get_by_text("This address is view-only.")).to_be_visible()
     for button in ("Take control", "Start", "Stop", "Release control"):
         expect(page.get_by_role("button", name=button, exact=True)).to_be_disabled()
     expect(page.get_by_role("slider", name="Delay")).to_be_disabled()

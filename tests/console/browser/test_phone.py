@@ -143,7 +143,7 @@ def test_with_hold_to_drive_lifting_the_thumb_stops(hand):
     assert hand.sent("samples")[-1]["hand"] is True
     lift()
     hand.is_driving(False)
-    hand.alert("The thumb was lifted")
+    hand.alert("You lifted your thumb")
     assert becomes(lambda: hand.sent("samples")[-1]["hand"] is False)
 
 
@@ -358,7 +358,7 @@ def test_a_phone_that_wants_a_tap_first_is_asked_by_calibrate_and_again_by_start
     hand.register()
     hand.take()
     hand.go("Calibration")
-    expect(hand.status("Sensor")).to_contain_text("wants to be asked")
+    expect(hand.status("Sensor")).to_contain_text("asks before it shares")
     hand.tap("Calibrate")
     expect(hand.status("Calibration")).to_have_text("Calibrated.")
     assert hand.sent("phone_calibrate")[0]["reference_mps2"] == pytest.approx([0, 6.9, 6.9])
@@ -366,7 +366,7 @@ def test_a_phone_that_wants_a_tap_first_is_asked_by_calibrate_and_again_by_start
     hand.page.reload()
     start = hand.page.get_by_role("button", name="Start", exact=True)
     expect(start).to_be_enabled()
-    expect(hand.page.get_by_role("status", name="Doing")).to_contain_text("wants to be asked")
+    expect(hand.page.get_by_role("status", name="Doing")).to_contain_text("asks before it shares")
     start.tap()
     hand.is_driving()
     assert hand.page.evaluate("window.asked") == 1

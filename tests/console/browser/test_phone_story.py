@@ -50,7 +50,7 @@ def test_a_phone_registers_drives_by_tilt_and_is_a_row(visits, programs, tmp_pat
     record, out, motion = tmp_path / "run.mcap", tmp_path / "out", tmp_path / "motion"
     words = ("--record", record, "-o", out, "--keep-motion", motion, "--links", links)
     console = programs.start("console", "--no-open", *WORDS, *words)
-    console.wait_to_say("A phone has to trust this machine once")
+    console.wait_to_say("Each phone must trust this computer once")
     phone = re.findall(r"^Phone: (\S+)", console.said, re.MULTILINE)[0]
 
     hand = Hand(visits(**SCREEN, **UNTRUSTED), phone)

@@ -222,6 +222,6 @@ def test_the_audit_log_of_a_recording_is_shown_with_its_chain(address, audited, 
     expect(table.locator("tbody tr")).to_have_count(3)
     expect(table).to_contain_text("acknowledge")
     state = page.get_by_role("status", name="Verification")
-    expect(state).to_contain_text("The chain holds")
+    expect(state).to_contain_text("Verified")
     expect(page.get_by_text("It is kept in audited.mcap.")).to_be_visible()
     assert faults(page) == []

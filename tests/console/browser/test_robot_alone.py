@@ -87,7 +87,7 @@ def test_a_robot_is_registered_opened_driven_by_a_strange_client_and_switched_of
     page.get_by_role("button", name="Take manual control").click()
     expect(page.get_by_text("busy: held by")).to_be_visible()  # the client has gone with it
     page.get_by_role("button", name="Switch off").click()
-    expect(station).to_contain_text("It is off")
+    expect(station).to_contain_text("The robot is off")
     assert faults(page) == []
     page.close()
     robot.send(signal.SIGINT)
@@ -102,7 +102,9 @@ def test_a_robot_that_registers_at_once_is_driven_by_hand_and_busy_for_a_client_
     robot.wait_to_say("registered at", "listening on")
     expect(page.get_by_role("list", name="State")).to_contain_text("Idle")
     page.get_by_role("button", name="Take manual control").click()
-    expect(page.get_by_role("status", name="Manual control")).to_contain_text("in your hand")
+    expect(page.get_by_role("status", name="Manual control")).to_contain_text(
+        "You control it manually"
+    )
     page.keyboard.down("ArrowUp")
     expect(page.get_by_role("region", name="Side view")).to_contain_text("100 % PWM")
     page.keyboard.up("ArrowUp")

@@ -52,7 +52,7 @@ def take(page: Page) -> None:
         if button.is_enabled():
             button.click()
         page.wait_for_timeout(200)
-        return "in your hand" in hint.inner_text()
+        return "You control it manually" in hint.inner_text()
 
     assert becomes(is_taken)
 
@@ -161,7 +161,7 @@ def test_a_page_that_is_closed_lets_the_robot_stand_and_another_one_sees_why(
     take(driver)
     driver.keyboard.down("ArrowUp")
     expect(other.get_by_role("region", name="Side view")).to_contain_text("0.50 m/s")
-    expect(other.get_by_text("in the hand of another page")).to_be_visible()
+    expect(other.get_by_text("Another page controls it")).to_be_visible()
     driver.close()
     expect(other.get_by_role("region", name="Side view")).to_contain_text("0.00 m/s")
     other.get_by_role("button", name="Take manual control").click()

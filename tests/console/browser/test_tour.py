@@ -48,7 +48,7 @@ def test_the_tour_ends_with_both_times_and_can_be_taken_once_more(own_world, vis
     assert min(times) > 1.0
     kept = re.findall(r"robot (\d) took (\S+) s", (tmp_path / "world-0.out").read_text())
     assert kept == [(str(robot), f"{time:.1f}") for robot, time in enumerate(times)]
-    page.get_by_role("button", name="Once more").click()
+    page.get_by_role("button", name="Do it again").click()
     expect(tour.get_by_role("heading")).to_contain_text("robot-1")
     assert distance(page, 0) > 1.5
 

@@ -105,5 +105,5 @@ def test_nobody_left_to_send_is_an_alarm_only_while_something_waits(page, desk):
 
 
 def test_a_row_that_is_gone_is_none_to_act_on(desk):
-    with pytest.raises(Refused, match="none any more"):
+    with pytest.raises(Refused, match="is over"):
         desk.members("event 1")

@@ -71,7 +71,7 @@ def test_only_a_guard_of_people_can_be_joined_and_by_one_alone(page):
     assert page.do("guard_join", guard="guard-2")[0]
     done, text = page.do("guard_join", guard="guard-2", client="g2")
     assert not done
-    assert "somebody else" in text
+    assert "Somebody else" in text
     assert page.do("guard_leave")[0]
     assert page.do("guard_join", guard="guard-2", client="g2")[0]
     assert line(page)["guard"] is None

@@ -41,7 +41,7 @@ def send_the_past(page):
     ("end", "within", "why"),
     [
         (lambda page: page.held.put_away(), 0.5, "silent for 0.3 s"),
-        (lambda page: setattr(page.held, "hand", False), 0.1, "thumb was lifted"),
+        (lambda page: setattr(page.held, "hand", False), 0.1, "lifted your thumb"),
         (lambda page: setattr(page.held, "orientation", 90), 0.1, "screen has turned"),
         (send_nonsense, 0.5, "silent"),
         (send_the_past, 0.5, "silent"),
@@ -106,7 +106,7 @@ def test_without_registration_there_are_neither_lists_nor_permissions(page):
     for what, about in (("phone_devices", {}), ("phone_permission", wish)):
         answer = page.ask(what, **about)
         assert not answer["ok"]
-        assert "not registered" in answer["text"]
+        assert "Register this phone" in answer["text"]
 
 
 def test_a_page_that_is_gone_for_good_leaves_the_dva_and_its_robot(driving):

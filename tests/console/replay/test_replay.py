@@ -236,7 +236,7 @@ def test_recordings_without_a_study_are_listed_by_name(files):
 
 
 def test_a_folder_without_recordings_is_told(tmp_path):
-    with pytest.raises(ConfigError, match="holds no recordings"):
+    with pytest.raises(ConfigError, match="contains no recordings"):
         Shelf(tmp_path)
 
 

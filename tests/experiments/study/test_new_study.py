@@ -82,6 +82,6 @@ def test_nothing_is_overwritten(fresh):
 @pytest.mark.parametrize("name", ["", ".", "..", ".yaml"])
 def test_a_study_without_a_name_is_not_written(tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ConfigError, match="is no name"):
+    with pytest.raises(ConfigError, match="cannot be the name"):
         write_study(name)
     assert list(tmp_path.iterdir()) == []

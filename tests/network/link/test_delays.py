@@ -160,7 +160,7 @@ def test_each_direction_may_have_its_own_delay():
     [
         ("10\nfast\n", r"d\.txt:2:1: should be a delay \[ms\], not 'fast'"),
         ("10\n-3\n", r"d\.txt:2:1: a delay should be between 0 and 60000 ms, not -3"),
-        ("# none\n", r"d\.txt: holds no delay"),
+        ("# none\n", r"d\.txt: contains no delay"),
     ],
 )
 def test_a_bad_file_of_delays_is_refused_with_its_line(tmp_path, text, words):

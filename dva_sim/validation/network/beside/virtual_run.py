@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from typing_extensions import override
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.emulator.forwarder import links_of
@@ -49,8 +50,8 @@ class CountedLink(PartedLink):
         super().__init__(whole, ())
         self._passed: list[tuple[float, int]] = []
 
+    @override
     def carry(self, now: float, size: int) -> float | None:
-        """See `Link`."""
         arrival = super().carry(now, size)
         if arrival is not None:
             self._passed.append((arrival, size))
