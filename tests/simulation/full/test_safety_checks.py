@@ -11,6 +11,7 @@ from helpers.wording import counted
 
 from dva_sim.agents.device import command_topic
 from dva_sim.agents.operator.drive import Teleoperation
+from dva_sim.agents.operator.operator import OperatorAgent
 from dva_sim.agents.people.guard import GuardAgent
 from dva_sim.agents.robot.controller import (
     LEASE_S,
@@ -36,6 +37,7 @@ from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.safety_checks import CHECKED, LEASE
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.simulation.full.verdicts import RULES, judged
+from dva_sim.storms.mutants import planted
 from dva_sim.worlds.bodies import RobotBody, TickTarget
 
 ROBOT, STRANGER = id_of("robot", 1), "02:00:00:09:00:01"
@@ -428,6 +430,45 @@ def test_an_order_that_is_kept_for_ever_breaks_s6(monkeypatch):
     assert broken(kept()) == set()
     monkeypatch.setattr(Orders, "take_back", lambda *_: [])
     assert "S6" in broken(kept())
+
+
+@pytest.mark.invariant("S6")
+def test_an_event_that_is_over_and_counts_as_something_else_breaks_s6():
+    run = played()
+    counts = run.dva.desk.book.counts
+    assert counts[State.CONFIRMED] == 1
+    counts[State.CONFIRMED], counts[State.EXPIRED] = 0, 1
+    run.show_page()
+    assert broken(run) == {"S6"}
+
+
+@pytest.mark.invariant("S6")
+@pytest.mark.parametrize(("within", "rules"), [(3.0, {"S6"}), (30.0, set())])
+def test_somebody_who_says_ok_and_does_not_set_out_breaks_s6(monkeypatch, within, rules):
+    monkeypatch.setattr(OperatorAgent, "_go_on", lambda self: None)  # takes up nothing
+    monkeypatch.setattr(Orders, "_overdue", lambda *_: [])
+    run = played(**{"dispatch.depart_within_s": within, "horizon_s": 20})
+    assert broken(run) == rules
+
+
+@pytest.mark.invariant("S5")
+def test_a_sensor_that_is_shown_to_somebody_who_may_not_read_it_breaks_s5():
+    run = staged()
+    run.clock.run(5.0)
+    value = m.SensorValue("smoke", (0.1,), "1/m", 5000)
+    data = encode(m.Message(DVA, 1, ROBOT, "12:00:00", 0, value))
+    run.sent(5.0, ROBOT, STRANGER, data)
+    assert broken(run) == {"S5"}
+
+
+@pytest.mark.parametrize(
+    ("mutant", "rule"), [("confirmed-on-arrival", "S7"), ("confirms-more", "S5")]
+)
+def test_a_planted_bug_breaks_its_rule_in_an_ordinary_run(mutant, rule):
+    with planted(mutant) as bug:
+        run = played()
+    assert bug.acts
+    assert broken(run) == {rule}
 
 
 @pytest.mark.invariant("S7")
