@@ -116,14 +116,24 @@ def _replay(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 
 def _order_again(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """An order to a robot arrives again when what it began is over: a copy that was long away."""
-    past = storm.interference.past(storm.id_of(fault.target))
+    """An order to a robot arrives again when what it began is over: a copy that was long away.
+
+    Meanwhile an intruder asks in the name of its sender, until the robot has forgotten its reply.
+    """
+    robot, clock = storm.id_of(fault.target), storm.run.clock
+    past = storm.interference.past(robot)
     orders = [each for each in past if any(kind in each.payload for kind in _ORDERS)]
-    for passing in orders[-3:]:
-        storm.interference.later(passing, fault.value)
+    for passing in orders[-1:]:
+        for number in range(FORGOTTEN_AFTER):
+            asked = m.Message(robot, 2**29 + number, passing.source, "12:00:00", 0, _HARMLESS)
+            after = fault.value * number / FORGOTTEN_AFTER
+            clock.call_after(after, storm.intruder.send, robot, encode(asked))
+        storm.interference.later(passing, fault.value + 0.5)
 
 
 _ORDERS: Final = b"<StartTeleOp", b"<GoTo", b"<Patrol", b"<ReturnToBase"
+_HARMLESS: Final = m.GetMissionStatus()
+FORGOTTEN_AFTER: Final = 80  # requests, of which a robot remembers 64
 
 
 def _replay_by_another(storm: StormScene, fault: Fault, chance: random.Random) -> None:
@@ -571,7 +581,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
         "the last orders to a robot arrive again, so many seconds after it was to stop",
         ("robot",),
         _order_again,
-        value=(1.0, 8.0),
+        value=(2.0, 8.0),
         on=("StopTeleOp", "CancelMission"),
         weight=3.0,
     ),

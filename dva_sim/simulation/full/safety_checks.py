@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
@@ -37,6 +37,7 @@ STARTED_ANEW = 10.0  # a robot whose clock has jumped that much [s]
 LEASE = 30.0  # a driver of whom nothing valid was heard for so long has the robot no longer [s]
 LEASE_SLACK = 2.0  # a robot looks at that once a second, the audit twice [s]
 ENDLESS = 3600.0  # a set point that holds for so long has no end [s]
+MOST_COPIES = 8  # of one command that are told apart
 MOST_KEPT = 1000  # of the newest messages to a robot, of its sessions, and of events
 
 CHECKED: Final = {
@@ -115,7 +116,7 @@ class Witness:
         over: By session: from when on nobody may act by it.
         unanswered: By sender and number: what it has not answered yet.
         done: By sender, session and number: what it has said OK to; it may say so again.
-        arrivals: By sender, number and session: when the newest commands arrived.
+        arrivals: By sender, number and session: when copies of the newest commands arrived.
         stopped: When the newest emergency was obeyed, or should have been.
         ordered: When the newest order that was accepted had arrived.
         does: What that was, by sender and session; nothing once that was ended.
@@ -137,7 +138,9 @@ class Witness:
     over: dict[int, float] = field(default_factory=dict)
     unanswered: dict[tuple[str, int], Unanswered] = field(default_factory=dict)
     done: OrderedDict[tuple[str, int | None, int], None] = field(default_factory=OrderedDict)
-    arrivals: OrderedDict[tuple[str, int, int | None], float] = field(default_factory=OrderedDict)
+    arrivals: OrderedDict[tuple[str, int, int | None], deque[float]] = field(
+        default_factory=OrderedDict
+    )
     stopped: float = -1.0
     ordered: float = -1.0
     does: Doing | None = None
@@ -298,7 +301,8 @@ class SafetyAudit:
         key = message.source, message.message_id
         if isinstance(message.body, m.SetTeleOp):
             # Whoever has started anew numbers from 1 again, and has other sessions.
-            witness.arrivals.setdefault((*key, message.session), now)
+            copies = deque[float](maxlen=MOST_COPIES)
+            witness.arrivals.setdefault((*key, message.session), copies).append(now)
             if len(witness.arrivals) > MOST_KEPT:
                 witness.arrivals.popitem(last=False)
             return
@@ -447,7 +451,10 @@ class SafetyAudit:
         if speaker == (source, session) and number <= known:
             found.append(("S1", "obeys a command again, or after a newer one"))
         witness.newest, witness.heard = ((source, session), number), command.time
-        arrived = witness.arrivals.pop((source, number, session), command.arrived)
+        copies = witness.arrivals.pop((source, number, session), (command.arrived,))
+        # Where newer commands replace those that wait, a copy replaces the one that came first.
+        known_by = (when for when in copies if when <= command.arrived + ROUNDED)
+        arrived = max(known_by, default=copies[0])
         witness.allowed = arrived + self._watchdog
         if command.seen_tick is not None and witness.offset is None:
             found.append(("S1", "obeys a command behind a picture that it has sent nobody"))
