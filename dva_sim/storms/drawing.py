@@ -65,6 +65,7 @@ def _scenario(chance: random.Random) -> dict[str, Any]:
         "robot": {
             "count": robots,
             "watchdog_s": chance.choice((1.0, 3.0, 3.0)),
+            "processing_s": chance.choice((0.05, 0.05, 0.01)),
             "sensors": [{"name": name} for name in chance.choice(((), ("smoke", "temperature")))],
         },
         "guard": {"count": guards, "mobilisation_s": chance.choice((15.0, 25.0))},
