@@ -82,7 +82,7 @@ class WebSocketConnection:
         """Say good-bye and end the connection, without waiting for the peer."""
         if not self.is_open:
             return
-        with suppress(Exception):  # a handshake that never ended has no close frame
+        if self._protocol.state.name == "OPEN":  # a handshake that never ended has no close frame
             self._protocol.send_close(code, reason[:120])
             self.push()
         self.end(reason)

@@ -409,6 +409,7 @@ class RobotAgent:
             return Decision(m.BUSY, self.unfit)
         if self.unfit and isinstance(body, m.Emergency):
             stop = self.controller.press_emergency(self.device.clock.now)
+            self._happened(PRESSED)
             return stop._replace(code=m.BUSY, text=f"told to stop, but {self.unfit}")
         return None
 

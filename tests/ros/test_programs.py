@@ -1,0 +1,85 @@
+"""The commands as users start them: a robot of ROS, a live run and a console for its clients."""
+
+import json
+import signal
+
+import pytest
+from helpers.foxglove.viewer import Viewer
+from helpers.processes.patience import becomes
+from helpers.processes.programs import all_gone_after
+from helpers.ros.ros_machine import RosMachine
+from helpers.ros.served_world import Stranger
+from helpers.wording import unnamed
+
+from dva_sim.console.robots.robot_station import two_free_ports
+
+pytestmark = pytest.mark.system
+
+
+@pytest.fixture
+def programs(tmp_path):
+    yield from all_gone_after(tmp_path)
+
+
+@pytest.fixture
+def machine():
+    machine = RosMachine()
+    yield machine
+    machine.stop()
+
+
+def address(program, name):
+    program.wait_to_say(f"{name}: ")
+    line = next(line for line in program.said.splitlines() if line.startswith(f"{name}: "))
+    return line.split()[1]
+
+
+def test_a_robot_of_ros_is_driven_by_a_script_at_a_dva_and_stands_in_the_end(programs, machine):
+    where = f"127.0.0.1:{two_free_ports('127.0.0.1')}"
+    dva = programs.start("live", "drive-to-event", "--only", "dva", "--dva", where, "--for", "200")
+    dva.wait_to_say("DVA: ")
+    robot = programs.start("robot", "--ros", machine.url, "--dva", where)
+    robot.wait_to_say("is connected to its bridge", "can be driven again")
+    driver = programs.start(
+        *("live", "drive-to-event", "--only", "operator", "--operators", "scripted"),
+        *("--dva", where, "--for", "60"),
+    )
+    assert becomes(lambda: "emergency: obeyed" in driver.said)
+    assert max(speed for speed, _ in machine.commands) > 0.0
+    robot.send(signal.SIGINT)
+    assert robot.ends() == 0
+    assert becomes(lambda: machine.ops("unadvertise"))
+    assert machine.commands[-1] == (0.0, 0.0)
+    assert robot.complained == []
+    dva.send(signal.SIGINT)
+
+
+def test_a_robot_of_ros_without_a_dva_ends_in_one_line(programs):
+    robot = programs.start("robot", "--ros", "ws://127.0.0.1:1")
+    assert robot.ends() == 2
+    assert unnamed(robot.complained, "--dva") == []
+    assert len(robot.complained) == 1
+
+
+@pytest.mark.parametrize("command", ["live", "console"])
+def test_clients_of_ros_and_foxglove_see_what_runs(programs, command):
+    pytest.importorskip("foxglove", reason="needs Foxglove's SDK: pip install 'dva-sim[foxglove]'")
+    more = ("--for", "300") if command == "live" else ("--no-open", "--port", "0")
+    run = programs.start(*(command, "fire-drill", "--rosbridge", "0", "--foxglove", "0"), *more)
+    client = Stranger(address(run, "rosbridge"))
+    viewer = Viewer(address(run, "Foxglove"))
+    assert becomes(lambda: client.is_open)
+    topics = "/robot_1/odom", "/robot_1/image/compressed", "/clock"
+    for topic in topics:
+        client.subscribe(topic)
+    assert becomes(lambda: all(client.of(topic) for topic in topics))
+    assert client.of(topics[1])[0]["format"] == "jpeg"
+    assert becomes(lambda: viewer.of("/tf") and viewer.of("/robot-1/image"))
+    assert viewer.channels["/scene"]["schemaName"] == "foxglove.SceneUpdate"
+    client.say({"op": "call_service", "service": "/robot_1/emergency_stop", "id": "stop"})
+    assert becomes(lambda: any(each.get("id") == "stop" for each in client.came))
+    answer = next(each for each in client.came if each.get("id") == "stop")
+    assert answer["values"]["success"], json.dumps(answer)
+    run.send(signal.SIGINT)
+    assert run.ends() == 0
+    assert becomes(lambda: client.closed)
