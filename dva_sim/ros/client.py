@@ -61,7 +61,7 @@ class RosbridgeClient:
     ) -> None:
         self._clock, self._url, self._topics, self._advertised = clock, url, topics, advertised
         self._on_change, self._on_bad = on_change, on_bad
-        self._pause, self._heard, self._is_over = FIRST_PAUSE, 0.0, False
+        self._pause, self._is_over = FIRST_PAUSE, False
         self._dialer: WebSocketDialer | None = None
         self.is_connected = False
         self.counters: Counter[str] = Counter()
@@ -116,7 +116,7 @@ class RosbridgeClient:
             self._dialer.connection.send(encode(operation))
 
     def _opened(self) -> None:
-        self.is_connected, self._heard = True, self._clock.now
+        self.is_connected = True
         for topic, kind in self._advertised.items():
             self._send({"op": "advertise", "topic": topic, "type": kind})
         for topic, wanted in self._topics.items():
@@ -141,12 +141,15 @@ class RosbridgeClient:
 
     def _look(self) -> None:
         """Give a connection up over which nothing comes: a peer may be gone without a word."""
-        silence = self._clock.now - self._heard
-        if silence > SILENT_AFTER:
+        connection = self._dialer.connection if self._dialer is not None else None
+        if not self.is_connected or connection is None:
+            return
+        if self._clock.now - connection.heard_at > SILENT_AFTER:
             self.renew(f"nothing was heard for {SILENT_AFTER:g} s")
+        else:
+            connection.ping()
 
     def _take(self, data: bytes) -> None:
-        self._heard = self._clock.now
         topic = self._topic_of(data)
         wanted = self._topics.get(topic)
         if wanted is not None and len(data) > wanted.largest:

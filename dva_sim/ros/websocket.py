@@ -40,6 +40,7 @@ class WebSocketConnection:
     Attributes:
         is_open: False once the connection is over.
         on_event: Takes requests and responses of the handshake.
+        heard_at: Time of the newest bytes of the peer, pongs among them [s].
     """
 
     def __init__(
@@ -55,7 +56,7 @@ class WebSocketConnection:
         self._parts: list[bytes] = []
         self._buffer = bytearray()
         self._flushing = False
-        self.is_open = True
+        self.is_open, self.heard_at = True, clock.now
         self.on_event: Callable[[Any], object] = lambda _: None
         sock.setblocking(False)
         with suppress(OSError):
@@ -76,6 +77,12 @@ class WebSocketConnection:
         """Send a text message, as UTF-8."""
         if self.is_open:
             self._protocol.send_text(text)
+            self.push()
+
+    def ping(self) -> None:
+        """Ask for a sign of life, which every peer gives by itself."""
+        if self.is_open and self._protocol.state.name == "OPEN":
+            self._protocol.send_ping(b"")
             self.push()
 
     def close(self, code: int = NORMAL, reason: str = "") -> None:
@@ -122,6 +129,7 @@ class WebSocketConnection:
             self.end(error.strerror or str(error))
             return
         if data:
+            self.heard_at = self._clock.now
             self._protocol.receive_data(data)
         else:
             self._protocol.receive_eof()

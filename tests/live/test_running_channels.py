@@ -23,7 +23,7 @@ from dva_sim.serving.listening import listen
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.run import Run, Watched
 
-SEED, LASTS = 1, 90.0
+SEED, LASTS = 1, 45.0
 
 
 class Lines:

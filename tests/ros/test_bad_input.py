@@ -18,7 +18,6 @@ from dva_sim.ros.websocket import WebSocketUrl
 
 READER = RosReader(RosProfile())
 TAKES = {
-    "odometry-ros1": READER.odometry,
     "odometry-ros2": READER.odometry,
     "tf": lambda message: READER.transform(message, None),
     "battery": READER.charge,

@@ -12,7 +12,9 @@ from helpers.wording import counted, unnamed
 
 from dva_sim.cameras.service import PictureService
 from dva_sim.protocol import messages as m
+from dva_sim.ros.client import SILENT_AFTER
 from dva_sim.ros.profile import RosLimits, RosProfile, RosTopics
+from dva_sim.serving.listening import listen
 
 pytestmark = pytest.mark.system
 
@@ -167,6 +169,29 @@ def test_a_robot_that_does_not_stop_is_told_of_and_told_to_stand_on_and_on(robot
     assert set(robot.machine.commands[told:]) == {(0.0, 0.0)}
     robot.machine.obeys = True
     robot.until(lambda: not robot.agent.unfit)
+
+
+def test_a_bridge_that_says_nothing_is_kept_as_long_as_it_lives(machine):
+    machine.tells = False
+    robot = BridgedRobot(machine)
+    try:
+        robot.until(lambda: machine.connections == 1)
+        robot.pause(SILENT_AFTER + 1.5)
+        assert machine.connections == 1
+        assert robot.robot.bridge.is_connected
+    finally:
+        robot.close()
+
+
+def test_a_bridge_that_has_gone_without_a_word_is_given_up():
+    with listen("127.0.0.1", 0) as mute:
+        mute.setblocking(True)
+        url = f"ws://127.0.0.1:{mute.getsockname()[1]}"
+        robot = BridgedRobot(type("Mute", (), {"url": url}))
+        try:
+            robot.until(lambda: "does not speak WebSocket" in robot.agent.unfit)
+        finally:
+            robot.close()
 
 
 def test_odometry_in_another_frame_keeps_the_robot_from_registering(machine):
