@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import json
 import math
+import socket
 import threading
 
 import pytest
@@ -261,3 +262,12 @@ def test_more_clients_than_there_is_room_for_are_turned_away(world):
     assert world.client().refused == -1
     clients[0].leave()
     world.until(lambda: world.client().is_open)
+
+
+def test_connections_that_say_nothing_make_room_for_those_that_do(world):
+    port = int(world.url.partition("?")[0].rstrip("/").rpartition(":")[2])
+    with contextlib.ExitStack() as stack:
+        for _ in range(16):
+            stack.enter_context(socket.create_connection(("127.0.0.1", port)))
+        assert world.client().refused == -1
+        world.until(lambda: world.client().is_open)
