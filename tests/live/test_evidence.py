@@ -318,7 +318,7 @@ def test_the_lines_of_a_run_that_goes_on_can_be_read_meanwhile(tmp_path):
     inlet = keeper.inlet()
     ended = call("replay", str(keeper.path))
     assert (ended.returncode, ended.stderr) == (0, "")
-    with pytest.raises(ConfigError, match=r"run\.mcap\.part.*goes on"):
+    with pytest.raises(ConfigError, match=r"run\.mcap\.part.*in progress"):
         Keeper(tmp_path / "run.mcap", scenario_of(), 1)
     os.write(inlet, b'["told", 3.0, "dva", "is here", "event"]\n')
     os.close(inlet)

@@ -1,4 +1,4 @@
-"""A console at a DVA that remote system: what messages tell, and nothing that they do not."""
+"""A console at a DVA that runs elsewhere: what messages tell, and nothing that they do not."""
 
 import json
 import signal
@@ -158,7 +158,7 @@ def test_it_shows_what_runs_there_and_outlives_the_dva(programs):
     assert becomes(lambda: any(e["kind"] == "fire" for e in console.state()["events"]))
     refused = console.act("take", robots=["robot-1"])
     assert not refused["ok"]
-    assert "remote system" in refused["text"]
+    assert "runs elsewhere" in refused["text"]
     assert console._ask("/api/emergency", {"robots": "all"})["text"] == "robots stop"
 
     fire = next(e["number"] for e in console.state()["events"] if e["kind"] == "fire")

@@ -41,7 +41,7 @@ def send_the_past(page):
     ("end", "within", "why"),
     [
         (lambda page: page.held.put_away(), 0.5, "silent for 0.3 s"),
-        (lambda page: setattr(page.held, "hand", False), 0.1, "lifted your thumb"),
+        (lambda page: setattr(page.held, "hand", False), 0.1, "thumb was lifted"),
         (lambda page: setattr(page.held, "orientation", 90), 0.1, "screen has turned"),
         (send_nonsense, 0.5, "silent"),
         (send_the_past, 0.5, "silent"),

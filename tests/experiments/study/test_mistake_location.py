@@ -32,7 +32,7 @@ def complaint_of_study(folder, *settings):
         ("robot.procesing_s=1", "'processing_s'"),
         ("operator.person=3", "'operator.person'"),
         ("parts.drve.replications=2", "no 'drve'"),
-        ("persons.a=3", "'persons' holds no keys"),
+        ("persons.a=3", "'persons' has no keys"),
         ("seed=-1", "at least 0, not -1"),
         ("persons=5%", "not '5%'"),
         ("link.delay_s=500ms", "write 0.5"),

@@ -73,7 +73,7 @@ def test_it_answers_its_question(fresh, tmp_path):
 
 
 def test_nothing_is_overwritten(fresh):
-    with pytest.raises(ConfigError, match=r"mine\.yaml is there already"):
+    with pytest.raises(ConfigError, match=r"mine\.yaml already exists"):
         write_study("mine.yaml")
     with pytest.raises(DvaSimError, match="No such file"):
         write_study("nowhere/mine")
