@@ -1,4 +1,4 @@
-"""What everybody stands on: clock, random streams, recorder, configuration, plug-ins, errors.
+"""Foundations: clock, random streams, recorder, configuration, plug-ins, errors.
 
 It imports no other room. Begin reading at `clock` and `streams`, then at `config`.
 """

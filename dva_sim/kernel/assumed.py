@@ -115,7 +115,7 @@ class Sparse(Config):
         return {key: value for key, value in handler(self).items() if key in self.model_fields_set}
 
     def changed_by(self, other: Sparse) -> Sparse:
-        """The same with every key that `other` was given."""
+        """Return a copy with every key that `other` was given."""
         given = {name: getattr(other, name) for name in other.model_fields_set}
         inner = {
             name: getattr(self, name).changed_by(value)

@@ -48,7 +48,7 @@ class AlsoCalled:
 
 @dataclass(frozen=True, eq=False)
 class Key:
-    """How a key is called where people read it: `Annotated[float, Key("one-way delay")]`.
+    """Name of a key where people read it: `Annotated[float, Key("one-way delay")]`.
 
     Attributes:
         title: As a factor of a study.
@@ -71,7 +71,7 @@ class Key:
 
     @property
     def absent(self) -> str:
-        """What is not there at a level of zero; empty if that is not said so."""
+        """Name of what is absent at a level of zero; empty if the key has none."""
         return self.zero if isinstance(self.zero, str) else self.title if self.zero else ""
 
 
@@ -86,7 +86,7 @@ def keys_said_of(model: Any) -> dict[str, Key]:
 
 
 def meant(path: KeyPath, value: Any, *models: Any) -> str:
-    """What to write instead of an unknown key: `did you mean 'x'?`, or what there is.
+    """Suggest what to write instead of an unknown key: `did you mean 'x'?`, or the known keys.
 
     Args:
         path: The key as it was given.
@@ -173,7 +173,7 @@ def fields_below(model: Any, above: str = "", depth: int = _DEPTH) -> Iterator[t
 
 
 def _fields(model: Any) -> dict[str, Any]:
-    """Of a model, with those of what it takes its other keys from."""
+    """Collect the fields of a model and of the model that takes its other keys."""
     further = getattr(model, "further_keys", None)
     fields: dict[str, Any] = dict(getattr(model, "model_fields", {}))
     return fields | (dict(further().model_fields) if further is not None else {})
@@ -233,7 +233,7 @@ def _path(problem: Any, data: Mapping[str, Any]) -> KeyPath:
 
 
 def _is_tag(part: str | int, data: Any, loc: Sequence[str | int]) -> bool:
-    """Whether `part` of an error location names a union member rather than a key."""
+    """Return True if `part` of an error location names a union member rather than a key."""
     for step in loc:
         inside = isinstance(data, Mapping) and step in data
         inside = inside or (isinstance(data, list) and isinstance(step, int) and step < len(data))
@@ -281,7 +281,7 @@ def _given(problem: Any, message: str) -> str:
 
 
 def _instead(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> str:
-    """What to write instead, where that can be guessed."""
+    """Suggest what to write instead, where that can be guessed."""
     given, kinds = problems[0]["input"], {problem["type"] for problem in problems}
     if isinstance(given, str) and "float_type" in kinds:
         number = as_number(str(path[-1]) if path else "", given)
@@ -296,7 +296,7 @@ def _instead(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> 
 
 
 def _in_words(problems: Sequence[Any]) -> str:
-    """What would be right, in words that need no Python."""
+    """Describe what would be right, in words that need no Python."""
     kinds = {problem["type"]: problem for problem in problems}
     first = kinds.get("finite_number", problems[0])
     if first["type"] in ("too_short", "too_long"):
@@ -368,7 +368,7 @@ class Config(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
-        """What is otherwise than by default, so that a whole scenario fits a screen."""
+        """Show only what differs from the defaults, so that a whole scenario fits on a screen."""
         fields = type(self).model_fields
         for name, value in super().__repr_args__():
             info = fields.get(name or "")

@@ -75,7 +75,7 @@ def blame(
     make: Callable[[Mapping[str, Any]], object],
     source: Document | Mapping[str, Any] | None = None,
 ) -> ConfigError:
-    """The same mistake with the changes that make it, and without a place in a file that is valid.
+    """Attribute a mistake to the changes that cause it, without a place in a valid file.
 
     Args:
         error: A mistake of all changes together.
@@ -135,7 +135,7 @@ def set_key(data: dict[str, Any], key: str, value: Any) -> None:
 
 
 def _place_in(node: Any, name: str, above: str, key: str) -> str | int:
-    """Where a part of a dotted key leads: a key of a mapping, or an item of a list."""
+    """Resolve one part of a dotted key: a key of a mapping, or an item of a list."""
     if isinstance(node, dict):
         return name
     if not isinstance(node, list):

@@ -1,4 +1,4 @@
-"""What the program ends with: one number for each way in which a command can end.
+"""Exit codes of the program, one for each way in which a command can end.
 
 Errors that a caller may handle; everything else is a bug and keeps its traceback.
 """
@@ -13,7 +13,7 @@ from dva_sim.kernel.labels import visible
 
 
 class ExitCode(IntEnum):
-    """How a command ended, as a shell and CI see it."""
+    """Exit code of a command, as a shell and CI see it."""
 
     OK = 0
     DOES_NOT_HOLD = 1

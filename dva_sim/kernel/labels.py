@@ -33,7 +33,7 @@ def visible(text: str) -> str:
 
 
 def look_of(label: str) -> str:
-    """How a label looks at a glance: without regard to case, width and white space."""
+    """Normalise a label: without regard to case, width and white space."""
     return " ".join(unicodedata.normalize("NFKC", visible(label)).casefold().split())
 
 

@@ -11,6 +11,6 @@ T = TypeVar("T")
 
 
 def maker(kind: Callable[P, T]) -> Callable[P, T]:
-    """What makes named tuples of a kind, past the machinery that classes are called by."""
+    """Return a fast constructor of named tuples that bypasses `type.__call__`."""
     new: Any = kind.__new__
     return cast("Callable[P, T]", MethodType(new, kind))

@@ -1,4 +1,4 @@
-"""What is measured: each column of a table, said once, beside the code that computes it.
+"""Measures: each column of a table, described once, beside the code that computes it.
 
 Tables, their dictionary, the words of reports and what a study may ask for all follow from these
 objects. The unit is the end of the name, see `units`.
@@ -44,12 +44,12 @@ class Measure:
 
     @property
     def unit(self) -> str:
-        """As printed; empty for what has none."""
+        """Unit as printed; empty for a measure without one."""
         return unit_of(self.name)
 
     @property
     def words(self) -> str:
-        """How reports call it."""
+        """Name in reports."""
         return self.title or without_unit(self.name)
 
     @property
@@ -61,7 +61,7 @@ class Measure:
         return low if self.low is None else self.low, high if self.high is None else self.high
 
     def as_json(self) -> dict[str, Any]:
-        """What a results folder keeps of it: it is read where its class cannot be."""
+        """Return what a results folder keeps of it, to be read where its class is missing."""
         told = {"meaning": self.meaning, "title": self.title, "better": self.better}
         return told | ({} if self.is_number else {"is_number": False})
 

@@ -62,7 +62,7 @@ class Plugins(Generic[T]):
         return sorted(shipped | {entry.name for entry in self.installed()})
 
     def installed(self) -> list[EntryPoint]:
-        """What installed packages offer."""
+        """Return the plug-ins that installed packages offer."""
         return sorted(entry_points(group=self.group), key=lambda entry: entry.name)
 
     def files(self) -> list[Path]:
@@ -76,7 +76,7 @@ class Plugins(Generic[T]):
         options: Mapping[str, Any] | None = None,
         base: Path | None = None,
     ) -> Callable[..., T]:
-        """What makes one of a name, from what one of its kind is always given.
+        """Return a factory for the plug-in of a name, with its options applied.
 
         Args:
             name: As for `find`.
@@ -113,7 +113,7 @@ class Plugins(Generic[T]):
         return self.shipped.get(name) or self._from_file(name, base) or self._installed(name)
 
     def located(self, name: str, base: Path | None = None) -> str:
-        """The same name, with the whole path of the file if it is in one; see `find`.
+        """Return the name with the full path of its file, if it is in one; see `find`.
 
         Raises:
             ConfigError: there is no such file.
@@ -242,7 +242,7 @@ class Guard:
         return None
 
     def _held(self, what: str, value: float, least: float, most: float) -> float:
-        """What is allowed of a value; by how much it misses that beyond rounding, is counted."""
+        """Clamp a value to its limits; count by how much it exceeds them beyond rounding."""
         if not least - BEYOND * most <= value <= most + BEYOND * most:
             self._count(f"{what} {value:.3g}; allowed is {least:.3g} to {most:.3g}")
         return min(max(value, least), most)
@@ -253,12 +253,12 @@ class Guard:
 
 
 def word_of(name: object) -> str:
-    """What a name or a class is called in messages."""
+    """Return what a name or a class is called in messages."""
     return name if isinstance(name, str) else getattr(name, "__qualname__", repr(name))
 
 
 def stamp_of(name: str) -> int:
-    """When the file of `file.py:Class` was last changed [ns]; 0 for a name without a file."""
+    """Return when the file of `file.py:Class` was last changed [ns]; 0 without a file."""
     file = Path(name.rpartition(":")[0])
     return file.stat().st_mtime_ns if file.is_file() else 0
 

@@ -30,7 +30,7 @@ _UNITS: Final[dict[str, dict[str, float]]] = {
 
 
 def as_number(key: str, text: str) -> str:
-    """What a text should be as the value of a key, such as `0.5` for `500ms`; empty if unclear."""
+    """Suggest the number that a text means as a key's value, as `0.5` for `500ms`; else empty."""
     found = _QUANTITY.fullmatch(text.strip())
     if found is None:
         return ""

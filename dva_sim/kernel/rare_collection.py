@@ -1,4 +1,4 @@
-"""How often Python looks for reference cycles in the processes of the program."""
+"""Rarer collection of reference cycles in the processes of the program."""
 
 import gc
 

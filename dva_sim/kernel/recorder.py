@@ -1,4 +1,4 @@
-"""What happened in a run: a timeline for people, numbers for measures, broken rules counted."""
+"""Recorder of a run: a timeline for people, numbers for measures, broken rules counted."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Moment(NamedTuple):
 
 
 class TrackPoint(NamedTuple):
-    """Where an agent was [m, rad], and what it was doing."""
+    """Position [m], heading [rad] and activity of an agent."""
 
     time: float
     x: float
@@ -103,7 +103,7 @@ make_accepted = maker(Accepted)
 
 
 class ByHand(NamedTuple):
-    """What somebody does who drives a robot by hand, at the robot itself, and is obeyed.
+    """Action of a person who drives a robot by hand, at the robot itself, and is obeyed.
 
     Attributes:
         robot: Which, by id.
@@ -161,7 +161,7 @@ make_shown = maker(Shown)
 
 
 class Followed(NamedTuple):
-    """What an operator wants, by which picture; times in [s].
+    """Command that an operator wants, and the picture that it is based on; times in [s].
 
     Attributes:
         captured: When that picture was captured.
@@ -178,7 +178,7 @@ _make_followed = maker(Followed)
 
 
 class DrivenBy(NamedTuple):
-    """Who drove, and with what, where that is not the scenario's.
+    """Driver of a drive, and the driver's equipment, where these differ from the scenario's.
 
     Attributes:
         person: A number and no name; empty of a simulated person.
@@ -334,7 +334,7 @@ class Recorder:
         self.timeline.append(Moment(time, who, what, kind))
 
     def view(self, time: float, robot: str, x: float, y: float, heading: float) -> None:
-        """Where an operator believes a robot to be, if pictures are wanted."""
+        """Record where an operator believes a robot to be, if pictures are wanted."""
         if self.traffic is not None:
             self.views[robot].append(TrackPoint(time, x, y, heading, "seen"))
 

@@ -17,7 +17,7 @@ _TEXTS: Final = (".yaml", ".yml", ".csv", ".xsd")  # files that a name may mean
 
 
 class FolderKind(NamedTuple):
-    """What is found in one folder.
+    """Contents of a resource folder.
 
     Attributes:
         word: What such a file is called.
@@ -64,7 +64,7 @@ def available(folder: str, pattern: str = "*.yaml") -> dict[str, Path]:
 
 
 def is_there(name: str, folder: str) -> bool:
-    """Whether there is a file of that name, without reading whole folders."""
+    """Return True if there is a file of that name, without reading whole folders."""
     return any(is_file(root.joinpath(folder, f"{name}.yaml")) for root in roots())
 
 
@@ -94,7 +94,7 @@ def find(
 
 
 def _missing(name: str, folder: str, known: list[str], is_asked: bool) -> str:
-    """That no file of its kind has a name: what it is the name of, what was meant, or what is."""
+    """Describe a missing file: what else has its name, what was meant, or what there is."""
     kind = KINDS.get(folder, FolderKind(Path(folder).name.removesuffix("s"))).word
     path, others = Path(name), {where: k for where, k in KINDS.items() if where != folder}
     if name and _is_there(path.is_dir):
@@ -149,12 +149,12 @@ def refuse_to_replace(
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is such a file; what nothing can be called is none."""
+    """Return True if there is such a file; a name that no file can have is no error."""
     return _is_there(path.is_file)
 
 
 def _is_there(look: Callable[[], bool]) -> bool:
-    """What nothing can be called, such as a name of a thousand letters, is not there."""
+    """Evaluate a look at the disk; a name that no file can have counts as absent."""
     try:
         return look()
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""What somebody meant by a name that there is not: the nearest one, or else what there is."""
+"""Suggestions for unknown names: the closest known name, or a list of the known ones."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _slips(one: str, other: str) -> int:
 
 
 def _is_numbered(one: str, other: str) -> bool:
-    """Whether two names differ in their number alone: no slip makes robot-9 of robot-1."""
+    """Return True if two names differ only in their number: robot-9 is no misspelt robot-1."""
     digits = re.compile(r"[0-9]+")
     return one != other and digits.sub("0", one) == digits.sub("0", other)
 
@@ -69,7 +69,7 @@ def hint(given: str, known: Iterable[str], there: str = "known") -> str:
 
 
 def unknown(what: str, given: object, known: Iterable[str], there: str = "known") -> str:
-    """That there is nothing of a name, and which one was meant or what there is."""
+    """Say that a name is unknown, and suggest the closest one or list the known ones."""
     return f"{what} {given!r} is unknown; {hint(str(given), known, there)}"
 
 

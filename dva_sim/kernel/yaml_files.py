@@ -158,7 +158,7 @@ def _plain(node: Any, path: KeyPath, places: dict[KeyPath, tuple[int, int]]) -> 
 
 
 def parse_scalar(text: str) -> Any:
-    """What `text` would be as a value in YAML: `--set seed=3` gives the number 3."""
+    """Parse `text` as a YAML scalar: `--set seed=3` gives the number 3."""
     try:
         return _plain(YAML(typ="safe", pure=True).load(text), (), {})
     except (YAMLError, ValueError, RecursionError) as error:

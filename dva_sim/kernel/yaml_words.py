@@ -9,7 +9,7 @@ Place = tuple[int | None, int | None]
 
 
 class Slip(NamedTuple):
-    """What ruamel says, what we say, and whether the mistake is where what it reads began."""
+    """Translation of a message of ruamel; and whether the mistake is where its context began."""
 
     theirs: str
     ours: str
@@ -49,7 +49,7 @@ _SIGNS: Final = {
 
 
 def in_words(error: Any) -> tuple[str, Place]:
-    """What is wrong, and where: line and column, from 1.
+    """Return what is wrong, and its line and column, from 1.
 
     Args:
         error: What ruamel raised, with its marks.

@@ -1,4 +1,4 @@
-"""What control rooms and the DVA say to each other: events, decisions, proposals.
+"""Messages between control rooms and the DVA: events, decisions, proposals.
 
 One frozen dataclass per element below `Dispatch` of `protocol/dva.xsd`, as in `messages`, where
 all of them are found, too.
@@ -142,7 +142,7 @@ class Revoke:
 
 @dataclass(frozen=True, slots=True)
 class ByWhom:
-    """Which device did something, what it is called, and how long ago that was [s], up to 1e6."""
+    """Device that did something, its label, and how long ago that was [s], up to 1e6."""
 
     device: str
     label: str
@@ -170,7 +170,7 @@ class LastDecision:
 
 @dataclass(frozen=True, slots=True)
 class Proposed:
-    """What the policy would do, and waits for a person to decide.
+    """Proposal of the policy that waits for a person to decide.
 
     Attributes:
         device: Id of the guard or robot that it would send.
@@ -187,7 +187,7 @@ class Proposed:
 
 @dataclass(frozen=True, slots=True)
 class EventStatus:
-    """How an event stands: published by the DVA when that changes, and told if asked.
+    """State of an event: published by the DVA on every change, and returned on request.
 
     Attributes:
         event_id: The DVA's number of the event.
@@ -240,7 +240,7 @@ class EventList:
 
 @dataclass(frozen=True, slots=True)
 class DispatchStatus:
-    """How orders are given: published by the DVA when that changes, and told if asked.
+    """Dispatch mode: published by the DVA on every change, and returned on request.
 
     Attributes:
         dispatch_mode: `automatic` or `ask_first`.
@@ -274,7 +274,7 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """What the policy would do about an event now, and with whom.
+    """What the policy would do about an event now.
 
     Attributes:
         event_id: The event.

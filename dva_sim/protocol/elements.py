@@ -35,7 +35,7 @@ class _Value(NamedTuple):
 
 
 class Form:
-    """How messages of a class are written and read.
+    """Serialisation of the messages of a class.
 
     Args:
         kind: Class of the messages.

@@ -1,4 +1,4 @@
-"""What goes wrong between bytes and messages."""
+"""Errors in decoding bytes into messages."""
 
 from __future__ import annotations
 

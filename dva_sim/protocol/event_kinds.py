@@ -1,4 +1,4 @@
-"""What messages call what happens; whatever else happens is reported as one of these."""
+"""Kinds of events in messages; any other event is reported as one of these."""
 
 from typing import Final, Literal, get_args
 

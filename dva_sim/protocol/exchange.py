@@ -1,4 +1,4 @@
-"""What both ends of an exchange keep: growing MessageIDs, and replies already given."""
+"""State of both ends of an exchange: growing MessageIDs, and replies already given."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ A_DAY = 345_600  # sessions: the DVA hands out at most four a second
 
 
 def is_absurd(session: int, known: int) -> bool:
-    """Whether no honest DVA can have come to a session by now.
+    """Return True for a session number that no honest DVA can have reached by now.
 
     It is more than a day ahead of the highest that is known, or leaves no room for another day.
     Whoever knows none yet (0) cannot tell the former.
@@ -52,7 +52,7 @@ class Outbox:
         return make_message(destination, self._last_id, self.source, stamp, held, body)
 
     def encode(self, destination: str, body: Body, now: float, session: int = 0) -> bytes:
-        """The same as bytes."""
+        """Serialise a new message."""
         return encode(self.message(destination, body, now, session))
 
 
@@ -60,7 +60,7 @@ Key = tuple[str | None, bytes]
 
 
 def key_of(sender: str | None, request: bytes) -> Key:
-    """What a request is known by: whose key it came with, if keys are used, and its bytes."""
+    """Return the identity of a request: the key it came with, if keys are used, and its bytes."""
     return sender, blake2b(request, digest_size=16).digest()
 
 
@@ -115,7 +115,7 @@ class ReplyCache:
 
 
 class Hearing(Enum):
-    """How a peer is heard: answered, read but not answered, or not even read."""
+    """Treatment of a peer: answered, read but not answered, or not even read."""
 
     ANSWERED = "answered"
     READ = "read"
@@ -126,7 +126,7 @@ ANSWERED, READ, IGNORED = Hearing  # found faster than as members of their class
 
 
 class Nuisances:
-    """Who sends what is refused as it arrives, and is listened to less and less; pure.
+    """Peers whose messages are refused on arrival, and who are increasingly ignored; pure.
 
     Each connection has a count of its bad messages that goes down with time, and is halved by
     each good one. Above `UNANSWERED` nobody tells it any more what was wrong; above `UNREAD` it is
@@ -144,7 +144,7 @@ class Nuisances:
         self._counts: OrderedDict[Hashable, tuple[float, float]] = OrderedDict()
 
     def hearing(self, peer: Hashable, now: float) -> Hearing:
-        """How a peer is heard now [s]."""
+        """Return how messages of a peer are treated now [s]."""
         if not self._counts:
             return ANSWERED
         count = self._count(peer, now)

@@ -1,4 +1,4 @@
-"""What `protocol/dva.xsd` allows, as data: the one place of every limit and every word on the wire.
+"""Limits of `protocol/dva.xsd` as data: every limit and every word on the wire.
 
 Writer, reader and checker all derive from it what they refuse.
 """
@@ -74,7 +74,7 @@ def pattern(name: str) -> str:
 
 
 def length(name: str) -> tuple[int, int]:
-    """Of a type's text: the least and the most characters."""
+    """Return the least and the greatest length of a type's text [characters]."""
     known = facets(name)
     return int(known.get("minLength", ["0"])[0]), int(known["maxLength"][0])
 
@@ -113,10 +113,10 @@ def _named() -> dict[str, etree._Element]:
 
 
 def is_simple(element: etree._Element) -> bool:
-    """Whether an element holds a value and no elements."""
+    """Return True if an element holds a value rather than elements."""
     return element.get("type") in _restrictions()
 
 
 def occurs(element: etree._Element) -> tuple[int, int]:
-    """How often an element may stand at its place: at least and at most."""
+    """Return how often an element may occur at its place: at least and at most."""
     return int(element.get("minOccurs", "1")), int(element.get("maxOccurs", "1"))

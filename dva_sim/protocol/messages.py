@@ -122,7 +122,7 @@ class StopTeleOp:
 
 @dataclass(frozen=True, slots=True)
 class RobotStatus:
-    """What a robot publishes about itself.
+    """Status that a robot publishes about itself.
 
     Attributes:
         mode: `Idle`, `Mission` or `Teleoperation`.
@@ -143,7 +143,7 @@ class RobotStatus:
 
 @dataclass(frozen=True, slots=True)
 class RobotHolder:
-    """Who may act on a robot now, published by it.
+    """Device that may control a robot now; published by the robot.
 
     Attributes:
         holder: Id of the device that holds it; None: nobody.
@@ -160,7 +160,7 @@ class RobotHolder:
 
 @dataclass(frozen=True, slots=True)
 class PersonStatus:
-    """What a guard's terminal publishes: what the guard is doing, in words, and where."""
+    """Activity and position of a guard; published by the guard's terminal."""
 
     activity: str
     position: Position
@@ -175,7 +175,7 @@ class GetSensorInfo:
 
 @dataclass(frozen=True, slots=True)
 class SensorValue:
-    """What a sensor shows, published to one subscriber.
+    """Reading of a sensor, published to one subscriber.
 
     Attributes:
         sensor: Its name, up to 64 characters.
@@ -325,7 +325,7 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class OrderProgress:
-    """How an order stands.
+    """State of an order.
 
     Attributes:
         event_id: The event of the order.
@@ -357,7 +357,7 @@ class TaskAnnouncement:
 
 @dataclass(frozen=True, slots=True)
 class TaskBid:
-    """What a device offers: to arrive at the event so long after this was sent [s]."""
+    """Bid of a device: to arrive at the event this long after the bid was sent [s]."""
 
     event_id: int
     arrival_in: float
@@ -389,7 +389,7 @@ class Device:
 
 @dataclass(frozen=True, slots=True)
 class DeviceList:
-    """Who is registered; at most 64 devices, and no more than fit into one message."""
+    """Registered devices; at most 64, and no more than fit into one message."""
 
     devices: tuple[Device, ...]
 
@@ -404,7 +404,7 @@ class Sensor:
 
 @dataclass(frozen=True, slots=True)
 class SensorInfo:
-    """What a robot can show.
+    """Sensor that a robot offers.
 
     Attributes:
         camera_url: Where its camera is found; printable ASCII, up to 256 characters.
@@ -426,14 +426,14 @@ class DeviceSensors:
 
 @dataclass(frozen=True, slots=True)
 class SensorList:
-    """What the devices can show; at most 64 of them, and no more than fit into one message."""
+    """Sensors that the devices offer; at most 64, and no more than fit into one message."""
 
     devices: tuple[DeviceSensors, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Holder:
-    """Who holds what was asked for: its id, its label, and for how long it has [s], up to 1e6."""
+    """Current holder: its id, its label, and for how long it has held the robot [s], up to 1e6."""
 
     holder: str
     label: str
@@ -449,7 +449,7 @@ class SessionFloor:
 
 @dataclass(frozen=True, slots=True)
 class Permission:
-    """What was granted: act on `device` with `session` in the header.
+    """Permission granted: act on `device` with `session` in the header.
 
     Attributes:
         device: Id of the robot.

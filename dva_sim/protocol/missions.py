@@ -1,4 +1,4 @@
-"""What a robot is told to do by itself, and how that stands; found in `messages`, too."""
+"""Missions: what a robot is ordered to do by itself, and its progress; also in `messages`."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class GetMissionStatus:
 
 @dataclass(frozen=True, slots=True)
 class MissionStatus:
-    """How the newest mission of a robot stands: published when it changes, and told if asked.
+    """State of a robot's newest mission: published on every change, and returned on request.
 
     Attributes:
         mission_id: MessageID of the message that began it; 0 if there was none.

@@ -1,4 +1,4 @@
-"""What is wrong with a message, and where: the codec judges, and only what it refuses is searched.
+"""Diagnosis of invalid messages: what is wrong, and where; only refused messages are searched.
 
 What the value of an element should look like is said in words, read from the schema itself.
 """
@@ -22,7 +22,7 @@ from dva_sim.protocol.schema import MAX_BYTES
 
 @cache
 def form_of(element: str) -> str | None:
-    """What an element should hold; None if it holds elements, or different things by place."""
+    """Return what an element should hold; None if it holds elements, or varies by place."""
     types = types_of(element)
     if len(types) != 1:
         return None
@@ -72,7 +72,7 @@ _MARKUP: Final = (
 
 @dataclass
 class _Place:
-    """Where an element begins, and the first text directly inside it: offsets in bytes."""
+    """Offsets of an element, and of the first text directly inside it [bytes]."""
 
     start: int
     text: int | None = None
@@ -89,7 +89,7 @@ def check_message(data: bytes) -> list[Problem]:
 
 
 def _by_sight(data: bytes) -> list[Problem]:
-    """What no schema can say: size, encoding, declaration, markup; the first kind that occurs."""
+    """Find what no schema can express: size, encoding, declaration, markup; the first only."""
     if not data.strip():
         return [Problem(1, 1, "is empty; should hold one <msg>")]
     if len(data) > MAX_BYTES:
@@ -102,7 +102,7 @@ def _by_sight(data: bytes) -> list[Problem]:
 
 
 def _declaration(data: bytes) -> tuple[Problem | None, int]:
-    """Where the declaration is broken, if it is, and where it ends."""
+    """Return the problem of the declaration, if any, and where the declaration ends."""
     end = 0
     if not data.startswith(b"<?xml"):
         return None, end
@@ -135,7 +135,7 @@ def _other_markup(data: bytes, start: int) -> Iterator[Problem]:
 
 
 def _by_grammar(data: bytes) -> list[Problem]:
-    """Where the text ceases to be XML: libxml2's reason, at expat's more exact place."""
+    """Find where the text stops being XML: libxml2's reason, at expat's more exact position."""
     parser = _plain_parser()
     try:
         etree.fromstring(data, parser)
@@ -175,7 +175,7 @@ def _element_at(tree: etree._ElementTree, path: str | None) -> etree._Element:
 
 
 def _explain(element: etree._Element, entry: Any) -> str:
-    """What libxml2 found, and what would be right."""
+    """Translate a finding of libxml2, and say what would be right."""
     name, kind = str(element.tag), entry.type_name
     _, _, expected = entry.message.rstrip(". ").partition(" Expected is ")
     right = expected.removeprefix("one of").strip("() ").replace(", ", " or ")

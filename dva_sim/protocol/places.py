@@ -1,4 +1,4 @@
-"""Where something is, as messages say it."""
+"""Positions in messages."""
 
 from __future__ import annotations
 

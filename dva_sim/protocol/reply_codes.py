@@ -1,4 +1,4 @@
-"""What a reply says in one number: `OK`, or why not."""
+"""Reply codes: `OK`, or why a request was refused."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ _FORMS: Final = {
 
 
 def bad(reason: str) -> ProtocolError:
-    """What to raise about a value that no message can hold."""
+    """Return the error to raise about a value that no message can hold."""
     return ProtocolError(m.BAD_MESSAGE, reason)
 
 

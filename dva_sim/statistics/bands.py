@@ -105,7 +105,7 @@ def reach(ratio: Floats, count: Floats, level: float) -> tuple[Floats, Floats]:
 
 
 def chance_above(means: Floats) -> float:
-    """How likely persons' means `(n,)` are so far above zero if their true mean is zero.
+    """Return the probability that persons' means `(n,)` lie this far above a true mean of zero.
 
     The one-sided p-value that belongs to `reach`: it is below 0.025 where the interval of 95 %
     lies above zero. Nan with fewer than two persons.
@@ -125,7 +125,7 @@ def chance_above(means: Floats) -> float:
 
 
 def place(n: int, level: float) -> int:
-    """Of `n` ascending values, the place of the first that such a share does not exceed."""
+    """Return the index, among `n` ascending values, of the quantile at a level."""
     return max(math.ceil(n * level - _ROUNDING * n) - 1, 0)
 
 

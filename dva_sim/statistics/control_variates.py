@@ -47,7 +47,7 @@ def adjusted(means: ArrayLike, covariates: ArrayLike) -> Floats:
 
 
 def _pseudo_values(values: Floats, covariates: Floats) -> Floats:
-    """Of the constant of a regression on covariates `(n, p)`; as given where it has no solution.
+    """Jackknife the constant of a regression on covariates `(n, p)`; values as given if singular.
 
     Leaving a person out changes the constant by what its residual weighs in it.
     """

@@ -1,4 +1,4 @@
-"""How large a difference is beside how much persons differ, and what pairing did to its variance.
+"""Effect sizes, and the reduction of variance by pairing.
 
 Sizes without a unit; how alike two treatments' random numbers are; how much of the variance lies
 between persons. All but the last rest on statistics of persons' pairs of means, and on how far they
@@ -87,14 +87,14 @@ def _times(found: Interval, factor: float) -> Interval:
 
 
 def _hedges(n: int) -> float:
-    """What a standardised mean of `n` persons is too large by, inverted."""
+    """Return Hedges' correction of a standardised mean of `n` persons."""
     half = (n - 1) / 2
     return math.exp(math.lgamma(half) - math.lgamma(half - 0.5)) / math.sqrt(half)
 
 
 @dataclass(frozen=True)
 class VarianceReduction:
-    """What pairing did to the variance of a difference of two means.
+    """Change in the variance of a difference of two means due to pairing.
 
     Attributes:
         correlation: Pearson's, of the persons' means under the two treatments.
@@ -107,7 +107,7 @@ class VarianceReduction:
 
     @property
     def is_lower(self) -> bool:
-        """Whether the variance is lower beyond doubt; False where nothing can be told."""
+        """True if the variance is significantly lower; False where nothing can be told."""
         return self.ratio.high < 1
 
 
@@ -184,7 +184,7 @@ class Components:
 
     @property
     def share(self) -> float:
-        """How much of the variance of a single run lies between persons."""
+        """Share of the variance of a single run that lies between persons."""
         total = self.between + self.within
         return self.between / total if total > 0 else math.nan
 
@@ -217,7 +217,7 @@ def components(values: ArrayLike) -> Components:
 
 
 class Pairs(NamedTuple):
-    """What is known of the pairs of means of some persons, each entry of the same shape.
+    """Sums over the pairs of means of some persons, each entry of the same shape.
 
     Attributes:
         persons: How many.
@@ -298,7 +298,7 @@ def _interval(statistic: Statistic, whole: _Drawn, drawn: _Drawn, n: int) -> Int
 
 
 def _rows(first: Floats, second: Floats) -> Floats:
-    """What each person adds to the sums `(6, n)`, centred so that squares keep their digits."""
+    """Return each person's contribution to the sums `(6, n)`, centred to keep precision."""
     one, two, off = (x - x.mean() for x in (first, second, first - second))
     return np.stack([np.ones(len(first)), one, two, one**2, two**2, off**2])
 

@@ -1,4 +1,4 @@
-"""What happened first: competing risks, at every moment and by a fixed time.
+"""Competing risks: cumulative incidence of each cause over time and by a fixed time.
 
 An event that was escalated will not be confirmed any more. Who takes it for one that "was not
 watched long enough" answers another question: how soon it would have been confirmed if nobody
@@ -69,13 +69,13 @@ class Incidence:
         return float(limit - (shares * np.diff(edges)).sum())
 
     def quantile(self, q: float, cause: int = 1) -> float:
-        """When a share `q` of all events had met a cause [s]; nan if that never happens."""
+        """Return when a share `q` of all events had met a cause [s]; nan if that never happens."""
         reached = np.flatnonzero(self.shares[cause - 1] >= q - 1e-12)
         return float(self.times[reached[0]]) if len(reached) else float("nan")
 
 
 def first_of(causes: Sequence[ArrayLike], watched: ArrayLike) -> tuple[Floats, Ints]:
-    """What each event met first, and when.
+    """Return the first cause that each event met, and when.
 
     Args:
         causes: For each cause the time at which each event met it [s]; nan or infinite: never.
@@ -118,7 +118,7 @@ def incidence(time: ArrayLike, cause: ArrayLike, causes: int) -> Incidence:
 
 @dataclass(frozen=True)
 class IncidenceAtHorizon:
-    """How often each cause came first by a horizon; the shares sum to 1.
+    """Share of each cause that came first by a horizon; the shares sum to 1.
 
     Attributes:
         causes: Share of each cause, in the order of the causes' names.
@@ -172,7 +172,7 @@ def cumulative_incidence(
 
 
 def _shares(times: Floats, causes: Ints, count: int, horizon: float) -> list[float]:
-    """Of each cause by the horizon, and of none: together exactly 1."""
+    """Return the share of each cause by the horizon, and of none: together exactly 1."""
     curve = incidence(times, causes, count)
     met = [float(curve.at(horizon, cause).round(12)) for cause in range(1, count + 1)]
     return [*met, round(1.0 - sum(met), 12)]

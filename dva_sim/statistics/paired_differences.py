@@ -1,4 +1,4 @@
-"""What differs between two treatments of the same persons: how much, and beyond which doubt.
+"""Paired differences between two treatments of the same persons, with intervals.
 
 Means over persons with their interval; whether a difference lies beyond a bound or within a margin;
 whether there is any, by the test that assumes nothing but that labels could be swapped. Of several

@@ -76,7 +76,7 @@ def students_t(level: float, n: int) -> float:
 
 @functools.lru_cache(maxsize=8)
 def draws(persons: int, resamples: int, seed: int = 1) -> Floats:
-    """How often each person is drawn when as many are drawn anew, `(resamples, persons)`."""
+    """Return how often each resample draws each person, `(resamples, persons)`."""
     rng = np.random.Generator(np.random.PCG64(seed))
     chances = np.full(persons, 1 / persons)
     weights = rng.multinomial(persons, chances, size=resamples).astype(float)

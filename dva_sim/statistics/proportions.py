@@ -1,4 +1,4 @@
-"""How often something happened, and quantiles of runs: both by the runs they are worth."""
+"""Proportions and quantiles of clustered runs, by their effective sample size."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dva_sim.statistics.persons import LEVEL, Floats, Interval, students_t
 
 
 def share_interval(flags: ArrayLike, person: ArrayLike) -> Interval:
-    """How often something happened, with Korn and Graubard's interval.
+    """Return the share of flags that are set, with Korn and Graubard's interval.
 
     Runs of one person are worth less than as many runs of different persons: the number of
     runs is divided by how much the variance between persons exceeds that of independent
@@ -88,7 +88,7 @@ def _present(values: ArrayLike, person: ArrayLike) -> tuple[Floats, NDArray[np.i
 
 
 def _variance(flags: Floats, code: NDArray[np.intp]) -> float:
-    """Of the share of all runs, if persons were drawn anew; nan of one person."""
+    """Estimate the variance of the share of all runs over resampled persons; nan for one person."""
     surplus = np.bincount(code, weights=flags - flags.mean())
     persons = len(surplus)
     if persons < 2:
@@ -106,7 +106,7 @@ def _runs_worth(share: float, variance: float, persons: int, runs: int) -> float
 
 
 def _is_compatible(share: Floats, n: float, q: float) -> NDArray[np.bool_]:
-    """Whether `q` lies within the interval of each share `(k,)` of `n` independent runs."""
+    """Return True where `q` lies within the interval of a share `(k,)` of `n` independent runs."""
     from scipy import special
 
     beyond, seen = (1 - LEVEL) / 2, share * n

@@ -1,4 +1,4 @@
-"""What each factor does on average, and where one changes what another does."""
+"""Main effects of factors, and their two-way interactions."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class Effect:
 
     @property
     def is_interaction(self) -> bool:
-        """Whether it is of two factors."""
+        """True for an interaction of two factors."""
         return len(self.factors) == 2
 
     @property
     def is_found(self) -> bool:
-        """Whether it can be told from zero; False where nothing can be told."""
+        """True if the effect differs significantly from zero; False where nothing can be told."""
         return self.interval.low > 0 or self.interval.high < 0
 
 
