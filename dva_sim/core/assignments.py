@@ -1,4 +1,4 @@
-"""Who is at what, and the rules that hold whatever a policy advises.
+"""Assignments of devices to events, and the rules that hold whatever a policy advises.
 
 A guard or a robot is at one event, an operator at as many as it has robots.
 """
@@ -16,7 +16,7 @@ from dva_sim.protocol.messages import Position
 
 @dataclass
 class Assignments:
-    """What each device works on, also while it still winds up a closed event.
+    """Event that each device works on, also while it still finishes a closed one.
 
     How many events a device may be at is for those who give orders; here none is lost.
     """
@@ -37,7 +37,7 @@ class Assignments:
         return True
 
     def is_at(self, device: str, event: Event) -> bool:
-        """Whether a device is at just this event."""
+        """Return True if a device is at exactly this event."""
         return self._events.get(device, {}).get(event.number) is event
 
     def find(self, device: str, number: int) -> Event | None:
@@ -68,7 +68,7 @@ class Assignments:
 
 @dataclass(frozen=True, kw_only=True)
 class Rules:
-    """What the DVA insists on.
+    """Rules that the DVA enforces.
 
     Attributes:
         escalate_after: An event that has waited so long for somebody is escalated [s]. 0: at
@@ -108,7 +108,7 @@ SET_OUT, MOVE = "set out", "move"
 
 
 class Promise(NamedTuple):
-    """What somebody who has taken an order up owes now; `at` is where it is, if that is known."""
+    """Next step that a device owes after accepting an order; `at` is its position, if known."""
 
     device: str
     event: Event
@@ -118,7 +118,7 @@ class Promise(NamedTuple):
 
 @dataclass
 class Promises:
-    """Whether who has said OK to an order gets on with it: sets out, and then moves.
+    """Deadlines of devices that have accepted an order: to set out, and then to keep moving.
 
     What counts is what the DVA hears: `departed`, and positions as they are published. Time runs
     from when something was first owed, or from the last move.
@@ -137,7 +137,7 @@ class Promises:
         return [owed for owed, since in self._owed.values() if now >= self._ends(owed, since)]
 
     def next_deadline(self) -> float:
-        """When something will have been owed for too long [s]."""
+        """Return when the next owed step is overdue [s]."""
         return min((self._ends(*owed) for owed in self._owed.values()), default=math.inf)
 
     def _ends(self, owed: Promise, since: float) -> float:

@@ -75,7 +75,7 @@ class Auctions:
                 del self.running[number]
 
     def stage(self, event: int) -> Literal["open", "over"] | None:
-        """Whether a task is on auction."""
+        """Return the stage of a task's auction; None if it is not auctioned."""
         auction = self.running.get(event)
         if auction is None:
             return None
@@ -99,5 +99,5 @@ class Auctions:
         return table
 
     def next_deadline(self) -> float:
-        """When the time of an auction is up [s]."""
+        """Return when the next auction closes [s]."""
         return min((a.until for a in self.running.values() if a.asked), default=math.inf)

@@ -1,4 +1,4 @@
-"""What was decided, by whom, why, and what came of it: the facts that an audit log is made of.
+"""Decisions with author, reason and outcome: the facts of an audit log.
 
 A fact is a value: whoever keeps facts needs nothing else of the DVA. The DVA hands each out once
 (`AuditTrail.take`), and decides nothing by them.
@@ -62,12 +62,12 @@ class Fact:
 
     @property
     def overrides(self) -> bool:
-        """Whether a person has sent somebody else than the policy would have sent."""
+        """True if a person sent somebody else than the policy would have sent."""
         done = self.action == "assign" and self.code == m.OK and self.role is not None
         return done and self.device != self.advised
 
     def row(self) -> dict[str, Any]:
-        """What it holds, by names, in plain numbers and words that JSON can hold."""
+        """Return the fact by names, as plain numbers and words that JSON can hold."""
         return asdict(self)
 
     @classmethod
@@ -92,7 +92,7 @@ class Fact:
         )
 
     def record(self) -> m.AuditRecord:
-        """The same as a message, as far as one can hold it."""
+        """Return the fact as a message, as far as a message can hold it."""
         return m.AuditRecord(
             author=self.author,
             label=self.label[:64],
@@ -141,7 +141,7 @@ class AuditTrail:
         self._facts.append(fact)
 
     def take(self) -> list[Fact]:
-        """What was decided since this was last asked."""
+        """Return the decisions since the last call."""
         facts = list(self._facts)
         self._facts.clear()
         return facts

@@ -1,4 +1,4 @@
-"""Who could be sent to an event, when each would be there, and why not."""
+"""Candidates for an event: when each would arrive, and why it may not be sent."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CANDIDATE_BYTES = 200  # of one, without what is written for people [B]
 
 
 def proposal(dispatcher: Dispatcher, event: Event, now: float) -> m.Proposal:
-    """What the policy would do about an event, with its reasons."""
+    """Return the policy's proposal for an event, with its reasons."""
     advised = dispatcher.advised(event, now)
     everybody = sorted(_everybody(dispatcher, event, now), key=_earliest_first)
     question = dispatcher.questions.of(event.number)
@@ -44,7 +44,7 @@ def _earliest_first(who: m.Candidate) -> tuple[bool, float, str]:
 
 
 def _reason(event: Event, advised: Advised | None, everybody: list[m.Candidate]) -> str:
-    """Why so: what can be told of a policy by what it advises."""
+    """Explain the advice, as far as advice alone can tell."""
     if not event.open:
         return f"it is over: {event.state}"
     free = [c for c in everybody if c.reason == FREE and c.arrival_in is not None]
@@ -75,7 +75,7 @@ def _everybody(dispatcher: Dispatcher, event: Event, now: float) -> Iterator[m.C
 
 
 def _ways(dispatcher: Dispatcher, entries: list[DeviceEntry], event: Event) -> list[float]:
-    """When each would be there [s from now]; infinite where that is not known, or never."""
+    """Return when each device would arrive [s from now]; infinite where unknown, or never."""
     engaged = dispatcher.orders.engaged
     known = {
         e.device.id_tag: Start(

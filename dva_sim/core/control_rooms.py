@@ -1,4 +1,4 @@
-"""What people at control rooms ask and decide: allowed by their role, done once, and noted.
+"""Requests and decisions of control rooms: allowed by role, carried out once, and recorded.
 
 People decide; the rules hold all the same: an event is in one state, has one responder and loses
 no time of its own, and nobody acts on a robot without its permission. The policy only advises.
@@ -46,7 +46,7 @@ Decision = m.Acknowledge | m.Assign | m.TakeOff | m.FalseAlarm | m.Escalate | m.
 
 @dataclass(frozen=True, slots=True)
 class RoomAnswer:
-    """What is answered, and what follows; a code other than OK means that nothing was done."""
+    """Answer and its consequences; a code other than OK means that nothing was done."""
 
     code: int = m.OK
     text: str = ""
@@ -111,7 +111,7 @@ class ControlRooms:
         return self._about_event(body, sender, action, now)
 
     def may(self, sender: m.Device, need: ControlRoomRole, action: str) -> str | None:
-        """Why a control room may not do something, or None."""
+        """Return why a control room may not do something, or None."""
         role = self._roles.of(sender.id_tag)
         if role.includes(need):
             return None
@@ -119,14 +119,14 @@ class ControlRooms:
         return f"{sender.label} has the role {role}; to {done} needs {need}"
 
     def status(self, now: float, asker: m.Device | None = None) -> m.DispatchStatus:
-        """How orders are given; and the role of who asks."""
+        """Return the dispatch mode, and the role of the asker."""
         questions = self._dispatcher.questions
         role = None if asker is None else self._roles.of(asker.id_tag).value
         mode = "ask_first" if questions.asks else "automatic"
         return m.DispatchStatus(mode, questions.within, by_whom(questions.switched, now), role)
 
     def event_status(self, event: Event, now: float) -> m.EventStatus:
-        """How an event stands now."""
+        """Return the present state of an event."""
         return status_of(event, self._dispatcher.questions.of(event.number), now)
 
     def _list(self, above: int, now: float) -> m.EventList:
@@ -283,7 +283,7 @@ class ControlRooms:
             raise _Refused(m.BUSY, f"{who} has it; state Decisions to send another instead")
 
     def _driver(self, body: m.Assign, robot: m.Device, sender: m.Device, now: float) -> str:
-        """Who drives a robot there: whom the sender names, or who has the least to do."""
+        """Choose the driver of a robot: the one the sender names, or the least busy one."""
         if body.operator is None:
             hands = self._dispatcher.situations.operators(now)
             if not hands:
@@ -330,7 +330,7 @@ class ControlRooms:
         return [*sends, order or orders.act(event, device, now)]
 
     def _way(self, entry: DeviceEntry, event: Event) -> float | None:
-        """When somebody would be there, as expected [s from now]."""
+        """Return when a device is expected to arrive [s from now]."""
         if entry.position is None:
             return None
         kind = "guard" if entry.device.device_type == GUARD else "robot"

@@ -41,7 +41,7 @@ DECISIONS = 4  # in a row, where one makes the next necessary
 
 @dataclass(frozen=True, slots=True)
 class Advised:
-    """What the policy would do about an event: whom it would send, to do what.
+    """Advice of the policy about an event: whom to send, to do what.
 
     Attributes:
         device: Id of the guard or robot.
@@ -108,11 +108,11 @@ class Dispatcher:
         return sends
 
     def next_deadline(self) -> float:
-        """When something has waited too long for an answer [s]."""
+        """Return when the next wait for an answer is too long [s]."""
         return min(self.auctions.next_deadline(), self.questions.next_deadline())
 
     def advised(self, event: Event, now: float) -> Advised | None:
-        """What the policy would do about an event now, or has done; None: nothing."""
+        """Return the policy's advice about an event, or what it has done already; None: nothing."""
         if (question := self.questions.of(event.number)) is not None:
             return Advised(question.device, question.task, max(0.0, question.expected - now))
         view = self.situations.look(now)
@@ -204,7 +204,7 @@ class Dispatcher:
         return [*sends, self.orders.confirm(event, responder, pilot, now, award)]
 
     def _waits_for_a_person(self, choice: Assignment, view: PolicyView, now: float) -> bool:
-        """Whether a person is asked first, and still has time."""
+        """Return True if a person is asked first and still has time."""
         if not self.questions.asks or not self.somebody_decides():
             return False
         event, device = view.events[choice.task], view.team.entries[choice.responder].device
@@ -212,7 +212,7 @@ class Dispatcher:
         return self.questions.ask(event, _task_of(choice, view), device.id_tag, way, now)
 
     def somebody_decides(self) -> bool:
-        """Whether a control room is there whose people may decide."""
+        """Return True if a control room is connected whose people may decide."""
         rooms = self.orders.registry.of_type(CONTROL_ROOM)
         least = ControlRoomRole.DISPATCH
         return any(self.roles.of(room.device.id_tag).includes(least) for room in rooms)
@@ -276,7 +276,7 @@ class Dispatcher:
 
 
 def _task_of(choice: Assignment, view: PolicyView) -> str:
-    """What is to be done, in the words of an order."""
+    """Return the task, in the words of an order."""
     task = view.situation.tasks[choice.task]
     if task.stage == "confirm":
         return "confirm"
@@ -330,7 +330,7 @@ class Patrols:
     def set_out(
         self, registry: Registry, sessions: Sessions, engaged: Assignments, now: float
     ) -> list[Send]:
-        """What to tell the robots that have rested long enough."""
+        """Return the messages to robots that have rested long enough."""
         sends: list[Send] = []
         for entry in self._with_a_beat(registry):
             robot = entry.device.id_tag

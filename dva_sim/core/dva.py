@@ -132,7 +132,7 @@ class Dva:
         return []
 
     def delivered(self, send: Send, now: float, content: object = None) -> list[Send]:
-        """What was sent was answered with OK, and with this."""
+        """Handle the reply OK to a message, with its content."""
         self.sessions.heard(send)
         body, sends = send.body, self._patrols.held(send, self.registry, self.sessions)
         if isinstance(body, m.GetSensorInfo):
@@ -155,7 +155,7 @@ class Dva:
         return self.undelivered(send, now)
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
-        """What was sent did not arrive, or was declined: take it back."""
+        """Handle a message that did not arrive, or was declined: take it back."""
         body, sends = send.body, list[Send]()
         if isinstance(body, m.Order | m.TaskAward):
             sends = self.orders.not_taken_up(send, now)
@@ -175,7 +175,7 @@ class Dva:
         return self._and_revocations(sends)
 
     def tick(self, now: float) -> list[Send]:
-        """What time brings: silent devices, deadlines, and another look at who is free."""
+        """Handle the passing of time: silent devices, deadlines, newly free responders."""
         sends: list[Send] = []
         for entry in self.registry.fallen_silent(now):
             sends += self._gone(entry.device.id_tag, now)
@@ -191,7 +191,7 @@ class Dva:
         return self._and_revocations(sends)
 
     def next_deadline(self) -> float:
-        """When `tick` has something to do at the latest, if nothing else happens [s].
+        """Return the latest time at which `tick` has work, if nothing else happens [s].
 
         Forgetting can wait.
         """
@@ -205,7 +205,7 @@ class Dva:
         )
 
     def go_on(self) -> list[Send]:
-        """What to say again after what an earlier life knew was recalled."""
+        """Return the messages to repeat after a restart."""
         return self._and_revocations(self.orders.again())
 
     def dismiss(self, device: str, now: float) -> list[Send]:
@@ -255,14 +255,14 @@ class Dva:
     def _dispatch(
         self, message: m.Message, entry: DeviceEntry, body: ControlRoomBody, now: float
     ) -> Reaction:
-        """What a control room asks, or decides."""
+        """Handle a request or decision of a control room."""
         answer = self.control_rooms.answer(body, entry.device, now)
         self.refused += answer.code != m.OK
         text = answer.text[:256]
         return m.Reply(message.message_id, answer.code, text, answer.content), list(answer.sends)
 
     def _and_revocations(self, sends: list[Send]) -> list[Send]:
-        """What to send, after the word that sessions are over."""
+        """Return the messages, preceded by revocations of ended sessions."""
         return self.sessions.to_tell() + sends
 
     # --- who is there ------------------------------------------------------------------
@@ -396,13 +396,13 @@ class Dva:
         return m.Reply(message.message_id, m.BUSY, text, told), sends
 
     def _may_force(self, asker: m.Device) -> bool:
-        """Whether a device may take a robot from its holder."""
+        """Return True if a device may take a robot from its holder."""
         if asker.device_type == CONTROL_ROOM:
             return self.roles.of(asker.id_tag).includes(ControlRoomRole.SUPERVISE)
         return asker.id_tag in self.handovers.supervisors
 
     def _sensors(self, message: m.Message, body: m.GetSensorInfo) -> Reaction:
-        """What a robot can show, or all of them; they are asked when somebody first asks."""
+        """List the sensors of one or all robots; the robots are asked on the first request."""
         robot = self.registry.entries.get(body.device or "")
         if body.device and (robot is None or robot.device.device_type != ROBOT or robot.silent):
             return self._refuse(message, m.UNKNOWN_DEVICE, f"no robot {body.device}")
@@ -498,7 +498,7 @@ class Dva:
     def _felt(
         self, message: m.Message, body: m.SensorValue, place: m.Position, now: float
     ) -> list[Send]:
-        """What a robot's sensor shows may be an event, or speak for one that is known."""
+        """Handle a sensor value of a robot: it may be a new event, or support a known one."""
         alarm, robot = self.sensing.crossed(message.source, body), message.source
         if alarm is None:
             return []
@@ -521,7 +521,7 @@ class Dva:
     def _told_better(
         self, source: str, body: m.EventReport, now: float
     ) -> tuple[Event | None, list[Send]]:
-        """Where it is that a robot has felt: who reports that has seen the place.
+        """Correct the position of an event that only sensors felt, by a report of somebody on site.
 
         The event is moved there, or ends, if somebody is on the way to where it was felt.
         """
@@ -539,7 +539,7 @@ class Dva:
         return None, self.orders.supersede(event, now)
 
     def _withdrawal(self, message: m.Message, body: m.EventReport, now: float) -> Reaction:
-        """What all who reported it have taken back, before anybody was sent, is over."""
+        """Close an event that all its reporters have withdrawn before anybody was sent."""
         source, sends = message.source, list[Send]()
         for event in self.book.reported_by(source, body.kind, body.position):
             self.book.take_back(event, source)

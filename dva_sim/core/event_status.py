@@ -1,4 +1,4 @@
-"""What control rooms are told of events."""
+"""Status of events as control rooms see it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BEGINS = {State.ASSIGNED: "assigned", State.ON_SCENE: "arrived", State.CONFIRME
 
 
 def state_since(event: Event) -> float:
-    """When an event came into its state [s]."""
+    """Return when an event entered its state [s]."""
     times = event.times
     detected = times.get("detected", 0.0)
     if not event.open:
@@ -28,7 +28,7 @@ def state_since(event: Event) -> float:
 
 
 def status_of(event: Event, question: Question | None, now: float) -> m.EventStatus:
-    """How an event stands."""
+    """Return the status of an event."""
     handling, times = event.handling, event.times
     looks = event.state in (State.ASSIGNED, State.ON_SCENE)
     acts = event.open and event.actor is not None
@@ -68,7 +68,7 @@ def event_list(events: Iterable[Event], questions: Questions, now: float) -> m.E
 
 
 def by_whom(choice: Choice | None, now: float) -> m.ByWhom | None:
-    """Who did something, if anybody did."""
+    """Return the author of a choice; None if nobody chose."""
     if choice is None:
         return None
     return m.ByWhom(choice.author, choice.label[:64], _ago(choice.time, now))

@@ -14,7 +14,7 @@ from dva_sim.protocol.messages import Position
 
 
 class State(StrEnum):
-    """Where an event stands."""
+    """State of an event."""
 
     PENDING = "pending"
     ASSIGNED = "assigned"
@@ -95,24 +95,24 @@ class Event:
 
     @property
     def open(self) -> bool:
-        """Whether something can still happen to it."""
+        """True if the event is not closed."""
         if self.state is State.CONFIRMED:
             return self.needs_containment
         return self.state not in FINAL
 
     @property
     def confidence(self) -> float:
-        """That there is something at all: the sources are taken to err independently."""
+        """Probability that the event is real; the sources are assumed to err independently."""
         return 1.0 - math.prod(1.0 - c for c in self.sources.values())
 
     @property
     def holder(self) -> str | None:
-        """Who has the order to confirm it: the operator of a robot, or a guard."""
+        """Device ordered to confirm it: the operator of a robot, or a guard."""
         return self.operator or self.responder
 
     @property
     def waits_for(self) -> Literal["confirm", "contain"] | None:
-        """What somebody should do who is not there yet; None if nobody is missing."""
+        """Task for which somebody is missing; None if nobody is."""
         if self.state is State.PENDING:
             return "confirm"
         lacks_actor = self.state is State.CONFIRMED and self.open and self.actor is None
@@ -145,7 +145,7 @@ class EventBook:
 
     @property
     def full(self) -> bool:
-        """Whether no further event fits."""
+        """True if no further event fits."""
         return len(self.open) >= MOST_OPEN
 
     def near(self, kind: str, position: Position) -> Event | None:

@@ -1,4 +1,4 @@
-"""How an event is handled: what was decided on it, by whom, and what people have said of it."""
+"""Handling of an event: decisions, their authors, and notes of people."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class Choice(NamedTuple):
-    """Who decided what, and when.
+    """Decision, its author, and when it was made.
 
     Attributes:
         author: Id of the device; the DVA's for its policy and its rules.
@@ -26,7 +26,7 @@ class Choice(NamedTuple):
     device: str = ""
 
     def told(self, now: float) -> str:
-        """The same in words, as of now."""
+        """Describe the choice in words, as of now."""
         about = self.device and f" of {self.device}"
         why = self.reason and f": {self.reason}"
         did, ago = self.action.replace("_", " "), now - self.time
@@ -35,7 +35,7 @@ class Choice(NamedTuple):
 
 @dataclass(slots=True)
 class Handling:
-    """What has been decided on one event.
+    """Decisions on one event.
 
     Attributes:
         decisions: How often something was decided: who acts on an older number acts too late.
@@ -61,7 +61,7 @@ class Handling:
         self.last = choice
 
     def is_already(self, author: str, action: str, device: str = "") -> bool:
-        """Whether the last decision was just this, by the same author."""
+        """Return True if the last decision was exactly this, by the same author."""
         last = self.last
         return last is not None and (last.author, last.action, last.device) == (
             author,
@@ -70,7 +70,7 @@ class Handling:
         )
 
     def arrival_in(self, device: str, now: float) -> float | None:
-        """When somebody who was sent would be there, as expected then [s from now]."""
+        """Return when a device that was sent is expected to arrive [s from now]."""
         if device not in self.expected:
             return None
         sent, way = self.expected[device]

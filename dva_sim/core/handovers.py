@@ -24,7 +24,7 @@ LONGEST = 1e6  # no longer time is told [s]
 
 
 class Step(StrEnum):
-    """How a handover stands, in words for who waits for it."""
+    """Stage of a handover, in words for the one who waits for it."""
 
     ASKED = "who has been asked for it"
     DECLINED = "who does not give it up"
@@ -58,13 +58,13 @@ class Handovers:
 
     @property
     def sessions(self) -> Sessions:
-        """Who may act on what."""
+        """Permissions of devices."""
         return self.orders.sessions
 
     # --- who has it --------------------------------------------------------------------
 
     def holder(self, robot: str, asker: str, now: float) -> m.Holder | None:
-        """Who holds a robot, serves an order with it, or waits for it, but for the asker."""
+        """Return who else holds a robot, serves an order with it, or waits for it."""
         known = self.under_way.get(robot)
         if known is not None and robot in self.sessions.reserved and known.asker != asker:
             return self._named(known.asker, 0.0)
@@ -118,7 +118,7 @@ class Handovers:
         return Step.ASKED, [Send(holder.holder, ask)]
 
     def waits(self, robot: str, asker: str) -> str | None:
-        """Why who asks for a robot that is kept for it has to wait, or None."""
+        """Return why the asker has to wait for a robot that is reserved for it, or None."""
         known = self.under_way.get(robot)
         if known is None or known.asker != asker or known.step is not Step.STOPPING:
             return None
@@ -157,7 +157,7 @@ class Handovers:
             known.step, known.until = Step.READY, now + FETCH_WITHIN
 
     def next_deadline(self) -> float:
-        """When a handover has lasted too long [s]."""
+        """Return when the next handover has taken too long [s]."""
         return min((known.until for known in self.under_way.values()), default=math.inf)
 
     def lapse(self, now: float) -> None:

@@ -118,7 +118,7 @@ class Orders:
         return []
 
     def _meant(self, send: Send) -> Event | None:
-        """What an order that was sent is about, if whom it went to still works on that."""
+        """Return the event of an order that was sent, if its addressee still works on it."""
         body = send.body
         return self.engaged.find(send.to, body.event_id) if isinstance(body, _ORDERS) else None
 
@@ -145,7 +145,7 @@ class Orders:
     # --- what those who have them say ---------------------------------------------------
 
     def has_order(self, event: Event, device: str) -> bool:
-        """Whether a device may say how an order stands; a robot leaves that to its operator."""
+        """Return True if a device may report on an order; a robot leaves that to its operator."""
         return self.engaged.is_at(device, event) and device in (event.holder, event.actor)
 
     def departed(self, event: Event, device: str, now: float) -> None:
@@ -191,7 +191,7 @@ class Orders:
             self.registry.locate(self.registry.entries[device], event.position)
 
     def found(self, event: Event, device: str, finding: str, now: float) -> list[Send]:
-        """What somebody who was sent has found, or done."""
+        """Handle the finding or result of a device that was sent."""
         if not event.open:
             return []
         if self.has_order(event, device):
@@ -274,7 +274,7 @@ class Orders:
         return sends
 
     def _overdue(self, now: float) -> list[Promise]:
-        """Who has said OK and then does not set out, or stands on the way."""
+        """Return the devices that accepted an order and do not set out, or stopped on the way."""
         if math.isinf(min(self.rules.depart_within, self.rules.still_within)):
             return []
         late = self._promises.overdue(self._owed(), now)
@@ -283,7 +283,7 @@ class Orders:
         return late
 
     def _owed(self) -> Iterator[Promise]:
-        """What everybody owes now; who has several orders begins with the first.
+        """Yield what every device owes now, for devices with several orders the first one.
 
         And may be at any of them: then a robot may stand until it is its turn.
         """
@@ -311,7 +311,7 @@ class Orders:
         return (MOVE if goes else "") if departed else SET_OUT
 
     def next_deadline(self) -> float:
-        """When something will have waited, or taken, too long [s]."""
+        """Return when the next order waits, or takes, too long [s]."""
         rules, waiting = self.rules, self.book.waiting
         ends = [min(self._pauses, default=math.inf) if waiting else math.inf]
         if math.isfinite(rules.escalate_after):
@@ -324,7 +324,7 @@ class Orders:
         return event.waiting_since + self.rules.escalate_after
 
     def _order_ends(self, device: str, event: Event) -> float:
-        """When who is at it counts as having failed; standing by is no work.
+        """Return when an order at a device counts as failed; standing by never does.
 
         Who has found something says `done` soon; so long after the finding, that was lost.
         """
@@ -351,7 +351,7 @@ class Orders:
         return [Send(event.operator or event.responder, over), *self._reopen(event, now)]
 
     def may_preempt(self, event: Event, now: float) -> bool:
-        """Whether a responder may be called away: not from a scene, nor past the deadline."""
+        """Return True if a responder may be recalled: not from a scene, nor past the deadline."""
         within = now - event.waiting_since < self.rules.escalate_after
         return event.state is State.ASSIGNED and within
 
@@ -374,7 +374,7 @@ class Orders:
         return [*self._called_off(event), *self.expire(event, now)]
 
     def _called_off(self, event: Event) -> list[Send]:
-        """Who looks, or still winds that up, is free; and is told."""
+        """Recall the devices that look at an event, or are still finishing that."""
         holder = event.holder
         self._release(event)
         return [Send(holder, m.OrderProgress(event.number, OVER))] if holder else []
@@ -394,7 +394,7 @@ class Orders:
     # --- decided by people -------------------------------------------------------------
 
     def recall(self, event: Event, device: str, now: float) -> list[Send]:
-        """Who was sent is not to go there any longer; that is no attempt, and no failure."""
+        """Recall a device from an event; this is neither an attempt nor a failure."""
         if device == event.actor:
             over = Send(device, m.OrderProgress(event.number, OVER))
             if event.act_taken_up:
@@ -428,7 +428,7 @@ class Orders:
         self.trail.note(fact)
 
     def label_of(self, device: str) -> str:
-        """What a device calls itself, if it is known."""
+        """Return the label of a device, if it is known."""
         entry = self.registry.entries.get(device)
         return entry.device.label if entry else device
 
@@ -452,7 +452,7 @@ class Orders:
     # --- the small print ---------------------------------------------------------------
 
     def _pause(self, device: str, now: float) -> None:
-        """Who did not take an order up is not asked again for a while."""
+        """Bar a device that did not take up an order from new orders for a while."""
         entry, until = self.registry.entries.get(device), now + self.rules.declined_pause
         if entry is not None:
             entry.free_from = until
@@ -479,7 +479,7 @@ class Orders:
         return self._stand_down(event)
 
     def _goes_on(self, event: Event, taken_up: bool, now: float) -> bool:
-        """Whether an event may wait again for somebody after an order came to nothing.
+        """Return True if an event may wait for another responder after an order failed.
 
         Where nobody took the order up it has waited all the time: so nobody can keep an event
         from its deadline by not answering.
@@ -491,7 +491,7 @@ class Orders:
         return event.attempts < self.rules.max_attempts
 
     def _actor_gone(self, event: Event, now: float) -> list[Send]:
-        """Who should have dealt with it does not: somebody else has to."""
+        """Replace a device that should have contained an event and did not."""
         taken_up, event.act_taken_up = event.act_taken_up, False
         self._free(event, event.actor)
         event.actor = None
@@ -504,7 +504,7 @@ class Orders:
         return []
 
     def _stand_down(self, event: Event, but: str | None = None) -> list[Send]:
-        """Who stands by, or was to deal with an event, is free again if that is over.
+        """Release devices that stood by at, or were to contain, an event that no longer needs them.
 
         So it is where nobody looks any longer: who stands by may be the one to look.
         """
@@ -520,10 +520,10 @@ _ORDERS = (m.Order, m.TaskAward)
 
 
 def _is_to_act(body: m.Body) -> bool:
-    """Whether it is an order to deal with something, or to stand by."""
+    """Return True for an order to contain an event, or to stand by."""
     return isinstance(body, m.Order) and body.task != "confirm"
 
 
 def _somebody_looks(event: Event) -> bool:
-    """Whether an order to confirm it stands."""
+    """Return True if an order to confirm the event is active."""
     return event.state in (State.ASSIGNED, State.ON_SCENE)

@@ -1,4 +1,4 @@
-"""Who may ask for what: the rules of access, whoever holds what at the moment."""
+"""Access rules: who may request what, independent of who holds it at the moment."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _INCLUDES = {"both": {"teleoperation", "missions"}}
 
 @dataclass(frozen=True, kw_only=True)
 class AccessRule:
-    """What some devices may do with some robots, for a time.
+    """Permission of some devices to use some robots, for a time.
 
     Attributes:
         holders: Labels of the devices it is about; empty: all.
@@ -41,7 +41,7 @@ class AccessRule:
         return self.levels.union(*(_INCLUDES.get(level, ()) for level in self.levels))
 
     def is_about(self, holder: Device, robot: Device, now: float) -> bool:
-        """Whether it says something about these two now."""
+        """Return True if the rule applies to these two now."""
         right = not self.holders or holder.label in self.holders
         return right and (not self.robots or robot.label in self.robots) and self._holds(now)
 
@@ -61,7 +61,7 @@ class Access:
     rules: Sequence[AccessRule] = field(default_factory=lambda: (AccessRule(),))
 
     def allows(self, holder: Device, robot: Device, level: str, now: float) -> bool:
-        """Whether a device may have a level of permission on a robot."""
+        """Return True if a device may have a level of permission on a robot."""
         if level != "sensors" and holder.device_type not in DRIVERS:
             return False
         wanted = _INCLUDES.get(level, {level})
@@ -82,5 +82,5 @@ class Access:
         return max((r.until for r in rules), default=now)
 
     def next_end(self, now: float) -> float:
-        """When the next rule ceases to hold [s]."""
+        """Return when the next rule expires [s]."""
         return min((r.until for r in self.rules if r.until > now), default=math.inf)

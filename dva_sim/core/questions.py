@@ -1,4 +1,4 @@
-"""What the policy asks a person before it acts, and for how long it waits for an answer."""
+"""Questions that the policy asks a person before it acts, and their deadlines."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dva_sim.core.handling import Choice
 
 @dataclass(slots=True)
 class Question:
-    """What the policy would do about an event.
+    """Proposal about an event that waits for an answer.
 
     Attributes:
         event: Which.
@@ -57,18 +57,18 @@ class Questions:
         return True
 
     def settle(self) -> list[Event]:
-        """What was not asked again is no question any more; the events of which that changed."""
+        """Drop questions that were not asked again; return the events of which that changed."""
         before, self._open, self._now = self._open, self._now, {}
         gone = [q.event for key, q in before.items() if key not in self._open]
         new = (q for key, q in self._open.items() if not _same(before.get(key), q))
         return gone + [q.event for q in new]
 
     def of(self, number: int) -> Question | None:
-        """What is asked about an event, looking before dealing with it."""
+        """Return the question about an event: about looking before about dealing with it."""
         return self._open.get((number, "confirm")) or self._open.get((number, "contain"))
 
     def next_deadline(self) -> float:
-        """When a question has waited too long [s]."""
+        """Return when the next question expires [s]."""
         return min((q.until for q in self._open.values()), default=math.inf)
 
 

@@ -1,4 +1,4 @@
-"""Who is registered, when each was last heard, and what each is doing."""
+"""Registered devices: when each was last heard, and its present activity."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class DeviceEntry:
         return SAME_AS.get(self.device.device_type, self.device.device_type)
 
     def is_new_life(self, message_id: int, timestamp: str) -> bool:
-        """Whether a registration says that the device has started anew: MessageIDs go back.
+        """Return True if a registration shows that the device has restarted: MessageIDs go back.
 
         A copy of an earlier registration, sent again or come late, does not say so.
         """
@@ -93,7 +93,7 @@ class Registry:
 
     @property
     def is_full(self) -> bool:
-        """Whether nobody else fits."""
+        """True if no further device fits."""
         return len(self.entries) >= self.most
 
     def register(self, id_tag: str, request: Registration, now: float) -> DeviceEntry | None:
@@ -218,7 +218,7 @@ class Registry:
         return self._silent
 
     def next_silence(self) -> float:
-        """When the device that was heard longest ago will have been quiet for too long [s]."""
+        """Return when the next device will have been silent for too long [s]."""
         longest = next(iter(self._heard.values()), None)
         if longest is None:
             return math.inf
@@ -233,12 +233,12 @@ class Registry:
         return self._located[device_type].values()
 
     def changes(self) -> dict[str, DeviceEntry | None]:
-        """Who came, moved, fell silent, was heard again or is forgotten: for the memory."""
+        """Return the devices that changed since the last call, for the store."""
         changed, self._changed = self._changed, {}
         return changed
 
     def moves(self) -> dict[str, DeviceEntry | None]:
-        """The same for whoever listens to the devices; each is told once to either."""
+        """Return the devices that changed since the last call, for listeners."""
         moved, self._moved = self._moved, {}
         return moved
 

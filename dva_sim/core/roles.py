@@ -1,4 +1,4 @@
-"""What control rooms may do: roles, which the DVA is told and no device can claim.
+"""Roles of control rooms, assigned by configuration; no device can claim one.
 
 A role goes with the id of a device: with keys an id is proven, without them anybody can claim
 to be anybody, as everywhere.
@@ -11,7 +11,7 @@ from enum import StrEnum
 
 
 class ControlRoomRole(StrEnum):
-    """What somebody may do; each includes those before it."""
+    """Role of a control room; each includes those before it."""
 
     LOOK = "look"
     DRIVE = "drive"
@@ -19,14 +19,14 @@ class ControlRoomRole(StrEnum):
     SUPERVISE = "supervise"
 
     def includes(self, other: ControlRoomRole) -> bool:
-        """Whether who has this role may do what that one allows."""
+        """Return True if this role allows what the other one allows."""
         ranks = list(ControlRoomRole)
         return ranks.index(self) >= ranks.index(other)
 
 
 @dataclass
 class Roles:
-    """Who has which role: stated by configuration, or by who runs the DVA within its process.
+    """Role of each control room: by configuration, or by the process that runs the DVA.
 
     Attributes:
         known: By id of the device; whoever is not there may look.

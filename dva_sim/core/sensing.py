@@ -1,4 +1,4 @@
-"""What robots can measure, and what the DVA makes of it.
+"""Sensors of robots, and the events that the DVA infers from their values.
 
 The DVA asks a robot for its sensors once somebody wants to know. Where it was told to heed some of
 them it reads them as any other subscriber does, by a permission of its own, and looks for values
@@ -30,7 +30,7 @@ MOST_LISTED = 64
 
 @dataclass(frozen=True)
 class SensorAlarm:
-    """What it means when a sensor shows much.
+    """Meaning of a high value of a sensor.
 
     Attributes:
         kind: Of the event that it speaks for: `fire`, `gas_leak` or `flood`.
@@ -43,7 +43,7 @@ class SensorAlarm:
 
 @dataclass
 class Sensing:
-    """What is known of the robots' sensors, and which of their values the DVA heeds.
+    """Known sensors of the robots, and the values that the DVA uses.
 
     Attributes:
         alarms: What it heeds, by the name of the sensor.
@@ -116,7 +116,7 @@ class Sensing:
     # --- reading them ------------------------------------------------------------------
 
     def renew(self, registry: Registry, sessions: Sessions, now: float) -> list[Send]:
-        """What to tell robots so that their values come, and go on coming."""
+        """Return the subscriptions to send so that the robots' values keep coming."""
         sends: list[Send] = []
         for robot in [robot for robot, due in self._due.items() if due <= now]:
             self._due[robot] = now + RENEW
@@ -132,7 +132,7 @@ class Sensing:
         return self._wishes(send.to, send.session) if send.to in self._due else []
 
     def next_due(self) -> float:
-        """When `renew` has something to do [s]."""
+        """Return when `renew` has work next [s]."""
         return min(self._due.values(), default=math.inf)
 
     def crossed(self, robot: str, value: m.SensorValue) -> SensorAlarm | None:
@@ -156,7 +156,7 @@ class Sensing:
 
 
 def _line(robot: str, info: m.SensorInfo, room: int) -> tuple[m.DeviceSensors | None, int]:
-    """What a robot has, as far as there is room, and how much of it that takes [B]."""
+    """Return a robot's sensors as far as there is room, and the room that takes [B]."""
     taken = LINE_BYTES + xml_size(info.camera_url)
     if taken > room:
         return None, 0
@@ -180,7 +180,7 @@ def within_reach(events: Iterable[Event], kind: str, place: m.Position) -> Event
 
 
 def is_no_news(book: EventBook, kind: str, place: m.Position, now: float) -> bool:
-    """Whether people have found something of the kind near there lately, or were called to it."""
+    """Return True if people recently found such an event nearby, or were called to one."""
     lately = (
         e for e in book.closed.values() if e.state in _FOUND and now - e.times["closed"] < NO_NEWS
     )
@@ -191,6 +191,6 @@ _FOUND = frozenset({State.CONFIRMED, State.CONTAINED, State.ESCALATED})
 
 
 def only_felt(event: Event, registry: Registry) -> bool:
-    """Whether nobody but sensors of robots speaks for an event: its place is not known well."""
+    """Return True if only robots' sensors support an event, so that its position is uncertain."""
     types = {e.device.device_type for s in event.sources if (e := registry.entries.get(s))}
     return types == {ROBOT}

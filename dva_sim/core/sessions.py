@@ -47,7 +47,10 @@ class Sessions:
     def grant(
         self, robot: m.Device, holder: m.Device, wish: m.PermissionRequest
     ) -> tuple[m.Permission, list[Send]] | None:
-        """What the holder is answered, and the robot told if it is news; None if it is held."""
+        """Grant a robot; the permission, and messages to the robot if it is new.
+
+        None if it is held.
+        """
         grant, is_news = self.permissions.request(
             robot.id_tag, holder.id_tag, wish.level, wish.sensors, holder.address
         )
@@ -67,7 +70,7 @@ class Sessions:
         return grant.session, told if is_news else None
 
     def is_held(self, robot: str) -> bool:
-        """Whether somebody else than the DVA holds a robot."""
+        """Return True if a robot is held by somebody other than the DVA."""
         grant = self.permissions.grants.get(robot)
         held = grant is not None and grant.holder != self.permissions.own
         return held or robot in self.reserved
@@ -99,7 +102,7 @@ class Sessions:
         return grant.session if grant is not None else 0
 
     def is_untold(self, robot: str) -> bool:
-        """Whether a robot has not said yet that it knows of the end of a session."""
+        """Return True if a robot has not confirmed the end of a session yet."""
         return any(send.to == robot for send in self.untold.values())
 
     def give_back(self, body: m.PermissionRevocation) -> bool:
@@ -197,7 +200,7 @@ class Sessions:
             del self.untold[next(iter(self.untold))]
 
     def to_tell(self) -> list[Send]:
-        """Who has to hear now that a session is over; each is given out once."""
+        """Return the ends of sessions to send now; each is returned once."""
         over, self._over = self._over, []
         return over
 
@@ -286,7 +289,7 @@ class Permissions:
         return grant, grant != held
 
     def renew(self, grant: Grant) -> Grant:
-        """The same right with a session above all that were handed out."""
+        """Return the same right with a session above all previous ones."""
         self.changes += 1
         renewed = self.grants[grant.robot] = replace(grant, session=self._new_session(False))
         return renewed
@@ -319,7 +322,7 @@ class Permissions:
         return self._counted(_take(self.grants, holder, robot))
 
     def forget(self, holder: str, robot: str | None = None) -> list[Grant]:
-        """The same for the right to read sensors."""
+        """Remove a right to read sensors; what was removed."""
         return self._counted(_take(self.observers, holder, robot))
 
     def _counted(self, taken: list[Grant]) -> list[Grant]:

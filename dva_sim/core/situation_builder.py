@@ -28,7 +28,7 @@ _place = operator.attrgetter("place")
 
 @dataclass
 class KnownTeam:
-    """Who can go: the entries behind `Situation.responders`, and the operators' free hands."""
+    """Available responders: the entries behind `Situation.responders`, and free operators."""
 
     entries: list[DeviceEntry]
     engaged: list[Event | None]
@@ -50,7 +50,7 @@ class KnownTeam:
 
 @dataclass
 class PolicyView:
-    """What a policy is shown, and the core's own things behind it, in the same places."""
+    """View of a policy, with the core's objects behind it, at the same indices."""
 
     situation: Situation
     events: list[Event]
@@ -77,7 +77,7 @@ class SituationBuilder:
     _bound_for: dict[str, tuple[int, float]] = field(default_factory=dict)  # station, until
 
     def look(self, now: float) -> PolicyView | None:
-        """What there is to decide; None if there is nothing, or nobody to send."""
+        """Return the decision to make; None if there is none, or nobody to send."""
         if not self.orders.book.open and not self.policy.relocates:
             return None
         events = self._tasks()
@@ -119,14 +119,14 @@ class SituationBuilder:
         return self.policy.preempts and self._is_under_way(event)
 
     def _finder_is_there(self, event: Event) -> bool:
-        """Whether a guard has just confirmed it and is about to be free to deal with it."""
+        """Return True if a guard has just confirmed it and will soon be free to deal with it."""
         finder = event.responder
         if event.state is not State.CONFIRMED or event.operator is not None or finder is None:
             return False
         return self.orders.engaged.is_at(finder, event)
 
     def _is_under_way(self, event: Event) -> bool:
-        """Whether its responder has heard of it and is not there yet."""
+        """Return True if its responder has received the order and has not arrived."""
         if event.state is not State.ASSIGNED or not event.taken_up or event.responder is None:
             return False
         return self.orders.registry.entries[event.responder].position is not None
@@ -230,7 +230,7 @@ class SituationBuilder:
         return distance, eta
 
     def _cover(self, team: KnownTeam, now: float) -> Cover | None:
-        """Where idle guards could wait, and where they are on their way to already."""
+        """Return where idle guards could wait, and where some are going already."""
         ground = self.ground
         if not ground.stations:
             return None
@@ -247,7 +247,7 @@ class SituationBuilder:
         return Cover(names, _sealed(eta), reach, demand, bound_for)
 
     def _station_ahead(self, start: Start, now: float) -> int | None:
-        """Where a guard is on its way to; None once it is there, or much too late."""
+        """Return the station that a guard is going to; None once it is there, or much too late."""
         station, until = self._bound_for.get(start.device, (None, math.inf))
         if station is None:
             return None
@@ -263,7 +263,7 @@ def same_place(a: m.Position, b: m.Position) -> bool:
 
 
 def _sealed(array: Floats) -> Floats:
-    """The same array, which a policy cannot change."""
+    """Return a read-only copy of an array for a policy."""
     view = array.view()
     view.flags.writeable = False
     return view

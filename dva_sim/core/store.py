@@ -1,4 +1,4 @@
-"""What survives the DVA: events, devices and permissions, in a SQLite file.
+"""Persistent state of the DVA: events, devices and permissions, in a SQLite file.
 
 Detectors report an event once and a holder is granted a robot once, so neither can be rebuilt
 by asking around; hence a file. What comes by itself within seconds is not kept: positions,
@@ -344,7 +344,7 @@ def _event(kept: dict[str, Any], past: float) -> Event:
 
 
 def _of_handling(handling: Handling, past: float) -> dict[str, Any] | None:
-    """What was decided on an event; nothing of one on which nothing was."""
+    """Return the decisions on an event as a row; None if there are none."""
     if handling == Handling():
         return None
     return {
@@ -399,7 +399,7 @@ def _is_same_right(one: Grant, other: Grant) -> bool:
 
 
 def _of_sessions(dva: Dva) -> dict[str, dict[str, str]]:
-    """What holds, and which robots have not heard of what is over, by session."""
+    """Return valid sessions, and robots that have not heard of ended ones, by session."""
     grants = dva.sessions.permissions.all()
     untold = [(s, send.body) for s, send in dva.sessions.untold.items()]
     return {

@@ -1,4 +1,4 @@
-"""What the core may know of the place: as values, never as a map."""
+"""Travel times: what the core may know of the site, as values rather than a map."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much fits into one message: lists are cut before they are too long for one."""
+"""Sizes of messages: lists are cut before they exceed one message."""
 
 LIST_BYTES = 7000  # of a list, the rest of the message apart [B]
 

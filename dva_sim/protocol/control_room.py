@@ -274,7 +274,7 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """What the policy would do about an event now.
+    """Proposal of the policy for an event, as things are now.
 
     Attributes:
         event_id: The event.

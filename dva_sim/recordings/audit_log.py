@@ -53,7 +53,7 @@ class AuditWriteError(DvaSimError):
 
 @dataclass(frozen=True, kw_only=True)
 class AuditEntry:
-    """What is to be remembered of one action.
+    """Entry about one action.
 
     Attributes:
         time_s: Of the run [s].
@@ -223,7 +223,7 @@ class FirstWrong:
 
 @dataclass(frozen=True)
 class Verified:
-    """What a look at the whole chain has shown.
+    """Result of a check of the whole chain.
 
     Attributes:
         rows: How many rows hold, from the first one on.
@@ -286,7 +286,7 @@ def _followed(file: sqlite3.Connection) -> Verified:
 
 
 def _wrong(values: Sequence[Any], number: int, head: str) -> str | None:
-    """What is wrong with the row in the place of `number`, after one with the hash `head`."""
+    """Return what is wrong with row `number`, given the hash `head` of the row before it."""
     if values[0] != number:
         return f"is missing: row {values[0]} follows row {number - 1}"
     *plain, before, told = values
@@ -300,7 +300,7 @@ def _wrong(values: Sequence[Any], number: int, head: str) -> str | None:
 
 
 def verify_plain(rows: Sequence[Mapping[str, Any]]) -> Verified:
-    """The same of rows that were kept elsewhere, as in a recording; they may begin anywhere."""
+    """Verify rows kept elsewhere, as in a recording; they may begin at any row."""
     first = rows[0] if rows else {}
     number, head, last = first.get("number", 1) - 1, first.get("before", NOTHING_BEFORE), ""
     for plain in rows:
@@ -339,7 +339,7 @@ def _opened(path: Path) -> sqlite3.Connection:
 
 
 def _holds_nothing(path: Path) -> bool:
-    """Whether a file is empty, or one of SQLite in which nothing was made yet."""
+    """Return True if a file is empty, or an SQLite file without tables."""
     if not path.stat().st_size:
         return True
     try:

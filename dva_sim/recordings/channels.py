@@ -34,7 +34,7 @@ ALIVE_S = 1.0  # who stands still is told of so often, on whole multiples [s]
 
 
 def poses(playback: Playback) -> Iterator[ChannelMessage]:
-    """Where everybody is: a pose for each who moves, and all of a moment in one transform."""
+    """Yield a pose for each moving agent, and all poses of a moment in one transform."""
     tracks = playback.recorder.tracks.items()
     every = heapq.merge(
         *([(p.time, name, p) for p in sparse(track)] for name, track in tracks),
@@ -45,7 +45,7 @@ def poses(playback: Playback) -> Iterator[ChannelMessage]:
 
 
 def placed(time: float, moved: Sequence[tuple[str, TrackPoint]]) -> Iterator[ChannelMessage]:
-    """Where those are who moved at a moment, by name."""
+    """Yield the poses of the agents that moved at a moment, by name."""
     for name, p in moved:
         yield _pose(name, POSE, p)
     transforms = [_transform(name, p) for name, p in moved]
@@ -67,26 +67,26 @@ def sparse(track: Sequence[TrackPoint]) -> Iterator[TrackPoint]:
 
 
 def activities(playback: Playback) -> Iterator[ChannelMessage]:
-    """What everybody does, told when it changes."""
+    """Yield the activity of each agent when it changes."""
     for name, track in playback.recorder.tracks.items():
         for mode, points in groupby(track, key=lambda p: p.mode):
             yield active(next(points).time, name, mode)
 
 
 def active(time: float, name: str, mode: str) -> ChannelMessage:
-    """What somebody does from now on."""
+    """Return the activity of an agent from now on."""
     return stamped(time, f"/{name}/{ACTIVITY}", "dva_sim.Activity", activity=mode)
 
 
 def beliefs(playback: Playback) -> Iterator[ChannelMessage]:
-    """Where operators take the robots to be that they drive."""
+    """Yield where operators believe the robots they drive to be."""
     for robot, views in playback.recorder.views.items():
         for seen in views:
             yield _pose(playback.labels[robot], SEEN, seen)
 
 
 def fixes(playback: Playback) -> Iterator[ChannelMessage]:
-    """Where the robots are on earth, once a second."""
+    """Yield the robots' geographic positions, once a second."""
     for robot in playback.radii:
         name = playback.labels[robot]
         for _, points in groupby(playback.recorder.tracks[name], key=lambda p: p.time // 1.0):
@@ -163,7 +163,7 @@ def _grid(what: str, time: float, cell: float, raster: Raster) -> ChannelMessage
 
 
 def _shortened(values: NDArray[np.float64]) -> NDArray[np.float32]:
-    """As 32-bit numbers whose last digits are zero, which are packed far smaller."""
+    """Round to 32-bit numbers whose last digits are zero, which compress far better."""
     bits = np.ascontiguousarray(values, "<f4").view("<u4")
     mask = np.uint32(0xFFFFFFFF << (23 - DIGITS) & 0xFFFFFFFF)
     return (bits & mask).view("<f4")
@@ -206,7 +206,7 @@ def plan(site: Site) -> ChannelMessage:
 
 
 def hazards(playback: Playback) -> Iterator[ChannelMessage]:
-    """What is real, from when it begins until it is dealt with or the run ends."""
+    """Yield real hazards, from their beginning until they are dealt with or the run ends."""
     for number, incident, until in _real(playback):
         drawn = -math.inf
         for time in _steps(incident.start, until):
@@ -229,14 +229,14 @@ def contained(time: float, number: int) -> ChannelMessage:
 
 
 def states(playback: Playback) -> Iterator[ChannelMessage]:
-    """The same hazards as numbers, once a second."""
+    """Yield the state of hazards as numbers, once a second."""
     for number, incident, until in _real(playback):
         for time in _steps(incident.start, until):
             yield state(time, number, incident)
 
 
 def state(time: float, number: int, incident: RunHazard) -> ChannelMessage:
-    """How a hazard is, by its number from 1."""
+    """Return the state of a hazard, by its number from 1."""
     x, y = incident.hazard.position
     return stamped(
         time,
@@ -254,7 +254,7 @@ def state(time: float, number: int, incident: RunHazard) -> ChannelMessage:
 
 
 def _real(playback: Playback) -> Iterator[tuple[int, RunHazard, float]]:
-    """What is real, with its number from 1, and until when it goes on [s]."""
+    """Yield real hazards with their number from 1, and when they end [s]."""
     for number, incident in enumerate(playback.incidents):
         if not incident.false_alarm:
             until = playback.contained.get(number, math.inf)
@@ -375,13 +375,13 @@ def log(moment: Moment) -> ChannelMessage:
 
 
 def facts(playback: Playback) -> Iterator[ChannelMessage]:
-    """What was decided, by whom and why, where people take part; without, the story tells."""
+    """Yield decisions with author and reason, where people take part; else the story tells."""
     for fact in playback.facts if playback.people_decide else ():
         yield fact_message(fact)
 
 
 def fact_message(fact: Fact) -> ChannelMessage:
-    """What was decided; `fact_of` reads it again."""
+    """Return a decision as a message; `fact_of` reads it again."""
     content = {_IN_SECONDS.get(name, name): value for name, value in fact.row().items()}
     del content["time"]
     return stamped(fact.time, FACTS, "dva_sim.Fact", **content)
@@ -464,7 +464,7 @@ def frame_shown(
 
 
 def commanded(playback: Playback) -> Iterator[ChannelMessage]:
-    """What the phones make of the tilt."""
+    """Yield the commands that phones make from the tilt."""
     labels, names = playback.labels, names_of(playback.labels)
     for number, drive in enumerate(playback.recorder.drives):
         topic, whose = f"/{names[drive.operator]}/{COMMANDS}", labels[drive.robot]
@@ -476,7 +476,7 @@ def commanded(playback: Playback) -> Iterator[ChannelMessage]:
 
 
 def applied(playback: Playback) -> Iterator[ChannelMessage]:
-    """What the robots make of the commands."""
+    """Yield the commands as robots apply them."""
     for drive in playback.recorder.drives:
         for a in drive.applied:
             yield stamped(
@@ -495,7 +495,7 @@ EVENTS, LATENCIES, IMAGE = "/events", "/latencies", "image"
 
 
 def event_message(time: float, event: Event) -> ChannelMessage:
-    """How an event stands; of runs that go on, since a recording holds its events as a whole."""
+    """Return the state of an event in a live run; recordings hold events as a whole."""
     return stamped(
         time,
         EVENTS,
@@ -514,7 +514,7 @@ def event_message(time: float, event: Event) -> ChannelMessage:
 
 
 def latency(time: float, robot: str, what: str, *, delay: float) -> ChannelMessage:
-    """How long a command or a picture took; a recording has `applied` and `shown` for that."""
+    """Return the latency of a command or picture; recordings have `applied` and `shown`."""
     told = {"robot": robot, "what": what, "delay_s": round(delay, 6)}
     return stamped(time, LATENCIES, "dva_sim.Latency", **told)
 

@@ -1,4 +1,4 @@
-"""What a recording's messages are made of: time stamps, poses, colours; and their JSON Schemas.
+"""Building blocks of recorded messages: time stamps, poses, colours; and JSON Schemas.
 
 Where Foxglove has a message type for something, its name and fields are used, so that viewers
 know what to draw; the others begin with `dva_sim.`. Times are whole seconds and nanoseconds of
@@ -73,7 +73,7 @@ def heading_of(rotation: dict[str, float]) -> float:
 
 
 def pose(x: float, y: float, heading: float = 0.0, z: float = 0.0) -> dict[str, Any]:
-    """Where something is [m] and where it heads [rad]."""
+    """Return a pose: position [m] and heading [rad]."""
     return {"position": point(x, y, z), "orientation": turned(heading)}
 
 
@@ -141,7 +141,7 @@ def _type(kind: str, known: Mapping[str, Schema]) -> Schema:
 
 
 def _schemas() -> dict[str, Schema]:
-    """Of all messages, by the names of their types.
+    """Return the schemas of all messages, by the names of their types.
 
     In `schemas.txt` parts of messages stand before the messages, a type a paragraph: its name,
     what it tells, then its fields. `a b: type` are two fields, `type*` is a list, `A=0 B=1` are

@@ -73,7 +73,7 @@ class MotionApp:
     profile: PhoneProfile
 
     def line(self) -> str:
-        """As it stands in a file."""
+        """Return the sample as a line of the file."""
         about = {"at_s": self.at, "period_s": self.period, "reference_mps2": list(self.reference)}
         told = {**about, "ios": self.ios, "profile": self.profile.model_dump(mode="json")}
         return APP + json.dumps(told)
@@ -81,7 +81,7 @@ class MotionApp:
 
 @dataclass
 class PhoneMotion:
-    """What is in a file.
+    """Contents of a motion file.
 
     Attributes:
         samples: In the order in which they came.
@@ -136,7 +136,7 @@ class MotionWriter:
 
 
 def read_motion(path: Path) -> PhoneMotion:
-    """What is in a file of motion.
+    """Read a motion file.
 
     Raises:
         NoMotionOfOursError: it is none.

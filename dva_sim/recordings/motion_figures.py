@@ -1,4 +1,4 @@
-"""What a file of motion tells of a phone's part: its rate, how even that is, its noise at rest."""
+"""Properties of a phone's sensor from a motion file: rate, regularity, noise at rest."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LEAST: Final = 30  # samples
 
 
 class MotionFigures(NamedTuple):
-    """What a file tells.
+    """Properties of the sensor.
 
     Attributes:
         samples: How many there are.
@@ -47,7 +47,7 @@ class MotionFigures(NamedTuple):
 
 
 def figures_of(motion: PhoneMotion, path: Path) -> MotionFigures:
-    """What a file tells.
+    """Compute the properties of the sensor.
 
     Raises:
         ConfigError: it holds too few samples to tell anything.

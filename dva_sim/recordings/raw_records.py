@@ -42,12 +42,12 @@ class _Exactly:
 
 
 class DamagedError(Exception):
-    """What is in the file is not what was written."""
+    """The file does not contain what was written to it."""
 
 
 @dataclass
 class RawRecords:
-    """What a file holds, sorted a little.
+    """Records of a file, grouped by kind.
 
     Attributes:
         made_by: The profile and the library that its head names.
@@ -103,7 +103,7 @@ class RawRecords:
             raise DamagedError(CUT if self.is_cut else self._incomplete())
 
     def _not_ours(self) -> str:
-        """What a whole file without our metadata is."""
+        """Describe a complete file without our metadata."""
         if channels.HAZARDS in self.said or any(map(is_camera, self.said)):
             return self._filtered("metadata")
         profile, library = (f"{text!r:.60}" for text in self.made_by)
@@ -112,7 +112,7 @@ class RawRecords:
         )
 
     def _incomplete(self) -> str:
-        """Why what goes with the messages is not what was written."""
+        """Return why the data that accompany the messages are incomplete."""
         if self.files.keys() < {RUN, SCENARIO}:
             return self._filtered("attachments")
         return "is damaged: something is missing or changed"
@@ -149,12 +149,12 @@ class RawRecords:
 
 
 def _other_form(head: bytes) -> str:
-    """What a file is that does not begin as MCAP does."""
+    """Describe a file that does not begin like an MCAP file."""
     if how := next((name for magic, name in PACKED.items() if head.startswith(magic)), None):
         return f"is compressed as a file ({how}); unpack it first"
     return "is not a recording: it does not begin as MCAP does"
 
 
 def is_camera(topic: str) -> bool:
-    """Whether a topic holds what a robot's camera took."""
+    """Return True if a topic holds camera pictures of a robot."""
     return topic.endswith(f"/{channels.CAMERA}")

@@ -71,7 +71,7 @@ class RecordedHazard(Hazard):
         return self._size(time)[2]
 
     def _size(self, time: float) -> tuple[float, float, float]:
-        """As last told of."""
+        """Return the size as last recorded."""
         index = bisect_right(self.times, time)
         return self.sizes[index - 1] if index else (0.0, 0.0, 0.0)
 
@@ -103,7 +103,7 @@ def recorded_hazard(number: int, entry: Mapping[str, Any], said: Said) -> Hazard
 
 
 class RecordedSurroundings(Surroundings):
-    """What lay over the floor, of all hazards together, as last recorded; nothing is simulated.
+    """Hazard fields over the floor, all hazards together, as last recorded; nothing is simulated.
 
     Args:
         site: Where.
@@ -166,7 +166,7 @@ class Opened:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the file holds all of the run."""
+        """True if the file holds the complete run."""
         return self.playback.duration >= self.lasted
 
 
@@ -437,7 +437,7 @@ class Lapse:
 
 
 def read_lapse(path: Path) -> Lapse:
-    """What a figure needs of a recording.
+    """Read what a figure needs of a recording.
 
     Raises:
         ConfigError: no such file, or not a recording.

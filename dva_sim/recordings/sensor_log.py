@@ -38,7 +38,7 @@ _AROUND_GRAVITY: Final = 0.15  # by how much the median may differ from it, as a
 
 
 class _Columns(NamedTuple):
-    """Where time and axes stand, and what the head says of them."""
+    """Columns of time and axes, and units given in the header."""
 
     time: int
     axes: tuple[int, int, int]
@@ -78,7 +78,7 @@ def read_sensor_log(path: Path, unit: Unit | None = None) -> list[MotionSample]:
 
 
 def _columns_of(head: Sequence[str], path: Path) -> _Columns:
-    """Where what is needed stands; a file without a head has time, x, y, z."""
+    """Find the columns; a file without a header has time, x, y, z."""
     names = [name.strip() for name in head]
     if all(_is_number(name) for name in names) and len(names) == 4:
         return _Columns(0, (1, 2, 3), ())
@@ -123,7 +123,7 @@ def _numbers(
 
 
 def _second_of(times: Sequence[float], columns: _Columns, path: Path) -> float:
-    """How many seconds one unit of the time is: by the head, else by the samples' distance."""
+    """Return the seconds in one unit of time: by the header, else by the spacing of samples."""
     head = columns.names[columns.time] if columns.names else ""
     named = re.search(r"[\[(_ ]\s*(s|ms|us|µs|ns)\s*[\])]?$", head)
     if named:
@@ -140,7 +140,7 @@ def _second_of(times: Sequence[float], columns: _Columns, path: Path) -> float:
 def _metre_of(
     axes: Sequence[Sequence[float]], columns: _Columns, unit: Unit | None, path: Path
 ) -> float:
-    """How many m/s^2 one unit of the axes is."""
+    """Return the m/s^2 in one unit of the axes."""
     head = " ".join(columns.names[n] for n in columns.axes) if columns.names else ""
     if unit is None and _IN_MPS2.search(head):
         unit = "m/s2"

@@ -192,7 +192,7 @@ def write_recording(
 
 
 def _beside(path: Path) -> Path:
-    """Where a file is written before it takes its place."""
+    """Return the temporary file in which a file is written before it replaces the target."""
     return path.with_name(f".{path.name}.{os.getpid()}")
 
 
@@ -306,7 +306,7 @@ def _packed(message: ChannelMessage) -> tuple[int, str, str, bytes]:
 
 # --- what goes with it -----------------------------------------------------------------
 def digest(files: Mapping[str, bytes]) -> str:
-    """Of all that goes with the messages, by which damage is found."""
+    """Return the digest of all that accompanies the messages, to detect damage."""
     whole = hashlib.sha256()
     for name, data in files.items():
         whole.update(f"{name}:{len(data)}:".encode() + data)
@@ -314,7 +314,7 @@ def digest(files: Mapping[str, bytes]) -> str:
 
 
 def facts(playback: Playback) -> dict[str, Any]:
-    """What a player has to know beside the messages."""
+    """Return what a player has to know besides the messages."""
     return {
         "format": FORMAT,
         "seed": playback.seed,

@@ -47,7 +47,7 @@ class Auction(Policy):
 
 
 def _cost(situation: Situation, task: int) -> Floats:
-    """Of each responder: what it offered, or for what is not auctioned the expected arrival."""
+    """Return the cost of each responder: its bid, or its expected arrival where none was asked."""
     what = situation.tasks[task]
     eta: Floats = situation.eta[task]
     if what.stage == "contain":

@@ -15,7 +15,7 @@ _UNREACHED = 3600.0  # what a zone counts that nobody covers [s]
 
 
 class Coverage(Policy):
-    """As `min_eta`, and idle guards move so that the expected response to the next event falls.
+    """`min_eta` with relocation: idle guards move to where the next response is expected sooner.
 
     The expected response is the time from the nearest guard to each zone, weighted by how many
     events are expected there. The best single move is made, then the best of those that are

@@ -12,7 +12,7 @@ from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, 
 
 
 class Free:
-    """Who can still be sent in one decision: each idle responder once, robots while operators last.
+    """Responders available in one decision: each idle one once, robots while operators last.
 
     Attributes:
         robots: Which responders are robots, shape `(responders,)`.
@@ -62,7 +62,7 @@ def waiting(situation: Situation) -> list[int]:
 
 
 def reachable(situation: Situation, cost: Floats) -> Floats:
-    """The same cost, infinite where the responder would never arrive."""
+    """Return the cost, infinite where the responder would never arrive."""
     return np.where(np.isfinite(situation.eta), cost, np.inf)
 
 

@@ -17,7 +17,7 @@ _OBJECTIVES: Final = ("eta", "distance")
 
 
 class BatchOptimal(Policy):
-    """As many tasks as possible, and among all ways to serve so many the least total ETA.
+    """As many tasks as possible, with the least total ETA among all assignments of that size.
 
     With more tasks than responders all tasks compete for who there is, so those near to somebody
     go first. That alone could let a far one starve. So a second of waiting counts for a task
@@ -56,7 +56,7 @@ class BatchOptimal(Policy):
     def _cost(
         self, situation: Situation, tasks: NDArray[np.intp], idle: NDArray[np.intp]
     ) -> Floats:
-        """Of each pair, shape `(tasks, idle)`; infinite means never."""
+        """Return the cost of each pair, shape `(tasks, idle)`; infinite means never."""
         here = np.ix_(tasks, idle)
         cost = situation.eta[here]
         if self.objective == "distance":
@@ -67,7 +67,7 @@ class BatchOptimal(Policy):
 
 
 class OperatorAware(BatchOptimal):
-    """As `batch_optimal` by ETA, where sending a robot must be worth an operator.
+    """`batch_optimal` by ETA, where sending a robot must be worth an operator.
 
     Operators are scarcer than robots, and one who drives is missing at the next event. So they
     go where a robot saves most against a person, and where it saves too little a person goes.

@@ -41,7 +41,7 @@ class Instance:
 
 @dataclass(frozen=True)
 class OraclePlan:
-    """Who goes where, and in which order.
+    """Sequence of assignments of the clairvoyant plan.
 
     Attributes:
         tours: Events of each unit in its order, counted from 0.
@@ -143,7 +143,7 @@ class _Search:
         return float(response[linear_sum_assignment(response)].sum())
 
     def _dominated(self, left: tuple[int, ...], state: tuple[float, ...]) -> bool:
-        """Whether the same events were served at no more cost, with no unit free later."""
+        """Return True if the same events were served at no more cost, with no unit free later."""
         known = self.seen.setdefault(left, [])
         if any(all(a <= b for a, b in zip(old, state, strict=True)) for old in known):
             return True

@@ -1,4 +1,4 @@
-"""What a policy sees, and what it may advise: values only, nothing that it could change."""
+"""View and advice of a policy: values only, so that a policy can change nothing."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Responder:
 
 @dataclass(frozen=True)
 class Cover:
-    """Where idle guards can wait, and what that would be good for.
+    """Positions where idle guards can wait, and the benefit of each.
 
     Attributes:
         stations: Names of the places to wait at.
@@ -84,7 +84,7 @@ class Cover:
 
 @dataclass(frozen=True, kw_only=True)
 class Situation:
-    """What is known at one moment.
+    """Knowledge of the DVA at one moment.
 
     Attributes:
         now: [s]
@@ -142,7 +142,7 @@ Advice = Assignment | Announcement | Relocation
 
 
 class Policy:
-    """What decides who goes where. Derive an own one from it, and name it by file and class.
+    """Base class of dispatch policies. Derive your own from it, and name it by file and class.
 
     A policy only advises: the core takes what the rules allow and counts the rest. It is asked
     whenever something has changed, and must not rely on its last advice having been taken.
@@ -158,7 +158,7 @@ class Policy:
     relocates: bool = False
 
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        """What to do now; a task left out waits.
+        """Return the advice for now; tasks without advice wait.
 
         Args:
             situation: What is known.

@@ -17,7 +17,7 @@ _REMEMBERED: Final = 1000  # events
 
 
 class HazardTeam(Policy):
-    """Where it is dangerous a robot goes and looks, and a person stands by to act after it.
+    """Where it is dangerous, a robot looks, and a person stands by to act on what it finds.
 
     A dangerous event is confirmed by the robot that is there first, unless a person would be
     there much earlier, or there is no robot or operator: then a person goes. While a robot is
@@ -52,7 +52,7 @@ class HazardTeam(Policy):
         return [*chosen, *serve(self._to_stand_by(situation), situation.eta, free)]
 
     def _best(self, situation: Situation, task: int, free: Free) -> int | None:
-        """Who goes: for a dangerous look a robot, if it is not much later than a person."""
+        """Choose who goes: for a dangerous look a robot, unless it is much later than a person."""
         eta, what = situation.eta[task], situation.tasks[task]
         if what.stage != "confirm" or what.kind not in self.dangerous:
             return free.best(eta)
@@ -82,5 +82,5 @@ class HazardTeam(Policy):
 
 
 def _only(cost: Floats, who: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Floats:
-    """The same cost, infinite for all others."""
+    """Return the cost, infinite for all others."""
     return np.where(who, cost, np.inf)

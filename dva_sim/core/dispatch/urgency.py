@@ -36,7 +36,7 @@ class PriorityEta(Policy):
 
 
 class Preemptive(Policy):
-    """As `priority_eta`, but whoever is under way may be sent to something clearly more urgent.
+    """`priority_eta` with preemption: responders may be redirected to clearly more urgent tasks.
 
     That happens only if nobody idle can serve the task well: not at all, or much later. What
     is left behind waits again, and is seen as such by the next decision.
@@ -81,7 +81,7 @@ class Preemptive(Policy):
     def _under_way(
         self, eta: Floats, left_behind: Floats, severity: float, before: float
     ) -> int | None:
-        """Who is redirected: the earliest of those whose task is clearly less urgent."""
+        """Choose whom to redirect: the earliest of those whose task is clearly less urgent."""
         may = (severity - left_behind >= self.margin - _ROUNDING) & np.isfinite(eta)
         if not (may & (eta < before)).any():
             return None

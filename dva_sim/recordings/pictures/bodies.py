@@ -59,12 +59,12 @@ class DrawnBody:
         )
 
     def place(self, time: float) -> tuple[float, float]:
-        """Where it is [m]."""
+        """Return its position [m]."""
         here = self._moments.at(self.name, time)
         return here.x, here.y
 
     def is_there(self, time: float) -> bool:
-        """Whether it is still on the site."""
+        """Return True if it is still on the site."""
         return self._moments.is_there(self.name, time)
 
     def show(self, time: float) -> list[Artist]:
@@ -83,7 +83,7 @@ class DrawnBody:
         return [self._trail, *ghost, self._mark]
 
     def _draw_trail(self, time: float) -> None:
-        """Where it was, the paler the longer ago, in the colours of what it did then."""
+        """Draw its trail, fading with age, in the colours of its activities."""
         past = self._moments.past(self.name, time)
         step = max(1, round(STEP / max(1e-3, (past[-1].time - past[0].time) / len(past))))
         past = [*past[:-1:step], past[-1]]
@@ -99,7 +99,7 @@ class DrawnBody:
 
 
 class _Ghost:
-    """Where the operator takes a robot to be, while there is a picture."""
+    """Position at which the operator believes a robot to be, while there is a picture."""
 
     def __init__(self, ax: Axes, moments: Moments, name: str) -> None:
         recording = moments.recording
@@ -133,5 +133,5 @@ def _pointed(outline: tuple[tuple[float, float], ...]) -> Any:
 
 
 def _fading(age: float) -> float:
-    """How strong a trail of some age [s] still is."""
+    """Return the opacity of a trail of some age [s]."""
     return 0.1 + 0.75 * math.exp(-age / style.TRAIL_S)

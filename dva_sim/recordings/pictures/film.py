@@ -88,7 +88,7 @@ def _shown_at(speed: float) -> str:
 
 
 class _Eye:
-    """What the operator at the wheel sees on the screen, or else what a robot sees now.
+    """Picture on the screen of the operator who is driving, or else what a robot sees now.
 
     Args:
         ax: Where.

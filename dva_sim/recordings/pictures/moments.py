@@ -23,12 +23,12 @@ FRESH = 3.0  # an older picture is not looked at any more [s]
 
 
 def kind_of(label: str) -> str:
-    """What somebody of that name is: `robot-1` is a robot."""
+    """Return the kind of agent of a label: `robot-1` is a robot."""
     return label.rpartition("-")[0]
 
 
 class Glance(NamedTuple):
-    """What an operator's screen shows.
+    """Contents of an operator's screen.
 
     Attributes:
         operator: Whose.
@@ -68,16 +68,16 @@ class Moments:
         return min(time, self.recording.duration)
 
     def is_there(self, name: str, time: float) -> bool:
-        """Whether somebody is on the site at `time` [s]; tracks of those who leave end."""
+        """Return True if an agent is on the site at `time` [s]; tracks of those who leave end."""
         return time <= self._times[name][-1] + GONE
 
     def past(self, name: str, time: float) -> list[TrackPoint]:
-        """Where somebody has been up to `time` [s], and is now."""
+        """Return the track of an agent up to `time` [s]."""
         track, index = self.tracks[name], bisect_right(self._times[name], time)
         return [*track[: max(1, index)], self.at(name, time)]
 
     def at(self, name: str, time: float) -> TrackPoint:
-        """Where somebody is at `time` [s], between two samples on a straight line."""
+        """Return the position of an agent at `time` [s], interpolated between two samples."""
         track, index = self.tracks[name], bisect_right(self._times[name], time)
         before, after = track[max(0, index - 1)], track[min(index, len(track) - 1)]
         gap = after.time - before.time
@@ -92,7 +92,7 @@ class Moments:
         )
 
     def going_on(self, time: float) -> list[RunHazard]:
-        """What has begun, is real and not dealt with at `time` [s]."""
+        """Return the hazards that are active at `time` [s]."""
         contained = self.recording.contained
         return [
             incident
@@ -103,7 +103,7 @@ class Moments:
     # --- what cameras see --------------------------------------------------------------
 
     def radius(self, name: str) -> float:
-        """Of somebody, seen from above [m]."""
+        """Return the radius of an agent, seen from above [m]."""
         robot = self.recording.robot_named(name)
         return PERSON if robot is None else self.recording.radii[robot]
 
@@ -117,7 +117,7 @@ class Moments:
         return None
 
     def eye(self, robot: str, time: float, width: int = 320, height: int = 240) -> Picture:
-        """What a robot's camera sees at `time` [s].
+        """Return what a robot's camera sees at `time` [s].
 
         Raises:
             ConfigError: no such robot.
@@ -160,7 +160,7 @@ class Moments:
 
 
 def _shown(drive: DriveLog, time: float) -> float | None:
-    """When the picture was taken that the driver looks at, if there is one."""
+    """Return when the picture that the driver looks at was taken, if there is one."""
     if drive.started is None or not drive.started <= time < (drive.ended or math.inf):
         return None
     shown = [frame for frame in drive.frames if frame.time <= time]

@@ -41,7 +41,7 @@ class Box(NamedTuple):
         return float((wide * high) ** 0.5) if wide > 0 and high > 0 else 0.0
 
     def beyond(self, frame: Box) -> float:
-        """How far it reaches out of a frame [pixels]."""
+        """Return how far the box exceeds a frame [pixels]."""
         gaps = (frame.x0 - self.x0, frame.y0 - self.y0, self.x1 - frame.x1, self.y1 - frame.y1)
         return sum(max(0.0, gap) for gap in gaps)
 
@@ -87,7 +87,7 @@ class Names:
         return [self._texts[body.name] for body in named]
 
     def _box_of(self, place: tuple[float, float], size: float) -> Box:
-        """What something of a size [points] covers."""
+        """Return the box of something with a size [points]."""
         x, y = self._ax.transData.transform(place)
         half = size / 2 * self._ax.figure.dpi / 72
         return Box(x - half, y - half, x + half, y + half)

@@ -98,7 +98,7 @@ class Sheet:
 
 
 def heading_of(recordings: Sequence[Playback]) -> str:
-    """What is shown: one run, or the same one under two patterns."""
+    """Return the heading: one run, or the same one under two patterns."""
     first = recordings[0]
     what = pattern_name(first) if len(recordings) == 1 else "The same run under two patterns"
     delay = first.scenario.link.delay_s

@@ -1,4 +1,4 @@
-"""Which pictures of a run are wanted: checked before the run, written after it."""
+"""Requested pictures of a run: checked before the run, written after it."""
 
 from __future__ import annotations
 
@@ -77,12 +77,12 @@ class Wanted:
 
     @property
     def any(self) -> bool:
-        """Whether there is anything to draw."""
+        """True if anything is to be drawn."""
         return any(path is not None for path in (self.video, self.still, self.strip))
 
     @property
     def is_plain_still(self) -> bool:
-        """Whether one drawing is asked for, of no moment and no camera in particular."""
+        """True if one drawing is requested, without a particular moment or camera."""
         others = (self.video, self.strip, self.at, self.camera)
         return self.still is not None and all(other is None for other in others)
 

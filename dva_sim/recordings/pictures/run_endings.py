@@ -1,4 +1,4 @@
-"""How runs ended, in a few words each: when all was confirmed, and how far ahead one of two was."""
+"""Outcomes of runs in a few words: when all was confirmed, and how far ahead one run was."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SAME = 0.05  # a shorter lead is none, as times are told [s]
 
 
 class RunVerdict(NamedTuple):
-    """How a run ended.
+    """Outcome of a run.
 
     Attributes:
         time: From when on that is so [s].
@@ -37,7 +37,7 @@ class RunVerdict(NamedTuple):
 
 
 def verdicts(runs: Sequence[Playback]) -> list[RunVerdict]:
-    """How each run ended; of two, the one that was ahead says by how much."""
+    """Return the outcome of each run; of two, the earlier one says by how much."""
     found = [_verdict(run) for run in runs]
     if len(found) != 2 or not all(verdict.text for verdict in found):
         return found
@@ -52,7 +52,7 @@ def decided_at(found: Sequence[RunVerdict]) -> float | None:
 
 
 def story(runs: Sequence[Playback]) -> list[str]:
-    """How runs under several patterns ended, a line for each."""
+    """Describe the outcomes of runs under several patterns, one line each."""
     names = [pattern_name(run) for run in runs]
     width = max(map(len, names))
     return [f"{name:<{width}}  {v.told}" for name, v in zip(names, verdicts(runs), strict=True)]
@@ -75,7 +75,7 @@ def _lead(own: float, other: float) -> float:
 
 
 def _verdict(run: Playback) -> RunVerdict:
-    """How a run ended, by itself."""
+    """Return the outcome of a run by itself."""
     right = [
         ending.outcome == ("refuted" if incident.false_alarm else "confirmed")
         for incident, ending in zip(run.incidents, run.endings, strict=False)
@@ -96,7 +96,7 @@ def _verdict(run: Playback) -> RunVerdict:
 
 
 def _of_one(run: Playback, good: bool) -> str:
-    """How the only event of a run ended."""
+    """Describe the outcome of the only event of a run."""
     ((outcome, time),) = run.endings
     if math.isinf(time):
         never = "reported" if outcome == "undetected" else "confirmed"

@@ -139,12 +139,12 @@ class _Sheet:
 
 
 def _stands_out(artist: Artist) -> bool:
-    """Whether a part of the site lies above hazards: walls, doors, names."""
+    """Return True if a part of the site is drawn above hazards: walls, doors, names."""
     return artist.get_zorder() > LAYER and not isinstance(artist, Axis | Spine)
 
 
 def _colour_of(verdict: RunVerdict) -> str:
-    """Of the box in which a run's end is told."""
+    """Return the colour of the box with a run's outcome."""
     if not verdict.good:
         return style.FAILED
     return style.BEHIND if verdict.ahead < 0 else style.AHEAD

@@ -86,5 +86,5 @@ def _sheet(recordings: Sequence[Playback], times: Sequence[float], columns: int)
 
 
 def _outlook(verdict: RunVerdict) -> str | None:
-    """What is told of a run that goes on while another one is done."""
+    """Describe a run that is still in progress when another one is done."""
     return f"still under way, {verdict.text}" if verdict.text else None
