@@ -441,11 +441,11 @@ class AgentDevice:
         """Tell the DVA how an order stands."""
         self.ask(self.dva, m.OrderProgress(event_id, state))
 
-    def publish(self, topic: str, body: m.Body) -> None:
-        """Publish a message to whoever has subscribed."""
+    def publish(self, topic: str, body: m.Body, to: str | None = None) -> None:
+        """Publish a message to all subscribers; its header names the DVA, or who it is for."""
         if self.silent or self.withdrawn:
             return
-        data = encode(self.outbox.message(self.dva, body, self.clock.now))
+        data = encode(self.outbox.message(to or self.dva, body, self.clock.now))
         self.network.publish(self.id_tag, topic, data, len(data))
 
     @property

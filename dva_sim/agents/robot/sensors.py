@@ -137,7 +137,7 @@ class SensorSubscriptions:
             return
         body = m.SensorValue(sensor, values, port.unit, self._tick_of(now))
         try:
-            self._device.publish(sensor_topic(sensor, subscriber), body)
+            self._device.publish(sensor_topic(sensor, subscriber), body, to=subscriber)
         except ProtocolError:
             self._device.recorder.counters["sensor values that no message holds"] += 1
 
