@@ -61,7 +61,8 @@ class WaitingHabits(Sparse):
         least_m: Shortest move worth a wait.
         let_go: Pace, as a share of the limits, that it takes the robot to have had when it changes
             to moving and waiting.
-        better: Share of the expected time below which it changes to the other way of steering.
+        driven: Delay of what goes on by itself against that of aimed movements at which a person
+            has the same unease.
     """
 
     settled_s: Annotated[float, Assumed(0.1, 1.0, "from one fixation to a careful second look")] = (
@@ -80,9 +81,64 @@ class WaitingHabits(Sparse):
     faces_rad: Annotated[float, Assumed(0.05, 0.25, "from 3 to 15 degrees off")] = 0.1
     least_m: Annotated[float, Assumed(0.05, 0.3, "from a hand's width to half a robot")] = 0.1
     let_go: Annotated[float, Assumed(0.1, 0.6, "from creeping to well under way")] = 0.25
-    better: Annotated[
-        float, Assumed(0.6, 1.0, "from a clear gain to any gain: habits are not changed for less")
-    ] = 0.8
+    driven: Annotated[
+        float, Assumed(1.0, 8.0, "a robot on its way may be left to it for a while")
+    ] = 4.0
+
+
+class CorrectingHabits(Sparse):
+    """How a person corrects the course of a vehicle.
+
+    Attributes:
+        evidence_rad: Sum of the error of the turn rate over time at which a correction begins.
+        grows_s: Time for which a correction grows.
+        unnoticed: Share of the last correction below which an error is no evidence.
+    """
+
+    evidence_rad: Annotated[
+        float,
+        Assumed(0.0005, 0.005, "what larger errors save in time, from 6 to 60 ms at 1 to 2 deg"),
+    ] = 0.0012
+    grows_s: Annotated[
+        float,
+        Assumed(0.15, 0.5, "quartiles of a car's first corrections, with the hand's lag or not"),
+    ] = 0.25
+    unnoticed: Annotated[float, Assumed(0.1, 0.4, "Weber fractions of motion and place")] = 0.3
+
+
+class AimingHabits(Sparse):
+    """How a person makes aimed movements; some of these are fitted, see the validation.
+
+    Attributes:
+        shortest_s: Duration of the shortest movement.
+        per_bit_s: Time more for each bit of its difficulty.
+        close_enough: Share of the tolerance within which nothing is corrected.
+        careful: Share of the tolerance within which it must expect to be before it presses, unless
+            in a hurry.
+        finest_m: Tolerance below which nobody aims more finely.
+        doubt: Usual miss of a movement that is not seen yet, as a share of its way.
+        settles: Time from the end of a movement to a press, in time constants of the hand.
+        ruffled: Share by which each movement that failed makes the delay feel longer.
+        misjudges: Standard deviation of the judged delay, as a share of it.
+        recalls_s: Time in which such a misjudgement changes.
+        practice: Power of the number of the trial by which a person becomes quicker.
+    """
+
+    shortest_s: Annotated[float, Assumed(0.05, 0.3, "from a flick to a refractory time")] = 0.08
+    per_bit_s: Annotated[float, Assumed(0.04, 0.15, "slopes of Fitts' law without corrections")] = (
+        0.05
+    )
+    close_enough: Annotated[float, Assumed(0.3, 1.0, "from near the centre to anywhere inside")] = (
+        0.6
+    )
+    careful: Annotated[float, Assumed(0.5, 1.0, "from near the centre to anywhere inside")] = 0.8
+    finest_m: Annotated[float, Assumed(0.0005, 0.004, "from a pixel to a few millimetres")] = 0.002
+    doubt: Annotated[float, Assumed(0.05, 0.4, "misses of a first movement, 5 to 20 %")] = 0.1
+    settles: Annotated[float, Assumed(0.5, 2.0, "from a click on the run to one at rest")] = 1.0
+    ruffled: Annotated[float, Assumed(0.0, 1.0, "from no notice to at once")] = 0.5
+    misjudges: Annotated[float, Assumed(0.05, 0.4, "Weber fractions of judged times")] = 0.2
+    recalls_s: Annotated[float, Assumed(0.2, 3.0, "from one movement to several")] = 0.7
+    practice: Annotated[float, Assumed(0.05, 0.3, "power laws of practice")] = 0.1
 
 
 class DelayHabits(Sparse):
@@ -90,14 +146,20 @@ class DelayHabits(Sparse):
 
     Attributes:
         first_guess_s: Delay that it expects before having seen any.
+        usual_s: Delay of the machines that it uses every day.
         remembers_s: Time for which it remembers what it did.
         fades_in_s: Time in which evidence loses its weight by a factor of e.
         firmness: Misfit that stands against each second of change [1/s].
         most_misfit: Highest misfit of one look.
         speed_scale_mps: Difference of speeds that counts one.
         turn_scale_rad_s: Difference of turn rates that counts one.
+        noticed: Share of the limits by which a motion must change to be noticed.
+        effects: Number of effects from which the period is judged.
     """
 
+    usual_s: Annotated[
+        float, Assumed(0.03, 0.15, "from a fast computer to a slow one, mouse to picture")
+    ] = 0.1
     first_guess_s: Annotated[
         float, Assumed(0.25, 1.5, "from a game over a good link to a bad video call")
     ] = 0.6
@@ -111,6 +173,8 @@ class DelayHabits(Sparse):
     most_misfit: Annotated[float, Assumed(0.25, 1.0, "a factor of two either way")] = 0.5
     speed_scale_mps: Annotated[float, Assumed(0.25, 1.0, "a factor of two either way")] = 0.5
     turn_scale_rad_s: Annotated[float, Assumed(0.5, 2.0, "a factor of two either way")] = 1.0
+    noticed: Annotated[float, Assumed(0.1, 0.5, "smaller changes are hard to tell")] = 0.25
+    effects: Annotated[int, Assumed(4, 16, "what is remembered of the last minute")] = 8
 
 
 class CloseQuarterHabits(Sparse):
@@ -179,6 +243,7 @@ class LookingHabits(Sparse):
 
     Attributes:
         half_seen_rad: Angle filled by what looks half like what it is.
+        hurried: Share of the criterion that is enough in a hurry.
         discount: Power of the contrast by which unclear evidence is discounted, beside the
             half power of its noise.
         leans_from: Share of the criterion from which on it is half convinced.
@@ -192,6 +257,9 @@ class LookingHabits(Sparse):
     half_seen_rad: Annotated[
         float, Assumed(0.015, 0.06, "a factor of two either way: 9 to 36 cm from 6 m away")
     ] = 0.03
+    hurried: Annotated[
+        float, Assumed(0.4, 0.9, "from a third of the usual errors to hardly more of them")
+    ] = 0.65
     discount: Annotated[
         float, Assumed(0.5, 1.5, "from as rare errors in smoke as without to many more")
     ] = 1.0
@@ -211,13 +279,15 @@ class AttentionHabits(Sparse):
     """Dividing attention among the pictures of several robots.
 
     Attributes:
-        glance_s: Time for which it looks at a robot that only drives.
+        glance_s: Time for which it looks at a robot that only drives, median.
+        glance_spread: Standard deviation of the logarithm of that.
         reconsiders_s: Time between two decisions which screen to look at.
     """
 
     glance_s: Annotated[
-        float, Assumed(1.0, 12.0, "from a few fixations to the medians seen with two robots")
-    ] = 3.0
+        float, Assumed(3.0, 14.0, "from a few fixations to the third quartile with two vehicles")
+    ] = 9.0
+    glance_spread: Annotated[float, Assumed(0.5, 1.1, "0.84 with two vehicles")] = 0.84
     reconsiders_s: Annotated[float, Assumed(0.2, 2.0, "from one fixation to several")] = 0.5
 
 
@@ -244,6 +314,8 @@ class OperatorHabits(Sparse):
 
     steering: SteeringHabits = Field(default_factory=SteeringHabits)
     waiting: WaitingHabits = Field(default_factory=WaitingHabits)
+    correcting: CorrectingHabits = Field(default_factory=CorrectingHabits)
+    aiming: AimingHabits = Field(default_factory=AimingHabits)
     delay: DelayHabits = Field(default_factory=DelayHabits)
     close_quarters: CloseQuarterHabits = Field(default_factory=CloseQuarterHabits)
     stuck: StuckHabits = Field(default_factory=StuckHabits)

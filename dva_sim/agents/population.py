@@ -63,6 +63,11 @@ class Population(Config):
             there.
         patience_s: How long it goes on without getting anywhere, or without seeing anything.
         switch_s: From turning to another robot's picture to understanding it.
+        tempo: Time that everything takes which the person does itself, against the median person.
+        waits_from_s: Delay at which it watches for half of the delay before it acts again.
+        compensates: Share of a delay beyond the usual one for which it takes what it asked for to
+            be under way still; at most all of it.
+        tracks: Gain x delay of following something all the time, where no place is aimed at.
         habits: Numbers that are the same for all persons, none of them measured.
     """
 
@@ -107,6 +112,18 @@ class Population(Config):
     switch_s: Annotated[
         Trait, Assumed(0.5, 3.0, "costs of switching a task, with a scene to be understood")
     ] = Trait(median=1.0, spread=0.3)
+    tempo: Annotated[Trait, Assumed(0.8, 1.25, "what a hurry, or care, makes of it")] = Trait(
+        median=1.0, spread=0.3
+    )
+    waits_from_s: Annotated[
+        Trait, Assumed(0.4, 1.5, "hardly anybody waits at 0.2 s, nearly all at 2 to 3 s")
+    ] = Trait(median=0.8, spread=0.4)
+    compensates: Annotated[
+        Trait, Assumed(0.2, 0.8, "adaptation to late pictures is partial: Foulkes, Miall 2000")
+    ] = Trait(median=0.5, spread=0.3)
+    tracks: Annotated[
+        Trait, Assumed(0.7, 1.2, "phase margins of 20 to 50 deg in following: McRuer, Jex 1967")
+    ] = Trait(median=0.95, spread=0.15)
     habits: OperatorHabits = Field(default_factory=OperatorHabits)
 
     @property
@@ -169,7 +186,16 @@ class Person:
     search: float
     patience: float
     switch: float
+    tempo: float
+    waits_from: float
+    compensates: float
+    tracks: float
     habits: OperatorHabits = field(default_factory=OperatorHabits, kw_only=True)
+
+    @property
+    def usual_delay(self) -> float:
+        """The delay that it is used to: its own, and that of machines it uses every day [s]."""
+        return self.perceptual_delay + self.hand_lag + self.habits.delay.usual_s
 
 
 def draw_person(population: Population, seed: int, index: int) -> Person:
@@ -177,6 +203,7 @@ def draw_person(population: Population, seed: int, index: int) -> Person:
     rng = Streams(seed).fresh(f"person-{index}")
     drawn = {name: trait.draw(rng) for name, trait in population.traits.items()}
     drawn["pace"] = min(1.0, drawn["pace"])
+    drawn["compensates"] = min(1.0, drawn["compensates"])
     return Person(*drawn.values(), habits=population.habits)
 
 

@@ -7,6 +7,7 @@ that is done. While none waits, the person glances from one screen to the next.
 References:
     T. B. Sheridan: Telerobotics, Automation, and Human Supervisory Control. MIT Press, 1992.
     D. R. Olsen, S. B. Wood: Fan-out: measuring human control of multiple robots. CHI 2004.
+    M. Colley et al., CHI 2025, doi:10.1145/3706598.3713476: looks at one of two vehicles.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import numpy as np
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.habits import AttentionHabits
 from dva_sim.agents.observation import Observation, make_observation, topic_in
-from dva_sim.agents.operator.delay_estimation import DelayEstimate
+from dva_sim.agents.operator.delay_estimation import DelayEstimate, Timing
 from dva_sim.agents.operator.strategies import Driver, Reach, Truth
 from dva_sim.agents.population import Person
 from dva_sim.agents.tilt import Phone
@@ -31,6 +32,8 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.network.patterns import Pattern
 from dva_sim.worlds.planning import Planner
+
+OCCASIONS = 0.35  # source: Claypool et al. 2017: spread of the log of a person's times
 
 
 class Screen(Protocol):
@@ -84,10 +87,14 @@ class Attention:
         clock: The run's clock.
         switch: What it takes to find into another screen [s].
         habits: Of the person.
+        luck: Standard normal numbers, one for each look.
     """
 
-    def __init__(self, clock: Clock, switch: float, habits: AttentionHabits) -> None:
+    def __init__(
+        self, clock: Clock, switch: float, habits: AttentionHabits, luck: Iterator[float]
+    ) -> None:
         self._clock, self._switch, self._habits = clock, switch, habits
+        self._luck, self._glance = luck, habits.glance_s
         self._screens: list[Screen] = []
         self._seen: list[float] = []
         self._current: Screen | None = None
@@ -130,8 +137,8 @@ class Attention:
     def _best(self) -> int:
         current = None if self._current is None else self._screens.index(self._current)
         waits = [screen.waits_since for screen in self._screens]
-        now, glance = self._clock.now, self._habits.glance_s
-        return next_screen(now, current, self._since, waits, self._seen, glance)
+        now = self._clock.now
+        return next_screen(now, current, self._since, waits, self._seen, self._glance)
 
     def _turn_to(self, place: int) -> None:
         self._screens[place].log.turned_to += 1
@@ -139,6 +146,8 @@ class Attention:
 
     def _look(self, screen: Screen, since: float) -> None:
         self._current, self._since = screen, since
+        habits = self._habits
+        self._glance = habits.glance_s * math.exp(habits.glance_spread * next(self._luck))
         screen.log.looks_since = since
 
     def _turn_away(self) -> None:
@@ -216,9 +225,20 @@ class DriverSeat:
         self.planner, self.setup = planner, setup
         habits = person.habits
         self.delay = DelayEstimate(0.0, habits.delay.first_guess_s, habits=habits.delay)
-        self.attention = Attention(device.clock, person.switch, habits.attention)
+        glances = _normals(looks("glances"), block=64)
+        self.attention = Attention(device.clock, person.switch, habits.attention, glances)
+        self._readings = _normals(looks("readings"), block=64)
+        self._timing = Timing(habits.aiming, looks("timing"))
         self._errors = _normals(rng)
         self._looks, self._times = looks, Counter[int]()
+
+    def judged_delay(self, now: float) -> float:
+        """The delay as the person judges it at a moment [s]."""
+        return self._timing.judged(self.delay.value, self.person.usual_delay, now)
+
+    def reading(self) -> float:
+        """From an order on the screen to acting on it, this time [s]."""
+        return self.person.reading * math.exp(OCCASIONS * next(self._readings))
 
     def luck(self, event: int) -> Iterator[float]:
         """Standard normal numbers for one more time at an event, whatever the pattern."""

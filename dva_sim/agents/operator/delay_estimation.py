@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.agents.habits import DelayHabits
+from dva_sim.agents.habits import AimingHabits, DelayHabits
 
 Floats = NDArray[np.float64]
 
@@ -121,3 +123,180 @@ class DelayEstimate:
         since, (one, other) = slice(self._filled, due), self._intent
         self._asked[0, since], self._asked[1, since] = one, other
         self._filled = due
+
+
+class PeriodEstimate:
+    """How often commands get through, as a person sees it: by when what it asks for takes effect.
+
+    A change that is asked for takes effect after the delay and the time until the next command
+    gets through. So times to effects differ by up to the period, a move lasts by up to a period
+    longer or shorter than asked, and one that is shorter than the period may have no effect at
+    all. The person weighs periods by how well they explain what it saw (Bayes' rule over a few
+    dozen periods, forgetting slowly), and counts on one that is as long as most of these.
+
+    Args:
+        habits: Changes that are noticed, and how many effects are remembered.
+
+    Attributes:
+        value: The period that is counted on; 0 until anything was seen of it [s].
+    """
+
+    MEMORY = 4.0  # design: what was seen fades over so many times as many effects
+    SHORTEST, LONGEST, STEPS = 0.1, 10.0, 40  # design: periods that are weighed [s]
+    SURE = 0.95  # design: share of the weight below the period that is counted on
+    BLURRED = 0.3  # design: times that differ by less are the same to a person [s]
+    SURPRISE = 0.02  # design: likelihood of what a period does not explain
+    EARLY, LATE = 0.5, 1.5  # design: of the delay; seen sooner, it was asked for before
+
+    def __init__(self, habits: DelayHabits) -> None:
+        self._habits = habits
+        self._lags: deque[float] = deque(maxlen=habits.effects)
+        # Two, since a turn that was lost is no less lost if the robot went on.
+        self._channels = _Channel(), _Channel()
+        self._delay = 0.0
+        self._periods = np.geomspace(self.SHORTEST, self.LONGEST, self.STEPS)
+        self._prior = -np.log(self._periods)  # links are usually quick
+        self._weights = np.zeros(self.STEPS)
+        self.value = 0.0
+
+    def intend(self, now: float, one: float, other: float) -> None:
+        """The person asks for this from `now` [s] on, as shares of the limits."""
+        for channel, asked in zip(self._channels, (one, other), strict=True):
+            lost = channel.ask(now, self._delay, asks=abs(asked) >= self._habits.noticed)
+            if lost > 0.0:
+                self._weigh(1.0 - np.minimum(lost / self._periods, 1.0))
+
+    def see(self, now: float, one: float, other: float, delay: float) -> float:
+        """The picture shows this motion, as shares of the limits: the period as it is taken now.
+
+        Args:
+            now: [s]
+            one: Of the motion; see `intend`.
+            other: Likewise.
+            delay: What the person takes the whole delay to be [s].
+        """
+        self._delay = delay
+        for channel, motion in zip(self._channels, (one, other), strict=True):
+            moves, move = abs(motion) >= 0.5 * self._habits.noticed, channel.move
+            channel.moves = moves
+            if move is not None:
+                channel.move = self._learn(move, now, delay, moves=moves)
+        return self.value
+
+    def _learn(self, move: _Move, now: float, delay: float, *, moves: bool) -> _Move | None:
+        """What a picture says of a move: the move, as long as more of it is to be seen."""
+        if move.seen is None and moves:
+            lag = now - move.begun
+            if lag < self.EARLY * delay:
+                return None
+            if self._lags:
+                self._came(abs(lag - min(self._lags)))
+            self._lags.append(lag)
+            return move._replace(seen=now)
+        if move.ended is None:
+            return move
+        asked = move.ended - move.begun
+        if move.seen is not None and not moves:
+            self._lasted(now - move.seen, asked)
+            return None
+        if move.seen is None and now > move.ended + self.LATE * delay + self.value:
+            self._weigh(1.0 - np.minimum(asked / self._periods, 1.0))
+            return None
+        return move
+
+    def _came(self, later: float) -> None:
+        """An effect came so much later than the soonest [s]: evenly, by up to a period."""
+        span = self._periods + self.BLURRED
+        self._weigh(np.where(later <= span, self.BLURRED / span, 0.0))
+
+    def _lasted(self, lasts: float, asked: float) -> None:
+        """A move lasted so long [s]: the whole periods just below what was asked, or just above."""
+        whole, part = np.divmod(asked / self._periods, 1.0)
+        less, more = (
+            np.exp(-0.5 * ((lasts - count * self._periods) / self.BLURRED) ** 2)
+            for count in (whole, whole + 1.0)
+        )
+        self._weigh((1.0 - part) * less + part * more)
+
+    def _weigh(self, likelihoods: Floats) -> None:
+        """Weigh the periods by what was seen."""
+        self._weights *= 1.0 - 1.0 / (self.MEMORY * self._habits.effects)
+        self._weights += np.log(np.maximum(likelihoods, self.SURPRISE))
+        shares = np.cumsum(np.exp(self._prior + self._weights - self._weights.max()))
+        place = int(np.searchsorted(shares, self.SURE * shares[-1]))
+        self.value = float(self._periods[min(place, self.STEPS - 1)])
+
+
+class _Move(NamedTuple):
+    """A motion that began at rest, and what was seen of it [s]."""
+
+    begun: float
+    ended: float | None = None
+    seen: float | None = None
+
+
+class _Channel:
+    """Speed or turn rate: whether it is asked for and seen, and the move that is followed.
+
+    Attributes:
+        move: That is followed; None: what began when something else still moved tells nothing.
+        moves: Whether motion is seen.
+    """
+
+    def __init__(self) -> None:
+        self.move: _Move | None = None
+        self._asks = self.moves = False
+
+    def ask(self, now: float, delay: float, *, asks: bool) -> float:
+        """Motion is asked for from `now` [s] on, or rest: the length of a move that was lost [s].
+
+        Args:
+            now: [s]
+            delay: After which the last move should have been seen [s].
+            asks: Whether motion is asked for.
+        """
+        lost, last = 0.0, self.move
+        if asks and not self._asks:
+            if last is not None and last.ended is not None and last.seen is None:
+                lost = last.ended - last.begun if now >= last.ended + delay else 0.0
+            known = last is None or lost > 0.0
+            self.move = _Move(now) if known and not self.moves else None
+        elif self._asks and not asks and self.move is not None:
+            self.move = self.move._replace(ended=now)
+        self._asks = asks
+        return lost
+
+
+class Timing:
+    """How a person misjudges a time: by a share of it that changes from moment to moment.
+
+    Args:
+        habits: How much, and how fast that changes.
+        rng: Luck of it.
+
+    References:
+        J. Gibbon: Scalar expectancy theory and Weber's law in animal timing. Psychological Review
+        84 (1977): the standard deviation of a judged time is a share of it.
+    """
+
+    def __init__(self, habits: AimingHabits, rng: np.random.Generator) -> None:
+        self._habits, self._rng = habits, rng
+        self._last, self._state = 0.0, float(rng.normal())
+
+    def at(self, now: float) -> float:
+        """What a time is taken to be at `now` [s], as a multiple of it."""
+        keep = math.exp(-max(now - self._last, 0.0) / self._habits.recalls_s)
+        fresh = math.sqrt(1.0 - keep * keep)
+        self._state = keep * self._state + fresh * float(self._rng.normal())
+        self._last = now
+        return math.exp(self._habits.misjudges * self._state)
+
+    def judged(self, delay: float, usual: float, now: float) -> float:
+        """What a delay is taken to be at a moment [s]: only what is new of it is misjudged.
+
+        Args:
+            delay: As it was learnt [s].
+            usual: To which the person is used [s].
+            now: [s]
+        """
+        return delay + max(delay - usual, 0.0) * (self.at(now) - 1.0)

@@ -232,7 +232,7 @@ class Teleoperation(Work):
         route = self._consider(judged)
         if route is not None:
             # The guess is made when a frame is perceived, so it holds the perceptual delay.
-            drive, delay = self._strategy.drive, seat.delay.value
+            drive, delay = self._strategy.drive, seat.judged_delay(now)
             view = make_view(now, judged, delay)
             usual = lambda keep: drive(route, view, keep)  # noqa: E731
             self._intend(self._steer(judged, delay, usual), judged.tick)

@@ -165,7 +165,7 @@ class OperatorAgent:
         drive = self.works[order.device] = self._kind(self._seat, order, log, self._finish)
         robot = device.label_of(order.device)
         device.tell(f"shall {drive.wish} {robot} to event {order.event_id}", "order")
-        device.clock.call_after(self._seat.person.reading, self._ask_permission, drive)
+        device.clock.call_after(self._seat.reading(), self._ask_permission, drive)
 
     def _ask_permission(self, drive: Work) -> None:
         if drive.over:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
-from dva_sim.agents.operator.delay_estimation import DelayEstimate
+from dva_sim.agents.operator.delay_estimation import DelayEstimate, Timing
 from dva_sim.agents.operator.strategies import (
     load_strategy,
 )
@@ -18,11 +19,13 @@ from dva_sim.simulation.task.pointing import CursorTrial, Goal
 from dva_sim.simulation.task.recorded_delays import RecordedDelays
 from dva_sim.simulation.task.scenario import TaskScenario
 from dva_sim.simulation.task.target_goals import PointGoal, ReachGoal, TrackGoal, Wandering
-from dva_sim.simulation.task.tasks import HeadingStep, Pointing, ReachTask, Tracking, Tunnel
+from dva_sim.simulation.task.tasks import HeadingStep, Pointing, ReachTask, Task, Tracking, Tunnel
 from dva_sim.simulation.task.trial import Seat, Trace
 from dva_sim.simulation.task.tunnel_goal import TunnelGoal
 
 Row = dict[str, Any]
+PRACTISED = 5  # trials after which a person has its own tempo; assumed
+REACTIONS = 0.23  # standard deviation of the log of a person's reactions; Goodridge et al. 2022
 PAUSE = 1.0  # between two trials, nothing is done [s]
 FINE = 0.01  # resolution at which the delay is learnt from a cursor [s]
 
@@ -69,20 +72,55 @@ def seat_of(scenario: TaskScenario) -> Seat:
     delay = DelayEstimate(0.0, guess, habits=habits)
     if not scenario.is_driven:
         pace = max(first for first, _ in scenario.task.conditions())  # in a second; assumed
-        delay = DelayEstimate(0.0, guess, FINE, (pace, pace), habits)
-    return Seat(person, load_strategy(operator.strategy, operator.options), delay)
+        delay = DelayEstimate(0.0, person.perceptual_delay, FINE, (pace, pace), habits)
+    seat = Seat(person, load_strategy(operator.strategy, operator.options), delay)
+    seat.felt = 0.0 if scenario.is_driven else person.hand_lag
+    return seat
+
+
+def practised(person: Person, number: int) -> Person:
+    """The same person after so many trials: quicker by the power law of practice.
+
+    References:
+        A. Newell, P. S. Rosenbloom: Mechanisms of skill acquisition and the law of practice, 1981.
+    """
+    share = ((number + 1) / PRACTISED) ** -person.habits.aiming.practice
+    return replace(person, tempo=person.tempo * share)
+
+
+def in_a_moment(person: Person, alertness: float, task: Task) -> Person:
+    """The same person as it happens to be in one trial, quicker or slower to react.
+
+    Where nothing but the first reaction is of interest, what it sees varies as well.
+
+    Args:
+        person: Who it is.
+        alertness: A standard normal number.
+        task: What is done.
+    """
+    share = math.exp(REACTIONS * alertness)
+    sees = share if isinstance(task, HeadingStep) else 1.0
+    return replace(
+        person,
+        perceptual_delay=person.perceptual_delay * sees,
+        reaction=person.reaction * share,
+    )
 
 
 def _play(
     scenario: TaskScenario, seed: int, drawn: int | None, recording: RecordedDelays | None = None
 ) -> Iterator[tuple[Row, Trace]]:
     seat, operator = seat_of(scenario), scenario.operator
+    who = seat.person
     conditions = list(scenario.task.conditions())
     plan = [(conditions[0], -1)] * scenario.practice
     plan += [(c, n) for n, c in enumerate(conditions) for _ in range(scenario.trials)]
     for number, (condition, cell) in enumerate(plan):
         kept = number - scenario.practice
         streams = Streams(derive_seed(seed, operator.population_seed, operator.person, number))
+        alertness = float(streams.fresh("reaction").normal())
+        seat.person = in_a_moment(practised(who, number), alertness, scenario.task)
+        seat.timing = Timing(who.habits.aiming, streams.fresh("timing"))
         trial = _trial(scenario, seat, condition, number, streams)
         if recording is not None and isinstance(trial, DriveTrial):
             trial.replay(recording, streams.fresh("recording").uniform(0.0, recording.length))
@@ -104,7 +142,8 @@ def _trial(
     number: int,
     streams: Streams,
 ) -> CursorTrial | DriveTrial:
-    task, reaction = scenario.task, seat.person.reaction
+    task = scenario.task
+    reaction = seat.person.reaction
     if isinstance(task, HeadingStep):
         return HeadingTrial(scenario, seat, condition, streams, reaction, leftwards=number % 2 == 0)
     if scenario.is_driven:
@@ -143,6 +182,7 @@ def _row(
     names = NAMES[trial.scenario.task.kind]
     return {
         "number": kept,
+        "since_start": kept + 1 + trial.scenario.practice,
         "condition": cell,
         **dict(zip(names, condition, strict=True)),
         **goal,
@@ -151,7 +191,7 @@ def _row(
         "waits": trial.waits.count,
         "wait_s": trial.waits.seconds,
         "move_and_wait_share": trial.move_and_wait_share,
-        "delay_felt_s": trial.seat.delay.value,
+        "delay_felt_s": trial.seat.delay.value + trial.seat.felt,
         **trial.device.farthest(),
         "plugin_failures": trial.failures + trial.device.failures,
     }

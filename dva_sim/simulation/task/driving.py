@@ -33,7 +33,9 @@ RUN_OUT = 5.0  # the way goes on so far beyond the finish, so that nobody stops 
 ENDLESS = 1000.0  # length of a way that nobody comes to the end of [m]
 MACHINE_LOOK = 1.0  # of a machine that steers by itself [m]; assumed
 CONE = 0.1  # radius in a picture [m]
+REACHED = 0.9  # share of its first peak at which it has grown: the rest is noise; assumed
 ONSET = 0.1  # share of its first peak at which a correction has begun; assumed
+SMOOTHED = 0.15  # over so long steering is averaged before it is looked at [s]; assumed
 CONE_STEP = 0.1  # between corners of the line that stands for a slalom [m]
 Points = list[Pair]
 
@@ -134,13 +136,21 @@ class DriveTrial(Trial[Observation]):
     @override
     def decide(self, driver: Driver, seen: Observation, now: float) -> None:
         delay = self.seat.delay
-        delay.see(now, seen.speed, seen.turn_rate)
+        delay.see(now, *self._motion(seen))
         if isinstance(driver, Oracle):
             intent = driver.drive(self._seen_way, Truth(seen), 0.0)
         else:
             intent = driver.drive(self._seen_way, View(now, self._judged(seen), delay.value), 0.0)
-        self.device.aim(intent.speed / self._top[0], intent.turn_rate / self._top[1])
+        self.device.aim(self._held(intent), intent.turn_rate / self._top[1])
         self.intended(now, intent.speed, intent.turn_rate)
+
+    def _held(self, intent: Intent) -> float:
+        """Deflection for the speed, as a share of a full one."""
+        return intent.speed / self._top[0]
+
+    def _motion(self, seen: Observation) -> Pair:
+        """What the person learns the delay from [m/s, rad/s]."""
+        return seen.speed, seen.turn_rate
 
     def _judged(self, seen: Observation) -> Observation:
         """As the person takes it: place and heading with an error."""
@@ -221,6 +231,17 @@ class HeadingTrial(DriveTrial):
         self.plant.speed = self._top[0]
         self._steered: list[float] = []  # against the error, step by step
 
+    def intended(self, now: float, one: float, other: float) -> None:
+        """The machine holds the speed: it tells nothing of the delay."""
+        super().intended(now, 0.0, other)
+
+    def _held(self, intent: Intent) -> float:
+        """Nothing: only steering is in the hand, so only that is noisy."""
+        return 0.0
+
+    def _motion(self, seen: Observation) -> Pair:
+        return 0.0, seen.turn_rate
+
     def commanded(self, dt: float) -> Pair:
         """The machine holds the speed."""
         _, turn = super().commanded(dt)
@@ -234,8 +255,11 @@ class HeadingTrial(DriveTrial):
 
     def row(self) -> dict[str, Any]:
         """When the first correction began, and how long it grew [s]."""
-        peak = movement_laws.first_peak(self._steered)
-        begun = movement_laws.first_above(self._steered, ONSET * self._steered[peak])
+        over = round(SMOOTHED / self.STEP)
+        steered = np.convolve(self._steered, np.full(over, 1.0 / over), "same").tolist()
+        peak = movement_laws.first_peak(steered)
+        peak = movement_laws.first_above(steered, REACHED * steered[peak])
+        begun = movement_laws.first_above(steered, ONSET * steered[peak])
         return {
             **super().row(),
             "reaction_s": begun * self.STEP,

@@ -141,7 +141,7 @@ def first_peak(values: Sequence[float], falls: float = 0.1) -> int:
     """Where the first rise of a signal ends: before it falls by a share of its height.
 
     Args:
-        values: Of the signal.
+        values: Of the signal, smoothed.
         falls: Share; a shorter fall is noise.
     """
     best, height = 0, 0.0

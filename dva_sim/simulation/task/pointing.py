@@ -24,15 +24,16 @@ from dva_sim.agents.operator.strategies import (
     PointView,
     Reach,
     Sighting,
+    Strategy,
     Truth,
     Velocity,
 )
-from dva_sim.agents.route_following import Route
+from dva_sim.agents.route_following import SHORTEST, Route
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.task.devices import make_device
 from dva_sim.simulation.task.plants import Cursor, Pair
 from dva_sim.simulation.task.scenario import TaskScenario
-from dva_sim.simulation.task.tasks import ReachTask
+from dva_sim.simulation.task.tasks import Pointing, ReachTask
 from dva_sim.simulation.task.trial import Seat, Trace, Trial
 
 MOVED = 1e-3  # a cursor that has gone so far has moved [m]; assumed
@@ -98,9 +99,11 @@ class Goal(ABC):
             velocity, and nobody leads it.
         path: The middle line, if the cursor is led along one.
         tolerance: Half the width of the target or tunnel [m].
+        edge: Distance from the start at which a moving target turns back [m].
     """
 
     flat = False
+    edge = math.inf
     stands = True
     path: Route | None = None
     tolerance: float
@@ -125,8 +128,13 @@ class Goal(ABC):
     def draw(self, trace: Trace) -> None:
         """Add the geometry to a picture."""
 
-    def notice(self, now: float, seen: Sighting, delay: float) -> None:  # noqa: B027
-        """The person has seen a frame; some goals are reached by what it then does."""
+    def press(self, now: float) -> None:  # noqa: B027
+        """The person presses the button; some goals are reached by that."""
+
+    @property
+    def awaits_press(self) -> bool:
+        """Whether pressing the button does anything now."""
+        return False
 
     def pushed(self, now: float, wanted: Velocity) -> Velocity:
         """The command with what disturbs the cursor [m/s]."""
@@ -174,6 +182,8 @@ class CursorTrial(Trial[Sighting]):
         self.goal = goal
         self._motion, self._summed = Motion(), summed_over(scenario.frames.rate_hz)
         self.moved_at: float | None = None
+        self._eye = Strategy(seat.person, reach)
+        self._felt, self._aimed, self._felt_at = (0.0, 0.0), (0.0, 0.0), 0.0
 
     def sight(self) -> Sighting:
         """Velocities are those of the last frames; see `Motion`."""
@@ -194,18 +204,36 @@ class CursorTrial(Trial[Sighting]):
             target_vx=tvx,
             target_vy=tvy,
             tolerance=self.goal.tolerance,
+            edge=self.goal.edge,
         )
 
     @override
     def decide(self, driver: Driver, seen: Sighting, now: float) -> None:
-        delay = self.seat.delay
-        delay.see(now, seen.vx, seen.vy, self._summed)
-        vx, vy = self._ask(driver, seen, now, delay.value)
-        self.goal.notice(self.now, seen, delay.value)
+        self.seat.delay.see(now, seen.vx, seen.vy, self._summed)
+        judged = self.seat.judged_delay(now)
+        vx, vy = self._ask(driver, seen, now, judged)
+        if self.goal.awaits_press and self._presses(driver, PointView(now, seen, judged)):
+            self.goal.press(self.now)
         if self.goal.flat:
             vy = 0.0
         self.device.aim(vx, vy)
         self.intended(now, vx, vy)
+
+    def intended(self, now: float, one: float, other: float) -> None:
+        """See `Trial`; the delay is learnt from the hand, which is felt to follow with its lag."""
+        super().intended(now, one, other)
+        (x, y), (ax, ay) = self._felt, self._aimed
+        keep = math.exp(-max(now - self._felt_at, 0.0) / max(self.seat.person.hand_lag, SHORTEST))
+        self._felt = x, y = ax + (x - ax) * keep, ay + (y - ay) * keep
+        self._felt_at, self._aimed = now, (one, other)
+        self.seat.delay.intend(now, x, y)
+
+    def _presses(self, driver: Driver, view: PointView) -> bool:
+        task = self.scenario.task
+        hurried = isinstance(task, Pointing) and task.errors == "free"
+        if isinstance(driver, Oracle):
+            return Strategy.presses(self._eye, view, hurried)
+        return driver.presses(view, hurried)
 
     def _ask(self, driver: Driver, seen: Sighting, now: float, delay: float) -> Velocity:
         path = self.goal.path

@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 from typing_extensions import override
 
-from dva_sim.agents.operator.strategies import (
-    Sighting,
-    Velocity,
-)
+from dva_sim.agents.operator.strategies import Velocity
 from dva_sim.simulation.task import movement_laws
 from dva_sim.simulation.task.plants import Cursor, Pair
 from dva_sim.simulation.task.pointing import CursorTrial, Goal
@@ -51,6 +48,7 @@ class Wandering:
     ) -> None:
         self.amplitude, self.axis = amplitude, (math.cos(angle), math.sin(angle))
         self._task, self._rng, self._angle = task, rng, angle
+        self.edge = self.LIMIT * amplitude
         self._time, self._place = 0.0, (amplitude * self.axis[0], amplitude * self.axis[1])
         self._velocity, self._turns_at = (0.0, 0.0), math.inf
         if task.target_mps:
@@ -68,7 +66,7 @@ class Wandering:
 
     def _go_on(self, now: float) -> None:
         """Go straight on until `now` [s], and back from the limit."""
-        passed, limit = now - self._time, self.LIMIT * self.amplitude
+        passed, limit = now - self._time, self.edge
         (x, y), (vx, vy) = self._place, self._velocity
         x, y = x + vx * passed, y + vy * passed
         vx = -abs(vx) if x > limit else abs(vx) if x < -limit else vx
@@ -99,7 +97,7 @@ class PointGoal(ToTarget):
         self._task, self._way, self.width = task, way, width
         self.amplitude = way.amplitude
         self.flat, self.stands = task.axes == 1, not task.target_mps
-        self.tolerance = 0.5 * (width - task.cursor_m)
+        self.tolerance, self.edge = 0.5 * (width - task.cursor_m), way.edge
         self._press, self._pressed_at, self._presses = press, math.inf, 0
         self._inside_since: float | None = None
         self._selected = False
@@ -110,15 +108,15 @@ class PointGoal(ToTarget):
     def target(self, now: float) -> Pair:
         return self._way.at(now)
 
-    def notice(self, now: float, seen: Sighting, delay: float) -> None:
-        """Who sees the cursor inside, so slow that it stays inside, presses."""
-        if self._task.selection != "click" or self._pressed_at < math.inf:
-            return
-        off = math.hypot(seen.x - seen.target_x, seen.y - seen.target_y)
-        drift = math.hypot(seen.vx - seen.target_vx, seen.vy - seen.target_vy)
-        if off + drift * delay <= self.tolerance:
-            self._pressed_at = now + self._press
-            self._presses += 1
+    def press(self, now: float) -> None:
+        """See `Goal`."""
+        self._pressed_at = now + self._press
+        self._presses += 1
+
+    @property
+    def awaits_press(self) -> bool:
+        """See `Goal`."""
+        return self._task.selection == "click" and self._pressed_at == math.inf
 
     @override
     def check(self, now: float, x: float, y: float, dt: float) -> bool:

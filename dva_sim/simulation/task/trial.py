@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
-from dva_sim.agents.operator.delay_estimation import DelayEstimate
+from dva_sim.agents.operator.delay_estimation import DelayEstimate, Timing
 from dva_sim.agents.operator.strategies import Driver, Oracle, Reach, Strategy
 from dva_sim.agents.population import Person
 from dva_sim.kernel.streams import Streams
@@ -43,12 +43,22 @@ class Seat:
         strategy: Makes the strategy for what is steered.
         delay: What the person has learnt of the delay, on a clock that runs on over trials.
         begun: When this trial begins, on that clock [s].
+        timing: How the delay is misjudged.
+        felt: Part of the delay that is felt in the hand, and not learnt from the picture [s].
     """
 
     person: Person
     strategy: Callable[[Person, Reach], Driver]
     delay: DelayEstimate
     begun: float = 0.0
+    timing: Timing | None = None
+    felt: float = 0.0
+
+    def judged_delay(self, now: float) -> float:
+        """The delay as it is judged at a moment [s]: what is new of it is misjudged."""
+        value = self.delay.value + self.felt
+        usual = self.person.usual_delay
+        return value if self.timing is None else self.timing.judged(value, usual, now)
 
 
 @dataclass

@@ -282,7 +282,9 @@ def _individuals(cells: Cells) -> Values:
         slopes.append(slope)
         left = float(np.var(y - cut - slope * x, ddof=2))
         errors.append(left / float(((x - x.mean()) ** 2).sum()))
-        numbers = np.log1p(np.concatenate([np.arange(len(logs)) for logs in own.values()]))
+        numbers = np.log(
+            np.concatenate([cells[c]["since_start"][cells[c].person == person] for c in own])
+        )
         practice.append(np.polyfit(numbers, rest[-1] - rest[-1].mean(), 1)[0])
     freedom = sum(len(w) - 1 for w in within)
     inside = float((np.concatenate(within) ** 2).sum()) / freedom

@@ -30,6 +30,10 @@ LEG_S = 40.0  # that a vehicle drives; published: 39.7 s
 GOES_ON_S = 10.0  # without being looked at, on the way that it was given; assumed
 TICK_S = 0.1
 TRIALS = 60  # of each choice
+HALF_CLEAR, SHORTER = (
+    0.25,
+    1.0 / 3.0,
+)  # half as clear as an event, a third of its criterion; assumed
 PICTURE_S = 1.0 / 30.0
 ANGLE, PASSED_S = 0.05, 4.0  # of an item beside the way of a searcher, and how long; assumed
 ITEMS = 20
@@ -93,11 +97,11 @@ def choices(person: Person, cell: str, seed: int) -> list[Row]:
     luck = _normals(seed)
     rows = []
     for _ in range(TRIALS):
-        right, wrong = (_evidence(person, cell, luck) for _ in range(2))
+        right, wrong = (_evidence(person, cell, luck, SHORTER) for _ in range(2))
         looked = 0.0
         while not (right.sure or wrong.sure):
-            right.weigh(PICTURE_S, 1.0, 1.0)
-            wrong.weigh(PICTURE_S, 0.0, 1.0)
+            right.weigh(PICTURE_S, 0.5 + HALF_CLEAR, 1.0)
+            wrong.weigh(PICTURE_S, 0.5 - HALF_CLEAR, 1.0)
             looked += PICTURE_S
         rows.append(
             {"time_s": person.reaction + looked, "error": float(wrong.sure and not right.sure)}
@@ -130,11 +134,13 @@ def walkers(person: Person, cell: str, seed: int) -> list[Row]:
 
 
 def _attention(clock: Clock, person: Person, seed: int) -> Attention:
-    return Attention(clock, person.switch, person.habits.attention)
+    return Attention(clock, person.switch, person.habits.attention, _normals(seed))
 
 
-def _evidence(person: Person, cell: str, luck: Iterator[float]) -> Evidence:
-    return Evidence(person.sensitivity, person.confirm_look, luck, person.habits.looking)
+def _evidence(person: Person, cell: str, luck: Iterator[float], share: float = 1.0) -> Evidence:
+    looking = person.habits.looking
+    share *= looking.hurried if cell == "speed" else 1.0
+    return Evidence(person.sensitivity, share * person.confirm_look, luck, looking)
 
 
 def _normals(seed: int) -> Iterator[float]:

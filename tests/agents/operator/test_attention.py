@@ -1,8 +1,9 @@
 """Which of several robots one person looks at."""
 
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import pairwise, repeat
 
+import numpy as np
 import pytest
 
 from dva_sim.agents.habits import AttentionHabits
@@ -10,7 +11,7 @@ from dva_sim.agents.operator.attention import Attention, next_screen
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import DriveLog
 
-HABITS = AttentionHabits()
+HABITS = AttentionHabits(glance_s=3.0)
 
 
 @dataclass
@@ -46,7 +47,7 @@ def test_while_none_waits_each_is_glanced_at_in_turn(glance):
 
 def test_of_a_single_robot_everything_is_seen_at_once_and_all_the_time():
     clock, robot = Clock(), Robot()
-    attention = Attention(clock, 1.0, HABITS)
+    attention = Attention(clock, 1.0, HABITS, repeat(0.0))
     attention.begin(robot)
     assert attention.looks_at(robot)
     clock.run(60.0)
@@ -59,7 +60,7 @@ def test_of_a_single_robot_everything_is_seen_at_once_and_all_the_time():
 def test_two_robots_share_the_eyes_and_each_turn_costs_the_switch():
     """3 s of looking, up to 0.5 s until the person moves on, 1 s to find into the other."""
     clock, one, two = Clock(), Robot(), Robot()
-    attention = Attention(clock, 1.0, HABITS)
+    attention = Attention(clock, 1.0, HABITS, repeat(0.0))
     attention.begin(one)
     attention.begin(two)
     clock.run(90.0)
@@ -75,9 +76,22 @@ def test_two_robots_share_the_eyes_and_each_turn_costs_the_switch():
     assert gaps == pytest.approx([1.0] * len(gaps))
 
 
+def test_looks_differ_as_the_spread_of_their_logarithm_says():
+    clock, robots = Clock(), (Robot(), Robot())
+    habits = AttentionHabits(reconsiders_s=0.01)
+    luck = iter(np.random.default_rng(1).normal(size=2000).tolist())
+    attention = Attention(clock, 1.0, habits, luck)
+    for robot in robots:
+        attention.begin(robot)
+    clock.run(6000.0)
+    looks = np.log([until - since for r in robots for since, until in r.log.attended])
+    assert np.exp(np.median(looks)) == pytest.approx(habits.glance_s, rel=0.1)
+    assert looks.std() == pytest.approx(habits.glance_spread, rel=0.1)
+
+
 def test_who_waits_for_a_judgement_keeps_the_eyes_until_it_is_over():
     clock, one, two = Clock(), Robot(), Robot()
-    attention = Attention(clock, 1.0, HABITS)
+    attention = Attention(clock, 1.0, HABITS, repeat(0.0))
     attention.begin(one)
     attention.begin(two)
     clock.run(0.2)
@@ -93,7 +107,7 @@ def test_who_waits_for_a_judgement_keeps_the_eyes_until_it_is_over():
 
 def test_the_last_screen_that_goes_off_leaves_nothing_to_look_at():
     clock, one, two = Clock(), Robot(), Robot()
-    attention = Attention(clock, 1.0, HABITS)
+    attention = Attention(clock, 1.0, HABITS, repeat(0.0))
     attention.begin(one)
     attention.end(one)
     attention.end(one)  # said twice

@@ -81,7 +81,8 @@ def test_more_frames_a_second_do_not_slow_who_has_no_noise():
 
 def test_the_delay_felt_is_neither_longer_nor_shorter_for_the_time_over_which_motion_is_summed():
     who, frames = {"traits": EXACT}, {"rate_hz": 100}
-    scenario = build(pointing(operator=who, practice=5, frames=frames), {"link.down.delay_s": 0.4})
+    late = {"link.down.delay_s": 0.4, "task.selection": "dwell"}
+    scenario = build(pointing(operator=who, practice=5, frames=frames), late)
     person = seat_of(scenario).person
     whole = 0.4 + person.perceptual_delay + person.hand_lag
     assert play(scenario, 1)[0]["delay_felt_s"] == pytest.approx(whole, abs=0.03)

@@ -1,8 +1,26 @@
-"""Steers in a closed loop, or moves and waits: whichever the person expects to be done sooner.
+"""A person with reasons: one way of acting under delay, from none to as long as anybody waits.
+
+It acts in samples, by what it has learnt of the delay and of how often commands get through, and
+the longer the delay, the more of it is spent watching before acting again.
+
+- A cursor is moved by `Submovements`: aimed, predicted, corrected. Where there is nothing to come
+  to but an error to be kept small all the time, it is the crossover law (`cursor.towards`).
+- A robot is steered by corrections of the turn rate. One begins once the evidence for an error has
+  added up, grows for a fixed time, and only then another one can begin. Speed and look-ahead are
+  those of `Pursuit`, for the delay with half of a correction and half of the period added.
+- It moves and waits where it likes that better: by the times that it expects, and by an unease at
+  a late picture that is the person's own. Hardly anybody does under a short delay and nearly
+  everybody under a long one, and persons differ: in the mean over them there is no step.
+- A command that is given for less time than the period at which commands get through may be lost,
+  so no move is shorter than the period that the person has seen; `PeriodEstimate`.
 
 References:
     W. R. Ferrell: Remote manipulation with transmission delay. IEEE Trans. Human Factors in
     Electronics HFE-6 (1965): with long delays people come to move and wait by themselves.
+    G. Markkula et al.: Sustained sensorimotor control as intermittent decisions about prediction
+    errors. Biological Cybernetics 112 (2018): evidence that adds up, corrections of a fixed form.
+    C. M. Goodridge et al.: J. Exp. Psychology: Human Perception and Performance 48(1) (2022): how
+    long that takes for small errors of the heading, and how long a correction grows.
 """
 
 from __future__ import annotations
@@ -10,41 +28,82 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from dva_sim.agents.operator.delay_estimation import PeriodEstimate
 from dva_sim.agents.operator.strategies.base import PathView, PointView, Strategy
-from dva_sim.agents.operator.strategies.cursor import Velocity, fastest
+from dva_sim.agents.operator.strategies.cursor import Velocity, fastest, towards
 from dva_sim.agents.operator.strategies.move_and_wait import MoveAndWait
 from dva_sim.agents.operator.strategies.pursuit import Pursuit
+from dva_sim.agents.operator.strategies.submovements import Submovements
 from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import SHORTEST, Intent, Reach, Route, View, gain_at
 
 GAP = 1.0  # design: a longer time between two frames is not counted as driving [s]
+AGAIN = 0.8  # design: of the liking at which one began to wait, below which one stops that
+
+
+class Corrections:
+    """Turn rates as a person gives them: in corrections that grow, one after the other.
+
+    Args:
+        person: Tempo and habits.
+    """
+
+    def __init__(self, person: Person) -> None:
+        self._habits, self._tempo = person.habits.correcting, person.tempo
+        self._from = self._to = 0.0
+        self._begun, self._last = -math.inf, math.inf
+        self._evidence = self._errors = self._gathered = 0.0
+
+    @property
+    def late(self) -> float:
+        """How much later the middle of a correction is than its beginning [s]."""
+        return 0.5 * self._habits.grows_s * self._tempo
+
+    def steer(self, now: float, wanted: float) -> float:
+        """The turn rate to ask for, if so much is wanted now [rad/s]."""
+        grows = self._habits.grows_s * self._tempo
+        share = (now - self._begun) / grows
+        if share >= 1.0:
+            self._from = self._to
+            passed = max(now - self._last, 0.0)
+            error = wanted - self._to
+            hardly = self._habits.unnoticed * abs(self._to)
+            self._evidence += math.copysign(max(abs(error) - hardly, 0.0), error) * passed
+            self._errors += error * passed
+            self._gathered += passed
+            if abs(self._evidence) >= self._habits.evidence_rad:
+                self._to += self._errors / self._gathered
+                self._evidence = self._errors = self._gathered = share = 0.0
+                self._begun = now
+        self._last = now
+        share = min(share, 1.0)
+        return self._from + (self._to - self._from) * share * share * (3.0 - 2.0 * share)
 
 
 class Adaptive(Strategy):
-    """Compares two expected times to finish, and changes to what is clearly better.
-
-    Expected are, from the delay as estimated and the way left: in a closed loop, the pace that the
-    delay allows, or the time that the person's gain takes to close an error; moving and waiting,
-    full pace and a wait after each move. Moving and waiting begins with a wait, unless nothing was
-    asked for yet that one could wait for, and is left only between two moves.
+    """Acts in samples under short delays, and moves and waits under long ones.
 
     Args:
         person: Who steers.
         reach: Limits of what is steered.
-        closed: Strategy of the closed loop; left out: `Pursuit`.
+        closed: Strategy that takes the place of its own under short delays.
 
     Attributes:
         using: What is used now: `closed` or `move_and_wait`.
         switches: How often that has changed.
+        period: What it has seen of how often commands get through.
     """
 
     uses = "closed"
 
     def __init__(self, person: Person, reach: Reach, closed: Strategy | None = None) -> None:
         super().__init__(person, reach)
-        self._habits, self._farthest = person.habits.waiting, person.habits.steering.farthest_look_m
-        self._closed = closed or Pursuit(person, reach)
+        self._closed, self._habits = closed, person.habits.waiting
+        self._pursuit = closed or Pursuit(person, reach)
         self._moves = MoveAndWait(person, reach)
+        self._aims = Submovements(person, self._most)
+        self._corrections = Corrections(person)
+        self.period = PeriodEstimate(person.habits.delay)
         self.using = "closed"
         self.switches = 0
         self._times = {"closed": 0.0, "move_and_wait": 0.0}
@@ -53,32 +112,39 @@ class Adaptive(Strategy):
 
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
         """See `Strategy`."""
-        seen, person = view.seen, self.person
-        left = route.remaining(seen.x, seen.y) - stop_before
-        left = left if left > 0.0 else 0.0
-        delay = view.delay if view.delay > SHORTEST else SHORTEST
-        pace, most = person.caution * self._farthest / delay, self._most
-        pace = pace if pace < most else most
-        turn = 1.0 / gain_at(person.crossover, person.margin, delay)
-        count = left / self._moves.trusted
-        waiting = self._waiting(left, count if count > 1.0 else 1.0, delay)
-        self._choose(view.now, left / pace + turn, waiting)
-        wanted = self._now.drive(route, view, stop_before)
+        seen, reach = view.seen, self.reach
+        motion = seen.speed / reach.speed, seen.turn_rate / max(reach.turn_rate, 1e-3)
+        self._moves.period = self.period.see(view.now, *motion, view.delay)
+        left = max(route.remaining(seen.x, seen.y) - stop_before, 0.0)
+        self._choose(view.now, self._prefers_to_wait(left, view.delay))
+        if self.using != "closed":
+            wanted = self._moves.drive(route, view, stop_before)
+        elif self._closed is not None:
+            wanted = self._closed.drive(route, view, stop_before)
+        else:
+            late = 0.5 * self.period.value + self._corrections.late
+            wanted = self._pursuit.drive(route, view._replace(delay=view.delay + late), stop_before)
+            turn = self._corrections.steer(view.now, wanted.turn_rate)
+            wanted = Intent(wanted.speed, turn)
         self._has_asked = self._has_asked or any(wanted)
+        self.period.intend(
+            view.now, wanted.speed / reach.speed, wanted.turn_rate / max(reach.turn_rate, 1e-3)
+        )
         return wanted
 
     def point(self, view: PointView) -> Velocity:
         """See `Strategy`."""
-        seen, person = view.seen, self.person
-        away = math.hypot(seen.target_x - seen.x, seen.target_y - seen.y)
-        folds = math.log(max(away / max(seen.tolerance, SHORTEST), 1.0))
-        gain = gain_at(person.pointing, person.margin, view.delay)
-        count = max(folds / -math.log(max(person.motor_noise, SHORTEST)), 1.0)
-        waiting = self._waiting(away, count, view.delay)
-        self._choose(view.now, folds / gain + away / self._most, waiting)
-        wanted = self._now.point(view)
-        self._has_asked = self._has_asked or any(wanted)
-        return wanted
+        if self._closed is not None:
+            return self._closed.point(view)
+        if view.seen.tolerance <= 0.0:  # no place to come to: it follows all the time
+            return towards(view.seen, view.delay, self.person, self._most, self.person.tracks)
+        return self._aims.point(view.now, view.seen, view.delay)
+
+    def presses(self, view: PointView, hurried: bool) -> bool:
+        """See `Strategy`."""
+        if self._closed is not None:
+            return self._closed.presses(view, hurried)
+        return self._aims.presses(view.now, view.seen, view.delay, hurried)
 
     def follow(self, view: PathView) -> Velocity:
         """See `Strategy`."""
@@ -86,38 +152,57 @@ class Adaptive(Strategy):
         left = view.path.remaining(seen.x, seen.y)
         pace = fastest(seen.tolerance, view.delay, person, self._most)
         count = max(left / self._moves.trusted_in(seen.tolerance), 1.0)
-        self._choose(view.now, left / pace, self._waiting(left, count, view.delay))
+        ratio = (left / pace) / self._waiting(left, count, view.delay)
+        self._choose(view.now, ratio * self._unease(view.delay))
         wanted = self._now.follow(view)
         self._has_asked = self._has_asked or any(wanted)
         return wanted
 
     def workload(self) -> Mapping[str, float]:
         """How often the person waited, and how much of the time it moved and waited."""
+        if self._aims.total:
+            return {"waits": 0.0, "move_and_wait_share": self._aims.waited / self._aims.total}
         total = sum(self._times.values())
         share = self._times["move_and_wait"] / total if total else 0.0
         return {**self._moves.workload(), "move_and_wait_share": share}
 
     @property
     def _now(self) -> Strategy:
-        return self._closed if self.using == "closed" else self._moves
+        return self._pursuit if self.using == "closed" else self._moves
+
+    def _prefers_to_wait(self, left: float, delay: float) -> float:
+        """How much more the person likes to move and wait, with so much way left [m]; 1: as much.
+
+        It is the ratio of the two times that it expects, times its unease at the delay. In a closed
+        loop that is the pace that the delay allows, and the time to close an error.
+        """
+        person, delay = self.person, max(delay, SHORTEST)
+        farthest = person.habits.steering.farthest_look_m
+        pace = min(person.caution * farthest / delay, self._most)
+        closed = left / pace + 1.0 / gain_at(person.crossover, person.margin, delay)
+        waiting = self._waiting(left, max(left / self._moves.trusted, 1.0), delay)
+        return closed / waiting * self._unease(delay)
+
+    def _unease(self, delay: float) -> float:
+        """By what factor a person takes acting on such a late picture to be worse than it is."""
+        return delay / (self._habits.driven * self.person.waits_from)
 
     def _waiting(self, way: float, moves: float, delay: float) -> float:
         """Expected time to finish by so many moves, each with its wait [s]."""
-        a_move = self._habits.shortest_s + self._moves.moves.usual_wait(delay)
-        return (way if way > 0.0 else 0.0) / self._most + moves * a_move
+        a_move = max(self._habits.shortest_s, self.period.value)
+        return way / self._most + moves * (a_move + self._moves.moves.usual_wait(delay))
 
-    def _choose(self, now: float, closed: float, waiting: float) -> None:
-        """Change the way of steering if the other one takes clearly less time [s]."""
+    def _choose(self, now: float, liking: float) -> None:
+        """Move and wait if the person likes that better; change back only between two moves."""
         if self._last is not None:
             gap = now - self._last
             self._times[self.using] += gap if gap < GAP else GAP
         self._last = now
-        better = self._habits.better
-        if self.using == "closed" and waiting < better * closed:
+        if self.using == "closed" and liking > 1.0:
             self.using = "move_and_wait"
             if self._has_asked:
                 self._moves.halt(now)
             self.switches += 1
-        elif self.using != "closed" and closed < better * waiting and self._moves.moves.rests:
+        elif self.using != "closed" and liking < AGAIN and self._moves.moves.rests:
             self.using = "closed"
             self.switches += 1

@@ -8,6 +8,7 @@ whatever it answers (`GuardedStrategy`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import ClassVar, NamedTuple
 
@@ -84,6 +85,18 @@ class Strategy:
         If a strategy says nothing else: as fast as the delay allows, as `cursor.through` has it.
         """
         return through(view.path, view.seen, view.delay, self.person, self._most)
+
+    def presses(self, view: PointView, hurried: bool) -> bool:
+        """Press the button: the cursor is seen on its target, and will stay there.
+
+        Args:
+            view: What is known.
+            hurried: A press beside the target costs nothing.
+        """
+        seen = view.seen
+        off = math.hypot(seen.x - seen.target_x, seen.y - seen.target_y)
+        drift = math.hypot(seen.vx - seen.target_vx, seen.vy - seen.target_vy)
+        return off + drift * view.delay <= seen.tolerance
 
     def workload(self) -> Mapping[str, float]:
         """What this way of steering asked of the person so far, by name with its unit."""

@@ -35,6 +35,7 @@ class Sighting(NamedTuple):
         target_vx: [m/s]
         target_vy: [m/s]
         tolerance: Half the width of the target, or of the tunnel here [m].
+        edge: Distance from the start, along x or y, at which a moving target turns back [m].
     """
 
     tick: int
@@ -47,9 +48,12 @@ class Sighting(NamedTuple):
     target_vx: float
     target_vy: float
     tolerance: float
+    edge: float = math.inf
 
 
-def towards(seen: Sighting, delay: float, person: Person, most: float) -> Velocity:
+def towards(
+    seen: Sighting, delay: float, person: Person, most: float, margin: float | None = None
+) -> Velocity:
     """Crossover law: the velocity of the target as seen, and the error times a gain.
 
     Args:
@@ -57,8 +61,9 @@ def towards(seen: Sighting, delay: float, person: Person, most: float) -> Veloci
         delay: What the person takes the whole delay to be [s].
         person: Knows its gain and margin.
         most: As fast as the person cares to go [m/s].
+        margin: Gain x delay; left out: the person's usual one.
     """
-    gain = gain_at(person.pointing, person.margin, delay)
+    gain = gain_at(person.pointing, margin or person.margin, delay)
     vx = seen.target_vx + gain * (seen.target_x - seen.x)
     vy = seen.target_vy + gain * (seen.target_y - seen.y)
     return slowed(vx, vy, most)

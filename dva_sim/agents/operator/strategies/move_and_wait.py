@@ -19,6 +19,7 @@ from dva_sim.agents.operator.strategies.cursor import Velocity
 from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import SHORTEST, Ahead, Intent, Reach, Route, View
 
+WHOLE = 0.2  # design: a move that is longer than whole periods by less of one is made faster
 Pair = tuple[float, float]
 MovePart = tuple[float, float, float]  # how long [s], and two wanted values
 
@@ -142,6 +143,7 @@ class MoveAndWait(Strategy):
 
     Attributes:
         trusted: How far a robot is driven in one move [m].
+        period: Between two commands that get through, as far as it is known [s].
     """
 
     def __init__(self, person: Person, reach: Reach) -> None:
@@ -150,6 +152,8 @@ class MoveAndWait(Strategy):
         self._in_curves = person.habits.steering.in_curves
         self.moves = Moves(person.reaction, habits)
         self.trusted = habits.off_way_m / max(person.heading_error + person.motor_noise, SHORTEST)
+
+    period = 0.0
 
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
         """See `Strategy`."""
@@ -246,8 +250,14 @@ class MoveAndWait(Strategy):
         return self.moves.begin(now, [(lasts, vx, vy)], self._flow(vx, vy))
 
     def _lasting(self, way: float, most: float) -> float:
-        """How long a move, or a turn, takes at most so fast [s]."""
-        return max(way / most, self._habits.shortest_s)
+        """How long a move, or a turn, takes at most so fast [s].
+
+        What is shorter than the period may be lost, and a command lasts for whole periods.
+        """
+        lasts, period = max(way / most, self._habits.shortest_s), self.period
+        if period <= self._habits.shortest_s:
+            return lasts
+        return period * max(1.0, math.ceil(lasts / period - WHOLE))
 
     def _pace(self, speed: float, turn_rate: float) -> float:
         """How fast a robot moves, driving or turning, as a share of what it can."""

@@ -1,0 +1,183 @@
+"""How a person moves a cursor: one aimed movement after the other, by an imperfect prediction.
+
+A movement is planned as a whole, from where the cursor will be once everything that was asked for
+has happened, and then runs its course; meanwhile nothing is corrected. What has not been seen yet
+is known from what was asked for and from how late the person takes it to show. It misjudges that
+time by a share of it, from one moment to the next, and its hand is noisy: so movements end beside
+the target, the farther the longer the delay, and are corrected. Under a longer delay there are
+more corrections, and each takes longer to be seen: what delay costs grows faster than the delay.
+
+After a movement a person may watch before it makes another one. How long is a share of the delay
+that is small where the delay is short against the person's own patience, and all of it where it
+is long: then it moves and waits.
+
+References:
+    D. E. Meyer et al.: Optimality in human motor performance: ideal control of rapid aimed
+    movements. Psychological Review 95 (1988): primary and corrective submovements.
+    P. Gawthrop et al.: Intermittent control: a computational theory of human control. Biological
+    Cybernetics 104 (2011): sampled, with a prediction, and a refractory time.
+    T. Flash, N. Hogan: The coordination of arm movements. J. Neuroscience 5 (1985): the course.
+    J. Gibbon: Scalar expectancy theory and Weber's law in animal timing. Psychological Review 84
+    (1977): times are misjudged by a share of them.
+    W. R. Ferrell: Remote manipulation with transmission delay. IEEE Trans. Human Factors in
+    Electronics HFE-6 (1965): with long delays people come to move and wait by themselves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity, slowed
+from dva_sim.agents.population import Person
+
+OFTEN = 1.0 / 60.0  # design: time between two frames before two were seen [s]
+FAILS = 0.5  # design: a movement has failed if more than this share of its way is left
+STEEPNESS = 4.0  # design: of the share of the delay that is waited, so that it rises smoothly
+
+
+def waited_share(delay: float, patience: float) -> float:
+    """Share of the delay that a person watches before it acts again.
+
+    Args:
+        delay: [s]
+        patience: Delay at which it is a half [s].
+    """
+    return 1.0 / (1.0 + math.pow(patience / max(delay, OFTEN), STEEPNESS))
+
+
+def _course(share: float) -> float:
+    """Part of the way of a movement with the least jerk, by the part of its time."""
+    share = min(max(share, 0.0), 1.0)
+    return share**3 * (10.0 - 15.0 * share + 6.0 * share * share)
+
+
+def foreseen(place: float, velocity: float, ahead: float, edge: float) -> tuple[float, float]:
+    """Place [m] and velocity [m/s] of a target along one axis after a time: it turns at the edge.
+
+    Args:
+        place: [m]
+        velocity: [m/s]
+        ahead: [s]
+        edge: [m]
+    """
+    place += velocity * ahead
+    if abs(place) > edge and place * velocity > 0.0:
+        return math.copysign(2.0 * edge, place) - place, -velocity
+    return place, velocity
+
+
+class Submovements:
+    """The movements of one person in one trial.
+
+    Args:
+        person: Tempo, patience, habits.
+        most: Highest speed [m/s].
+
+    Attributes:
+        off: Distance of the predicted cursor from the predicted target [m].
+        waited: Time spent watching before the next movement [s].
+        total: Time since the first frame [s].
+    """
+
+    def __init__(self, person: Person, most: float) -> None:
+        self._person, self._habits, self._most = person, person.habits.aiming, most
+        self._usual = person.usual_delay
+        self._asked: deque[tuple[float, float, float]] = deque()
+        self._begun, self._lasts = -math.inf, 0.0
+        self._way: Velocity = (0.0, 0.0)
+        self._last: float | None = None
+        self._gap = OFTEN
+        self._pressed, self._failures = -math.inf, 0
+        self.off, self._unseen = math.inf, 0.0
+        self.waited = self.total = 0.0
+
+    def point(self, now: float, seen: Sighting, delay: float) -> Velocity:
+        """Velocity to ask for [m/s]; a target that moves is followed all the time."""
+        if self._last is not None:
+            passed = now - self._last
+            self.total += passed
+            if self._begun + self._lasts < now < self._begun + self._lasts + self._watches(delay):
+                self.waited += passed
+            self._gap += 0.2 * (min(now - self._last, 0.5) - self._gap)
+        self._last = now
+        counted = self._counted(delay)
+        tx, target_vx = foreseen(seen.target_x, seen.target_vx, counted, seen.edge)
+        ty, target_vy = foreseen(seen.target_y, seen.target_vy, counted, seen.edge)
+        x, y = self._predicted(now, seen, counted)
+        dx, dy = tx - x, ty - y
+        self.off = math.hypot(dx, dy)
+        rests = self._begun + self._lasts + self._watches(delay)
+        if now >= rests - 1e-6 and self.off > self._habits.close_enough * seen.tolerance:
+            self._plan(now, dx, dy, seen.tolerance)
+        vx, vy = self._moving(now)
+        wanted = slowed(vx + target_vx, vy + target_vy, self._most)
+        self._asked.append((now, *wanted))
+        return wanted
+
+    def presses(self, now: float, seen: Sighting, delay: float, hurried: bool) -> bool:
+        """Press the button: the prediction is on the target, and so is the eye where it must be.
+
+        What has not been seen yet is trusted if a usual miss of that way is within the tolerance,
+        or if a press beside the target costs nothing.
+        """
+        person = self._person
+        settled = self._begun + self._lasts + self._habits.settles * person.tempo * person.hand_lag
+        if now < settled or now < self._pressed + delay + person.reaction:
+            return False
+        doubt = 0.0 if hurried else self._habits.doubt * self._unseen
+        if doubt > seen.tolerance:
+            if math.hypot(seen.target_x - seen.x, seen.target_y - seen.y) > seen.tolerance:
+                return False
+        elif self.off > (1.0 if hurried else self._habits.careful) * seen.tolerance:
+            return False
+        self._pressed = now
+        return True
+
+    def _counted(self, delay: float) -> float:
+        """For how long what was asked for is taken not to be seen yet [s]."""
+        new = max(delay - self._usual, 0.0)
+        return min(delay, self._usual) + self._person.compensates * new
+
+    def _watches(self, delay: float) -> float:
+        new = max(delay - self._usual, 0.0)
+        unease = new * (1.0 + self._habits.ruffled * self._failures)
+        return waited_share(unease, self._person.waits_from) * delay
+
+    def _plan(self, now: float, dx: float, dy: float, tolerance: float) -> None:
+        """A movement by so much; the target's own is added to it."""
+        habits, off = self._habits, math.hypot(dx, dy)
+        if off > FAILS * math.hypot(*self._way) > 0.0:
+            self._failures += 1
+        bits = math.log2(1.0 + off / (2.0 * max(tolerance, habits.finest_m)))
+        lasts = self._person.tempo * (habits.shortest_s + habits.per_bit_s * bits)
+        lasts = max(lasts, 1.9 * off / self._most)  # the least jerk is fastest at 1.9 of its mean
+        self._begun, self._lasts, self._way = now, lasts, (dx, dy)
+
+    def _moving(self, now: float) -> Velocity:
+        since = now - self._begun
+        if since >= self._lasts:
+            return 0.0, 0.0
+        share = (
+            _course((since + self._gap) / self._lasts) - _course(since / self._lasts)
+        ) / self._gap
+        return share * self._way[0], share * self._way[1]
+
+    def _predicted(self, now: float, seen: Sighting, counted: float) -> Velocity:
+        """The cursor [m] once everything that was asked for has happened.
+
+        The hand follows what is asked for with a lag that the person knows: what was asked for
+        longer ago than the rest of the delay is seen but for the share that the hand still lacks.
+        """
+        x, y, until, hand = seen.x, seen.y, now, self._person.hand_lag
+        dead = max(counted - hand, 0.0)
+        self._unseen = 0.0
+        asked = self._asked
+        while len(asked) > 1 and asked[1][0] < now - dead - 5.0 * hand:
+            asked.popleft()
+        for at, vx, vy in reversed(asked):
+            age = now - 0.5 * (at + until) - dead
+            lasts = (until - at) * (1.0 if age <= 0.0 else math.exp(-age / hand))
+            self._unseen += lasts * math.hypot(vx - seen.target_vx, vy - seen.target_vy)
+            x, y, until = x + vx * lasts, y + vy * lasts, at
+        return x, y
