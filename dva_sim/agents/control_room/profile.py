@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dva_sim.agents.population import Trait
 from dva_sim.kernel.assumed import Assumed
@@ -58,3 +58,17 @@ class DispatcherProfile(Config):
         Assumed(5.0, 60.0, "of the order of what call-takers need"),
     ] = Trait(median=12.0, spread=0.5)
     overrules: tuple[Overrule, ...] = ()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _spreads_stay(cls, data: Any) -> Any:
+        """A median that is given alone leaves the usual spread around it."""
+        if not isinstance(data, dict):
+            return data
+        usual = {name: cls.model_fields[name].default for name in ("acknowledge_s", "decide_s")}
+        alone = {
+            name: {"spread": trait.spread, **data[name]}
+            for name, trait in usual.items()
+            if isinstance(data.get(name), dict)
+        }
+        return {**data, **alone}

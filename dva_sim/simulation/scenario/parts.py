@@ -141,6 +141,15 @@ class GuardConfig(OmitsUnset):
         check_kinds(self.kind, self.count, "guard")
         return self
 
+    @model_validator(mode="after")
+    def _mobilisation_is_given_once(self) -> GuardConfig:
+        if self.mobilisation_s is not None and "mobilisation_s" in self.traits:
+            raise ValueError(
+                "guard.mobilisation_s and guard.traits.mobilisation_s set the same median: "
+                "give one of them"
+            )
+        return self
+
     @property
     def persons(self) -> tuple[int, ...]:
         """The numbers of the guards whom people play."""

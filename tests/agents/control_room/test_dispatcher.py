@@ -17,7 +17,10 @@ from dva_sim.simulation.full.stage import id_of
 from dva_sim.simulation.scenario import Scenario, build
 
 ROOM = id_of("control-room", 1)
-EXACT = {"acknowledge_s": {"median": 8.0}, "decide_s": {"median": 12.0}}
+EXACT = {
+    "acknowledge_s": {"median": 8.0, "spread": 0.0},
+    "decide_s": {"median": 12.0, "spread": 0.0},
+}
 ALARM = {"kind": "gas_leak", "at_s": 5.0, "room": "Workshop", "reported": True}
 TEAM = {"robot": {"count": 2}, "guard": {"count": 1}, "operator": {"count": 1}}
 
@@ -123,10 +126,16 @@ def test_who_may_only_look_is_refused_and_the_policy_goes_on():
 
 
 def test_too_slow_it_is_told_that_the_policy_was_first():
-    slow = scenario("ask_first", decide_s={"median": 70.0}, overrules=[{"sends": "guard"}])
+    slowly = {"median": 70.0, "spread": 0.0}
+    slow = scenario("ask_first", decide_s=slowly, overrules=[{"sends": "guard"}])
     recording = simulate(slow, seed=3)
     orders = [f for f in recording.facts if f.action == "assign" and f.code == m.OK]
     assert orders[0].role is None
     assert unnamed(orders[0].cause, "60 s") == []
     assert orders[0].time == pytest.approx(65.0, abs=1.1)
     assert run_row(recording)["unanswered"] == 1
+
+
+def test_a_median_that_is_given_alone_leaves_the_usual_spread():
+    person = scenario("ask_first", decide_s={"median": 70.0}).dispatch.person
+    assert (person.decide_s.median, person.decide_s.spread) == (70.0, 0.5)

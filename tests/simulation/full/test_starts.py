@@ -5,6 +5,7 @@ import re
 from typing import Any
 
 import pytest
+from helpers.wording import unnamed
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation import scenario as scenarios
@@ -123,3 +124,10 @@ def test_guards_get_ready_in_the_time_the_scenario_says_with_the_spread_of_their
     ]
     assert waits[1] - waits[0] == pytest.approx(89.0 * waits[1] / 90.0, rel=0.02)
     assert scenarios.guard_profile(late.scenario).mobilisation_s.spread == 0.45
+
+
+def test_a_mobilisation_that_is_given_twice_is_refused():
+    twice = {"count": 1, "mobilisation_s": 30.0, "traits": {"mobilisation_s": 60.0}}
+    with pytest.raises(ConfigError) as refused:
+        drill(guard=twice, **GUARD_ALONE)
+    assert unnamed(str(refused.value), "mobilisation_s", "traits") == []
