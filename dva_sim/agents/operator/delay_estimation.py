@@ -33,9 +33,10 @@ class DelayEstimate:
         scale: For each of the two channels, the difference that counts one, in its unit; left
             out: those of driving.
         habits: Of the person.
+        hand: Lag of the hand, which is felt: only the rest is learnt from the picture [s].
 
     Attributes:
-        value: The guess [s].
+        value: The guess of the whole delay, the hand's lag in it [s].
     """
 
     def __init__(
@@ -45,8 +46,10 @@ class DelayEstimate:
         step: float = STEP,
         scale: tuple[float, float] | None = None,
         habits: DelayHabits | None = None,
+        hand: float = 0.0,
     ) -> None:
         self._habits = habits = habits or DelayHabits()
+        self._hand = hand
         scale = scale or (habits.speed_scale_mps, habits.turn_scale_rad_s)
         self._start = self._next_look = start
         self._step, self._period = step, LOOK_STEPS * step
@@ -57,8 +60,8 @@ class DelayEstimate:
         self._weights = np.repeat([[1.0 / scale[0]], [1.0 / scale[1]]], len(self._lags), axis=1)
         self._offset = self._filled = 2 * len(self._lags)
         self._asked = np.zeros((2, 4 * len(self._lags)))
-        self._intent = 0.0, 0.0
-        self._misfit = habits.firmness * np.abs(self._lags - guess)
+        self._intent = self._felt = 0.0, 0.0
+        self._misfit = habits.firmness * np.abs(self._lags - (guess - hand))
         self.value = guess
 
     def intend(self, now: float, one: float, other: float) -> None:
@@ -99,7 +102,7 @@ class DelayEstimate:
         misfit = self._misfit
         misfit *= math.exp(-passed / fades_in)
         misfit += error[::-1]
-        self.value = float(self._lags[misfit.argmin()])
+        self.value = float(self._lags[misfit.argmin()]) + self._hand
 
     def rest(self) -> None:
         """Nothing is looked at for a while; that time stands for nothing seen."""
@@ -120,9 +123,16 @@ class DelayEstimate:
             return
         while due >= self._asked.shape[1]:
             self._asked = np.hstack([self._asked, np.zeros_like(self._asked)])
-        since, (one, other) = slice(self._filled, due), self._intent
-        self._asked[0, since], self._asked[1, since] = one, other
+        since, steps = slice(self._filled, due), due - self._filled
         self._filled = due
+        if not self._hand:
+            self._asked[0, since], self._asked[1, since] = self._intent
+            return
+        left = np.exp(-self._step / self._hand * np.arange(1, steps + 1))
+        for channel, (to, felt) in enumerate(zip(self._intent, self._felt, strict=True)):
+            self._asked[channel, since] = to + (felt - to) * left
+        one, other = self._asked[:, due - 1].tolist()
+        self._felt = one, other
 
 
 class PeriodEstimate:

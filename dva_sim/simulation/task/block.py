@@ -72,10 +72,8 @@ def seat_of(scenario: TaskScenario) -> Seat:
     delay = DelayEstimate(0.0, guess, habits=habits)
     if not scenario.is_driven:
         pace = max(first for first, _ in scenario.task.conditions())  # in a second; assumed
-        delay = DelayEstimate(0.0, person.perceptual_delay, FINE, (pace, pace), habits)
-    seat = Seat(person, load_strategy(operator.strategy, operator.options), delay)
-    seat.felt = 0.0 if scenario.is_driven else person.hand_lag
-    return seat
+        delay = DelayEstimate(0.0, guess, FINE, (pace, pace), habits, person.hand_lag)
+    return Seat(person, load_strategy(operator.strategy, operator.options), delay)
 
 
 def practised(person: Person, number: int) -> Person:
@@ -191,7 +189,7 @@ def _row(
         "waits": trial.waits.count,
         "wait_s": trial.waits.seconds,
         "move_and_wait_share": trial.move_and_wait_share,
-        "delay_felt_s": trial.seat.delay.value + trial.seat.felt,
+        "delay_felt_s": trial.seat.delay.value,
         **trial.device.farthest(),
         "plugin_failures": trial.failures + trial.device.failures,
     }

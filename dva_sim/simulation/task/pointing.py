@@ -28,7 +28,7 @@ from dva_sim.agents.operator.strategies import (
     Truth,
     Velocity,
 )
-from dva_sim.agents.route_following import SHORTEST, Route
+from dva_sim.agents.route_following import Route
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.task.devices import make_device
 from dva_sim.simulation.task.plants import Cursor, Pair
@@ -183,7 +183,6 @@ class CursorTrial(Trial[Sighting]):
         self._motion, self._summed = Motion(), summed_over(scenario.frames.rate_hz)
         self.moved_at: float | None = None
         self._eye = Strategy(seat.person, reach)
-        self._felt, self._aimed, self._felt_at = (0.0, 0.0), (0.0, 0.0), 0.0
 
     def sight(self) -> Sighting:
         """Velocities are those of the last frames; see `Motion`."""
@@ -218,15 +217,6 @@ class CursorTrial(Trial[Sighting]):
             vy = 0.0
         self.device.aim(vx, vy)
         self.intended(now, vx, vy)
-
-    def intended(self, now: float, one: float, other: float) -> None:
-        """See `Trial`; the delay is learnt from the hand, which is felt to follow with its lag."""
-        super().intended(now, one, other)
-        (x, y), (ax, ay) = self._felt, self._aimed
-        keep = math.exp(-max(now - self._felt_at, 0.0) / max(self.seat.person.hand_lag, SHORTEST))
-        self._felt = x, y = ax + (x - ax) * keep, ay + (y - ay) * keep
-        self._felt_at, self._aimed = now, (one, other)
-        self.seat.delay.intend(now, x, y)
 
     def _presses(self, driver: Driver, view: PointView) -> bool:
         task = self.scenario.task

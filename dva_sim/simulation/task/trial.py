@@ -44,7 +44,6 @@ class Seat:
         delay: What the person has learnt of the delay, on a clock that runs on over trials.
         begun: When this trial begins, on that clock [s].
         timing: How the delay is misjudged.
-        felt: Part of the delay that is felt in the hand, and not learnt from the picture [s].
     """
 
     person: Person
@@ -52,11 +51,10 @@ class Seat:
     delay: DelayEstimate
     begun: float = 0.0
     timing: Timing | None = None
-    felt: float = 0.0
 
     def judged_delay(self, now: float) -> float:
         """The delay as it is judged at a moment [s]: what is new of it is misjudged."""
-        value = self.delay.value + self.felt
+        value = self.delay.value
         usual = self.person.usual_delay
         return value if self.timing is None else self.timing.judged(value, usual, now)
 
