@@ -113,9 +113,9 @@ class AimingHabits(Sparse):
         shortest_s: Duration of the shortest movement.
         per_bit_s: Time more for each bit of its difficulty.
         close_enough: Share of the tolerance within which nothing is corrected.
-        careful: Share of the tolerance within which it must expect to be before it presses, unless
-            in a hurry.
+        careful: Share of the tolerance within which it must expect to be before it presses.
         finest_m: Tolerance below which nobody aims more finely.
+        misses: Standard deviation of where a movement ends, as a share of its way.
         doubt: Usual miss of a movement that is not seen yet, as a share of its way.
         settles: Time from the end of a movement to a press, in time constants of the hand.
         ruffled: Share by which each movement that failed makes the delay feel longer.
@@ -133,12 +133,15 @@ class AimingHabits(Sparse):
     )
     careful: Annotated[float, Assumed(0.5, 1.0, "from near the centre to anywhere inside")] = 0.8
     finest_m: Annotated[float, Assumed(0.0005, 0.004, "from a pixel to a few millimetres")] = 0.002
+    misses: Annotated[
+        float, Assumed(0.03, 0.12, "first movements end within 5 to 10 % of their way: Meyer 1988")
+    ] = 0.07
     doubt: Annotated[float, Assumed(0.05, 0.4, "misses of a first movement, 5 to 20 %")] = 0.1
     settles: Annotated[float, Assumed(0.5, 2.0, "from a click on the run to one at rest")] = 1.0
-    ruffled: Annotated[float, Assumed(0.0, 1.0, "from no notice to at once")] = 0.5
+    ruffled: Annotated[float, Assumed(0.0, 1.0, "from no notice to at once")] = 0.4
     misjudges: Annotated[float, Assumed(0.05, 0.4, "Weber fractions of judged times")] = 0.2
     recalls_s: Annotated[float, Assumed(0.2, 3.0, "from one movement to several")] = 0.7
-    practice: Annotated[float, Assumed(0.05, 0.3, "power laws of practice")] = 0.1
+    practice: Annotated[float, Assumed(0.05, 0.3, "power laws of practice")] = 0.2
 
 
 class DelayHabits(Sparse):

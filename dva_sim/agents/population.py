@@ -64,7 +64,7 @@ class Population(Config):
         patience_s: How long it goes on without getting anywhere, or without seeing anything.
         switch_s: From turning to another robot's picture to understanding it.
         tempo: Time that everything takes which the person does itself, against the median person.
-        waits_from_s: Delay at which it watches for half of the delay before it acts again.
+        waits_from_s: New delay at which it waits after half of its movements to see what came of them.
         compensates: Share of a delay beyond the usual one for which it takes what it asked for to
             be under way still; at most all of it.
         tracks: Gain x delay of following something all the time, where no place is aimed at.
@@ -113,14 +113,14 @@ class Population(Config):
         Trait, Assumed(0.5, 3.0, "costs of switching a task, with a scene to be understood")
     ] = Trait(median=1.0, spread=0.3)
     tempo: Annotated[Trait, Assumed(0.8, 1.25, "what a hurry, or care, makes of it")] = Trait(
-        median=1.0, spread=0.3
+        median=1.0, spread=0.4
     )
     waits_from_s: Annotated[
         Trait, Assumed(0.4, 1.5, "hardly anybody waits at 0.2 s, nearly all at 2 to 3 s")
-    ] = Trait(median=0.8, spread=0.4)
+    ] = Trait(median=0.7, spread=0.4)
     compensates: Annotated[
         Trait, Assumed(0.2, 0.8, "adaptation to late pictures is partial: Foulkes, Miall 2000")
-    ] = Trait(median=0.5, spread=0.3)
+    ] = Trait(median=0.45, spread=0.3)
     tracks: Annotated[
         Trait, Assumed(0.7, 1.2, "phase margins of 20 to 50 deg in following: McRuer, Jex 1967")
     ] = Trait(median=0.95, spread=0.15)

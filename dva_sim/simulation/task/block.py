@@ -25,7 +25,7 @@ from dva_sim.simulation.task.tunnel_goal import TunnelGoal
 
 Row = dict[str, Any]
 PRACTISED = 5  # trials after which a person has its own tempo; assumed
-REACTIONS = 0.23  # standard deviation of the log of a person's reactions; Goodridge et al. 2022
+REACTIONS = 0.35  # standard deviation of the log of how long seeing and reacting take; fitted (C4)
 PAUSE = 1.0  # between two trials, nothing is done [s]
 FINE = 0.01  # resolution at which the delay is learnt from a cursor [s]
 

@@ -30,6 +30,7 @@ from dva_sim.agents.operator.strategies import (
 )
 from dva_sim.agents.route_following import Route
 from dva_sim.kernel.streams import Streams
+from dva_sim.simulation.task.delays import normals
 from dva_sim.simulation.task.devices import make_device
 from dva_sim.simulation.task.plants import Cursor, Pair
 from dva_sim.simulation.task.scenario import TaskScenario
@@ -100,9 +101,12 @@ class Goal(ABC):
         path: The middle line, if the cursor is led along one.
         tolerance: Half the width of the target or tunnel [m].
         edge: Distance from the start at which a moving target turns back [m].
+        is_pushed: Whether the cursor is moved by something else as well: what it does then tells
+            nobody how late it is.
     """
 
     flat = False
+    is_pushed = False
     edge = math.inf
     stands = True
     path: Route | None = None
@@ -183,6 +187,7 @@ class CursorTrial(Trial[Sighting]):
         self._motion, self._summed = Motion(), summed_over(scenario.frames.rate_hz)
         self.moved_at: float | None = None
         self._eye = Strategy(seat.person, reach)
+        self._luck = normals(streams.fresh("aims"))
 
     def sight(self) -> Sighting:
         """Velocities are those of the last frames; see `Motion`."""
@@ -208,10 +213,13 @@ class CursorTrial(Trial[Sighting]):
 
     @override
     def decide(self, driver: Driver, seen: Sighting, now: float) -> None:
-        self.seat.delay.see(now, seen.vx, seen.vy, self._summed)
+        if not self.goal.is_pushed:
+            self.seat.delay.see(now, seen.vx, seen.vy, self._summed)
         judged = self.seat.judged_delay(now)
         vx, vy = self._ask(driver, seen, now, judged)
-        if self.goal.awaits_press and self._presses(driver, PointView(now, seen, judged)):
+        if self.goal.awaits_press and self._presses(
+            driver, PointView(now, seen, judged, self._luck)
+        ):
             self.goal.press(self.now)
         if self.goal.flat:
             vy = 0.0
@@ -231,7 +239,7 @@ class CursorTrial(Trial[Sighting]):
             truth = Truth(seen)
             return driver.point(truth) if path is None else driver.follow(path, truth)
         if path is None:
-            return driver.point(PointView(now, seen, delay))
+            return driver.point(PointView(now, seen, delay, self._luck))
         return driver.follow(PathView(now, seen, delay, path))
 
     @override

@@ -176,7 +176,7 @@ class TrackGoal(ToTarget):
     flat = True
 
     def __init__(self, task: Tracking, phases: list[float]) -> None:
-        self.stands = task.moves == "cursor"
+        self.stands = self.is_pushed = task.moves == "cursor"
         self._task, self.tolerance = task, 0.0
         self._waves = list(zip(task.amplitudes_m, task.frequencies, phases, strict=True))
         self._targets: list[float] = []

@@ -9,7 +9,8 @@ whatever it answers (`GuardedStrategy`).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import repeat
 from typing import ClassVar, NamedTuple
 
 from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity, slowed, through, towards
@@ -19,11 +20,16 @@ from dva_sim.kernel.plugins import FAILURES, Guard, said
 
 
 class PointView(NamedTuple):
-    """What a person knows who moves a cursor to a target; as in `View`."""
+    """What a person knows who moves a cursor to a target; as in `View`.
+
+    Attributes:
+        luck: Standard normal numbers, by which its movements miss and it makes up its mind.
+    """
 
     now: float
     seen: Sighting
     delay: float
+    luck: Iterator[float] = repeat(0.0)
 
 
 class PathView(NamedTuple):

@@ -27,13 +27,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Iterator
 
 from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity, slowed
 from dva_sim.agents.population import Person
 
 OFTEN = 1.0 / 60.0  # design: time between two frames before two were seen [s]
 FAILS = 0.5  # design: a movement has failed if more than this share of its way is left
-STEEPNESS = 4.0  # design: of the share of the delay that is waited, so that it rises smoothly
+STEEPNESS = 6.0  # design: of the share of the delay that is waited, so that it rises smoothly
 
 
 def waited_share(delay: float, patience: float) -> float:
@@ -88,16 +89,23 @@ class Submovements:
         self._way: Velocity = (0.0, 0.0)
         self._last: float | None = None
         self._gap = OFTEN
-        self._pressed, self._failures = -math.inf, 0
+        self._pressed, self._failures, self._boldness = -math.inf, 0, 0.0
         self.off, self._unseen = math.inf, 0.0
         self.waited = self.total = 0.0
 
-    def point(self, now: float, seen: Sighting, delay: float) -> Velocity:
-        """Velocity to ask for [m/s]; a target that moves is followed all the time."""
+    def point(self, now: float, seen: Sighting, delay: float, luck: Iterator[float]) -> Velocity:
+        """Velocity to ask for [m/s]; a target that moves is followed all the time.
+
+        Args:
+            now: [s]
+            seen: The newest frame.
+            delay: What the whole delay is taken to be [s].
+            luck: Standard normal numbers, three for each movement.
+        """
         if self._last is not None:
             passed = now - self._last
             self.total += passed
-            if self._begun + self._lasts < now < self._begun + self._lasts + self._watches(delay):
+            if self._begun + self._lasts < now < self._rests_until(delay):
                 self.waited += passed
             self._gap += 0.2 * (min(now - self._last, 0.5) - self._gap)
         self._last = now
@@ -107,9 +115,11 @@ class Submovements:
         x, y = self._predicted(now, seen, counted)
         dx, dy = tx - x, ty - y
         self.off = math.hypot(dx, dy)
-        rests = self._begun + self._lasts + self._watches(delay)
-        if now >= rests - 1e-6 and self.off > self._habits.close_enough * seen.tolerance:
-            self._plan(now, dx, dy, seen.tolerance)
+        if (
+            now >= self._rests_until(delay) - 1e-6
+            and self.off > self._habits.close_enough * seen.tolerance
+        ):
+            self._plan(now, dx, dy, seen.tolerance, luck)
         vx, vy = self._moving(now)
         wanted = slowed(vx + target_vx, vy + target_vy, self._most)
         self._asked.append((now, *wanted))
@@ -118,18 +128,21 @@ class Submovements:
     def presses(self, now: float, seen: Sighting, delay: float, hurried: bool) -> bool:
         """Press the button: the prediction is on the target, and so is the eye where it must be.
 
-        What has not been seen yet is trusted if a usual miss of that way is within the tolerance,
-        or if a press beside the target costs nothing.
+        What has not been seen yet is trusted if a usual miss of that way is within the tolerance.
+        Where a press beside the target costs nothing, it presses once it has made a movement.
         """
         person = self._person
         settled = self._begun + self._lasts + self._habits.settles * person.tempo * person.hand_lag
         if now < settled or now < self._pressed + delay + person.reaction:
             return False
-        doubt = 0.0 if hurried else self._habits.doubt * self._unseen
-        if doubt > seen.tolerance:
+        doubt = self._habits.doubt * self._unseen
+        if hurried:
+            if self._begun == -math.inf:
+                return False
+        elif doubt > seen.tolerance:
             if math.hypot(seen.target_x - seen.x, seen.target_y - seen.y) > seen.tolerance:
                 return False
-        elif self.off > (1.0 if hurried else self._habits.careful) * seen.tolerance:
+        elif self.off > self._habits.careful * seen.tolerance:
             return False
         self._pressed = now
         return True
@@ -139,20 +152,28 @@ class Submovements:
         new = max(delay - self._usual, 0.0)
         return min(delay, self._usual) + self._person.compensates * new
 
-    def _watches(self, delay: float) -> float:
-        new = max(delay - self._usual, 0.0)
-        unease = new * (1.0 + self._habits.ruffled * self._failures)
-        return waited_share(unease, self._person.waits_from) * delay
+    def _rests_until(self, delay: float) -> float:
+        """When it may act again [s]: at once, or once it has seen what came of the last."""
+        ended = self._begun + self._lasts
+        new = max(delay - self._usual, 0.0) * (1.0 + self._habits.ruffled * self._failures)
+        if self._boldness < 1.0 - waited_share(new, self._person.waits_from):
+            return ended
+        return ended + delay + self._person.habits.waiting.settled_s
 
-    def _plan(self, now: float, dx: float, dy: float, tolerance: float) -> None:
-        """A movement by so much; the target's own is added to it."""
+    def _plan(
+        self, now: float, dx: float, dy: float, tolerance: float, luck: Iterator[float]
+    ) -> None:
+        """A movement by so much, which misses by a share of it; the target's own is added."""
         habits, off = self._habits, math.hypot(dx, dy)
+        along, across = habits.misses * next(luck), habits.misses * next(luck)
+        self._boldness = 0.5 * math.erfc(next(luck) / math.sqrt(2.0))  # even, from 0 to 1
         if off > FAILS * math.hypot(*self._way) > 0.0:
             self._failures += 1
         bits = math.log2(1.0 + off / (2.0 * max(tolerance, habits.finest_m)))
         lasts = self._person.tempo * (habits.shortest_s + habits.per_bit_s * bits)
         lasts = max(lasts, 1.9 * off / self._most)  # the least jerk is fastest at 1.9 of its mean
-        self._begun, self._lasts, self._way = now, lasts, (dx, dy)
+        self._begun, self._lasts = now, lasts
+        self._way = dx + along * dx - across * dy, dy + along * dy + across * dx
 
     def _moving(self, now: float) -> Velocity:
         since = now - self._begun
