@@ -98,11 +98,11 @@ class CorrectingHabits(Sparse):
     evidence_rad: Annotated[
         float,
         Assumed(0.0005, 0.005, "what larger errors save in time, from 6 to 60 ms at 1 to 2 deg"),
-    ] = 0.0012
+    ] = 0.0008
     grows_s: Annotated[
         float,
         Assumed(0.15, 0.5, "quartiles of a car's first corrections, with the hand's lag or not"),
-    ] = 0.25
+    ] = 0.2
     unnoticed: Annotated[float, Assumed(0.1, 0.4, "Weber fractions of motion and place")] = 0.3
 
 

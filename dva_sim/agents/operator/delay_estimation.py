@@ -149,6 +149,7 @@ class PeriodEstimate:
 
     Attributes:
         value: The period that is counted on; 0 until anything was seen of it [s].
+        likely: The period that is as likely to be shorter as longer; likewise [s].
     """
 
     MEMORY = 4.0  # design: what was seen fades over so many times as many effects
@@ -167,7 +168,7 @@ class PeriodEstimate:
         self._periods = np.geomspace(self.SHORTEST, self.LONGEST, self.STEPS)
         self._prior = -np.log(self._periods)  # links are usually quick
         self._weights = np.zeros(self.STEPS)
-        self.value = 0.0
+        self.value = self.likely = 0.0
 
     def intend(self, now: float, one: float, other: float) -> None:
         """The person asks for this from `now` [s] on, as shares of the limits."""
@@ -233,8 +234,8 @@ class PeriodEstimate:
         self._weights *= 1.0 - 1.0 / (self.MEMORY * self._habits.effects)
         self._weights += np.log(np.maximum(likelihoods, self.SURPRISE))
         shares = np.cumsum(np.exp(self._prior + self._weights - self._weights.max()))
-        place = int(np.searchsorted(shares, self.SURE * shares[-1]))
-        self.value = float(self._periods[min(place, self.STEPS - 1)])
+        places = np.searchsorted(shares, shares[-1] * np.array([0.5, self.SURE]))
+        self.likely, self.value = self._periods[np.minimum(places, self.STEPS - 1)].tolist()
 
 
 class _Move(NamedTuple):

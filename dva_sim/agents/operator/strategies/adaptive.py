@@ -122,7 +122,7 @@ class Adaptive(Strategy):
         elif self._closed is not None:
             wanted = self._closed.drive(route, view, stop_before)
         else:
-            late = 0.5 * self.period.value + self._corrections.late
+            late = 0.5 * self.period.likely + self._corrections.late
             wanted = self._pursuit.drive(route, view._replace(delay=view.delay + late), stop_before)
             turn = self._corrections.steer(view.now, wanted.turn_rate)
             wanted = Intent(wanted.speed, turn)
