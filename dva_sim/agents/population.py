@@ -64,7 +64,7 @@ class Population(Config):
         patience_s: How long it goes on without getting anywhere, or without seeing anything.
         switch_s: From turning to another robot's picture to understanding it.
         tempo: Time that everything takes which the person does itself, against the median person.
-        waits_from_s: New delay at which it waits after half of its movements to see what came of it.
+        waits_from_s: New delay at which half of its movements are followed by a wait.
         compensates: Share of a delay beyond the usual one for which it takes what it asked for to
             be under way still; at most all of it.
         tracks: Gain x delay of following something all the time, where no place is aimed at.

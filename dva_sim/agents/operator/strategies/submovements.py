@@ -1,21 +1,24 @@
 """How a person moves a cursor: one aimed movement after the other, by an imperfect prediction.
 
 A movement is planned as a whole, from where the cursor will be once everything that was asked for
-has happened, and then runs its course; meanwhile nothing is corrected. What has not been seen yet
-is known from what was asked for and from how late the person takes it to show. It misjudges that
-time by a share of it, from one moment to the next, and its hand is noisy: so movements end beside
-the target, the farther the longer the delay, and are corrected. Under a longer delay there are
-more corrections, and each takes longer to be seen: what delay costs grows faster than the delay.
+has happened, and then runs its course; meanwhile nothing is corrected. It ends beside the target by
+a share of its way, and is corrected. What has not been seen yet is known from what was asked for,
+from the hand, which is felt, and from how late a picture usually is. Of a delay beyond the usual
+one only a share is counted on. What was asked for before that, and is not seen yet, is asked for
+once more: hardly anything while the new delay is short against a movement, and more and more of it
+when it is longer. So corrections collide, and what delay costs grows faster than the delay.
 
-After a movement a person may watch before it makes another one. How long is a share of the delay
-that is small where the delay is short against the person's own patience, and all of it where it
-is long: then it moves and waits.
+After a movement a person acts again at once, or waits until it has seen what came of it. It waits
+the more often the longer the new delay is against the person's own patience, and the more of its
+movements have failed: with long delays it moves and waits.
 
 References:
     D. E. Meyer et al.: Optimality in human motor performance: ideal control of rapid aimed
     movements. Psychological Review 95 (1988): primary and corrective submovements.
     P. Gawthrop et al.: Intermittent control: a computational theory of human control. Biological
     Cybernetics 104 (2011): sampled, with a prediction, and a refractory time.
+    N. F. Foulkes, R. C. Miall: Adaptation to visual feedback delays in a human manual tracking
+    task. Experimental Brain Research 131 (2000): people adapt to a new delay in part.
     T. Flash, N. Hogan: The coordination of arm movements. J. Neuroscience 5 (1985): the course.
     J. Gibbon: Scalar expectancy theory and Weber's law in animal timing. Psychological Review 84
     (1977): times are misjudged by a share of them.
@@ -34,14 +37,14 @@ from dva_sim.agents.population import Person
 
 OFTEN = 1.0 / 60.0  # design: time between two frames before two were seen [s]
 FAILS = 0.5  # design: a movement has failed if more than this share of its way is left
-STEEPNESS = 6.0  # design: of the share of the delay that is waited, so that it rises smoothly
+STEEPNESS = 6.0  # design: of the share of movements that are waited for; persons differ as well
 
 
 def waited_share(delay: float, patience: float) -> float:
-    """Share of the delay that a person watches before it acts again.
+    """Share of its movements after which a person waits to see what came of them.
 
     Args:
-        delay: [s]
+        delay: Beyond the usual one, as it is felt [s].
         patience: Delay at which it is a half [s].
     """
     return 1.0 / (1.0 + math.pow(patience / max(delay, OFTEN), STEEPNESS))
@@ -77,7 +80,7 @@ class Submovements:
 
     Attributes:
         off: Distance of the predicted cursor from the predicted target [m].
-        waited: Time spent watching before the next movement [s].
+        waited: Time spent waiting before the next movement [s].
         total: Time since the first frame [s].
     """
 
