@@ -283,6 +283,7 @@ class Dva:
             return self._refuse(message, m.BUSY, text)
         if known is not None and known.is_new_life(message.message_id, message.timestamp):
             sends = self._gone(message.source, now)  # it knows nothing of what it held
+            self.sessions.forget(message.source)  # nor which orders of a session it has obeyed
         if known is not None and known.device.address != body.address:
             self.sessions.forget(message.source)  # its holder has to ask for the new address
         if known is None and self.registry.is_full:

@@ -2,8 +2,8 @@
 
 Some time after the last fault somebody new does what anybody could do before: reports an event,
 asks for each robot in turn, drives it, stops it by an emergency, sends it out and calls it back;
-and the DVA lists everybody, for a while. What does not succeed has not recovered. Nobody is asked
-how it is.
+and the DVA lists everybody, for a while, and hears the heartbeats of everybody. What does not
+succeed has not recovered. Nobody is asked how it is.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ USED_LATELY = 30.0  # a robot that obeyed somebody so lately needs no probe [s]
 STANDS_AFTER = 5.0  # an emergency was answered [s]
 LISTED = 30  # times without a break that the DVA has to list everybody, a second apart
 LIST = "the list"
+BEATS_WITHIN = 30.0  # of the end the DVA has heard the heartbeat of everybody [s]
 BYSTANDER = NUMBER + 50
 
 
@@ -50,6 +51,7 @@ class RecoveryProbes:
         self._used: dict[str, float] = {}
         self._session: dict[str, int] = {}
         self._missing, self._listed = set[str](), 0
+        self._beats: dict[str, float] = {}
         self._place = m.Position(0.0, 0.0)
 
     def begin(self, robots: Sequence[str], others: Iterable[str], place: m.Position) -> None:
@@ -60,7 +62,7 @@ class RecoveryProbes:
             others: Ids of the guards and operators.
             place: Where an event is reported, and where robots are sent.
         """
-        self._place = place
+        self._place, self._beats = place, dict.fromkeys((*robots, *others), 0.0)
         self._open = dict.fromkeys(robots, "gives nobody the robot")
         self._open[DVA] = "takes no report"
         self._open[LIST] = "does not list everybody"
@@ -84,8 +86,18 @@ class RecoveryProbes:
             if motion.speed > MOVING:
                 self._used[robot] = now
 
+    def beats(self, now: float, source: str) -> None:
+        """Note that the heartbeat of a device has reached the DVA."""
+        if source in self._beats:
+            self._beats[source] = now
+
     def end(self) -> None:
         """Tell what has not recovered."""
+        for device, when in self._beats.items():
+            if self._clock.now - when > BEATS_WITHIN:
+                text = f"has not heard the heartbeat of {self._stage.labels[device]}"
+                text += f" for {self._clock.now - when:.0f} s"
+                self._recorder.violated("S8", self._clock.now, self._stage.labels[DVA], text)
         after = f"{RECOVERS_WITHIN + PROBES_LAST:.0f} s after the last fault"
         for who, what in self._open.items():
             label = self._stage.labels[DVA if who == LIST else who]

@@ -30,7 +30,8 @@ from dva_sim.storms.refused_drivers import RefusedDrivers
 from dva_sim.storms.scene import StormScene
 
 LOOK_AT_BOUNDS = 30.0  # how often all containers are counted [s]
-QUIET = b"<HBMsg>", b"<RobotStatus>"  # of messages that only say that somebody is there
+HEARTBEAT = b"<HBMsg>"
+QUIET = HEARTBEAT, b"<RobotStatus>"  # of messages that only say that somebody is there
 SILENCED = frozenset(
     {"robot-hangs", "robot-without-power", "robot-restarts", "replies-lost", "vanishes"}
     | {"dva-silent", "messages-lost", "partition", "frozen"}
@@ -178,7 +179,11 @@ class Storm(StormScene):
     def arrives(self, passing: PassingMessage) -> None:
         self._refused.arrives(self.now, passing)
         self._answers.watch(passing)
-        if passing.to == DVA and not any(quiet in passing.payload for quiet in QUIET):
+        if passing.to != DVA:
+            return
+        if HEARTBEAT in passing.payload:
+            self._recovery.beats(self.now, passing.source)
+        if not any(quiet in passing.payload for quiet in QUIET):
             self.run.show_page()
 
     @override

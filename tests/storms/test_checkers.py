@@ -182,6 +182,14 @@ def refusing(storm: Storm):
     storm.robots[0].agent.refuses = m.BUSY
 
 
+def unheard(storm: Storm):
+    def leave():
+        storm.run.dva._leave(storm.robots[0].id)
+        return True
+
+    storm.run.clock.every(1.0, leave)
+
+
 def away(storm: Storm):
     storm.dva.kill(1e4)
 
@@ -191,7 +199,8 @@ def test_what_works_has_recovered():
 
 
 @pytest.mark.parametrize(
-    ("spoil", "who"), [(silenced, "robot-1"), (refusing, "robot-1"), (away, "dva")]
+    ("spoil", "who"),
+    [(silenced, "robot-1"), (refusing, "robot-1"), (unheard, "dva"), (away, "dva")],
 )
 def test_what_does_not_work_has_not_recovered(spoil, who):
     assert ("S8", who) in unrecovered(spoil)

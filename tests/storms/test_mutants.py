@@ -12,7 +12,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.storms import hunting, mutants
 from dva_sim.storms.hunting import hunt
 from dva_sim.storms.mutants import MUTANTS, Mutant, named, planted
-from dva_sim.storms.plan import Fault
+from dva_sim.storms.plan import Fault, StormPlan
 from dva_sim.storms.shrinking import Shrinker
 from dva_sim.storms.storm import play
 
@@ -66,6 +66,43 @@ def test_hunts_are_a_table_with_a_line_for_each():
     *_, first, second = hunting.table([found, missed]).splitlines()
     assert unnamed(first, "S1", "stop-ignored", "3", "S2", "7") == []
     assert unnamed(second, "S6", "counts-wrong", "not in 8", "0") == []
+
+
+TEAM = {
+    "site": {"name": "hall"},
+    "robot": {"count": 1, "processing_s": 0.01},
+    "guard": {"count": 0},
+    "operator": {"count": 1},
+    "pattern": "req-rep",
+    "camera": {"rate_hz": 5, "frame_bytes": 4000},
+    "link": {"delay_s": 0.005},
+    "events": [{"kind": "fire", "at_s": 100.0, "reported": True}],
+}
+AGAIN = tuple(
+    Fault("order-again", 16.0 + 20 * n, 0.0, "robot-1", on=on, value=2.0)
+    for n, on in enumerate(("CancelMission", "StopTeleOp") * 4 + ("CancelMission",))
+)
+FLOODS = tuple(
+    Fault("flood-in-doubt", 16.0 + 10 * n, 6.0, "robot-1", value=150.0) for n in range(14)
+)
+HANGS = (Fault("vanishes", 16.0, 40.0, "operator-1"), Fault("robot-hangs", 20.0, 45.0, "robot-1"))
+
+
+@pytest.mark.system
+@pytest.mark.parametrize(
+    ("mutant", "faults", "rule"),
+    [
+        ("orders-act-again", AGAIN, "S1"),
+        ("questions-without-bound", FLOODS, "S10"),
+        ("subscribes-once", HANGS, "S8"),
+    ],
+)
+def test_what_storms_seldom_lead_to_is_found_where_they_do(mutant, faults, rule):
+    plan = StormPlan(2, TEAM, faults, 200.0, drivers=1)
+    with planted(mutant) as bug:
+        outcome = play(plan)
+    assert bug.acts
+    assert outcome.signature == {rule}
 
 
 EMERGENCY = Fault("emergency", 20.0, target="robot-*", on="SetTeleOp")
