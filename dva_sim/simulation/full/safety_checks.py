@@ -22,7 +22,12 @@ from dva_sim.kernel.recorder import Accepted, ByHand, Recorder
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.simulation.full.event_ledger import PENDING_SLACK, SILENT_AFTER, EventLedger
+from dva_sim.simulation.full.event_ledger import (
+    PENDING_SLACK,
+    SILENT_AFTER,
+    STEP_SLACK,
+    EventLedger,
+)
 from dva_sim.simulation.full.observations import MotorLimits, Page, RobotMotion, SafetyTerms
 from dva_sim.simulation.full.physical_world import PHYSICS_TICK
 from dva_sim.simulation.full.takeovers import Takeovers
@@ -50,17 +55,20 @@ CHECKED: Final = {
     "messages that is driven by hand; nobody keeps a robot of whom it hears nothing valid for "
     f"{LEASE:g} s, or the DVA nothing for {SILENT_AFTER:g} s; slack: until it has confirmed the "
     f"end, {OBEYS_WITHIN:g} s and ten messages, {LEASE_SLACK:g} s of silence; of each session that "
-    "is over the robot is told",
+    "is over the robot is told; one that a supervisor takes stands and knows it before it is given",
     "S3": "nothing that came before an emergency moves a robot after it; slack: as for S1 and S2",
     "S4": "speed and turn rate, and what the motors are asked for, stay within their limits; "
     f"slack: {SLACK - 1:.0%}, and "
     f"{MOVING:g} m/s backwards",
-    "S5": "every command, drive, mission and subscription has a permission that the DVA gave, and "
-    "has confirmed to the robot when it asked; no slack",
+    "S5": "every command, drive, mission, stop, subscription has a permission that the DVA gave, "
+    "and has confirmed to the robot when it asked; nobody gets a sensor's values who may not read "
+    f"it; slack of sensors: {OBEYS_WITHIN:g} s and ten messages",
     "S6": "every report becomes an event, every event is in one state and the counts agree; none "
-    "waits, or is in one pair of hands, beyond its limit; nothing is found but by who was sent; "
+    "waits, or is in one pair of hands, beyond its limit; who takes one up sets out and moves in "
+    "time; nothing is found but by who was sent; "
     f"slack: {PENDING_SLACK:g} s, and how far one sees an event",
-    "S7": "the times of every event are in order; no slack",
+    "S7": "the times of every event are in order, and those at which they were noted; "
+    f"slack: {STEP_SLACK:g} s",
 }
 """What the audit checks of each rule, at every message and twice a second."""
 CHECKED_IN_SHORT: Final = (
