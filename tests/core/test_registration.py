@@ -127,6 +127,16 @@ def test_a_renewed_registration_changes_nothing_and_a_new_life_ends_what_was_hel
     assert office.say(OPERATOR, AGAIN)[1] == [Send(ROBOT, over), Send(OPERATOR, over)]
 
 
+@pytest.mark.invariant("S1", "S2")
+def test_a_robot_that_starts_anew_has_no_holder_any_longer(office):
+    held = office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))[0].content
+    office.number = 0
+    sends = office.register(ROBOT, "Robot")
+    over = m.PermissionRevocation(ROBOT, OPERATOR, held.session)
+    assert {send.to for send in sends if send.body == over} == {ROBOT, OPERATOR}
+    assert ROBOT not in office.desk.sessions.permissions.grants
+
+
 def test_a_new_life_knows_nothing_of_its_order(office):
     office.ok(office.fire(12))
     assert office.working == {OPERATOR: 1, ROBOT: 1}
