@@ -108,14 +108,14 @@ class PointGoal(ToTarget):
     def target(self, now: float) -> Pair:
         return self._way.at(now)
 
+    @override
     def press(self, now: float) -> None:
-        """See `Goal`."""
         self._pressed_at = now + self._press
         self._presses += 1
 
     @property
+    @override
     def awaits_press(self) -> bool:
-        """See `Goal`."""
         return self._task.selection == "click" and self._pressed_at == math.inf
 
     @override

@@ -28,6 +28,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from typing_extensions import override
+
 from dva_sim.agents.operator.delay_estimation import PeriodEstimate
 from dva_sim.agents.operator.strategies.base import PathView, PointView, Strategy
 from dva_sim.agents.operator.strategies.cursor import Velocity, fastest, towards
@@ -110,8 +112,8 @@ class Adaptive(Strategy):
         self._last: float | None = None
         self._has_asked = False
 
+    @override
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
-        """See `Strategy`."""
         seen, reach = view.seen, self.reach
         motion = seen.speed / reach.speed, seen.turn_rate / max(reach.turn_rate, 1e-3)
         self._moves.period = self.period.see(view.now, *motion, view.delay)
@@ -132,22 +134,22 @@ class Adaptive(Strategy):
         )
         return wanted
 
+    @override
     def point(self, view: PointView) -> Velocity:
-        """See `Strategy`."""
         if self._closed is not None:
             return self._closed.point(view)
         if view.seen.tolerance <= 0.0:  # no place to come to: it follows all the time
             return towards(view.seen, view.delay, self.person, self._most, self.person.tracks)
         return self._aims.point(view.now, view.seen, view.delay, view.luck)
 
+    @override
     def presses(self, view: PointView, hurried: bool) -> bool:
-        """See `Strategy`."""
         if self._closed is not None:
             return self._closed.presses(view, hurried)
         return self._aims.presses(view.now, view.seen, view.delay, hurried)
 
+    @override
     def follow(self, view: PathView) -> Velocity:
-        """See `Strategy`."""
         seen, person = view.seen, self.person
         left = view.path.remaining(seen.x, seen.y)
         pace = fastest(seen.tolerance, view.delay, person, self._most)
