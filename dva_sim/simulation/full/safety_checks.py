@@ -551,7 +551,8 @@ class SafetyAudit:
             message, at, source = witness.unanswered.pop(key)
             body, by = message.body, at + witness.obeys_within
             if isinstance(body, m.Emergency):
-                witness.stands(by)
+                if witness.stopped < at:  # else one that came later, or a copy, has stopped it
+                    witness.stands(by)
             elif source != self._dva:
                 pass
             elif isinstance(body, m.PermissionRevocation):
