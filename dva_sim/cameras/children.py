@@ -77,7 +77,7 @@ class Child:
         raise ChildFailed(f"the {self.name} said nothing within {within:g} s")
 
     def why(self) -> str:
-        """Why it has ended, in a line."""
+        """Return why it has ended, in a line."""
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(END_WITHIN)
         code = self.process.poll()

@@ -1,4 +1,4 @@
-"""What robots' cameras saw, drawn from what was true when each frame was taken.
+"""Camera pictures of robots, drawn from the true state when each frame was taken.
 
 The site and the hazards are built from the scenario and its seed by the same functions as those of
 the run, so that a frame needs no more than a pose and who was near.

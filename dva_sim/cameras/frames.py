@@ -18,7 +18,7 @@ ALIVE = -1  # robot of a record that says only that somebody draws
 
 
 class Picture(NamedTuple):
-    """What a robot's camera shows.
+    """Picture of a robot's camera.
 
     Attributes:
         robot: Its index in the scene; `ALIVE` for none.
@@ -94,11 +94,11 @@ class Unpacker:
         return Picture(robot, number, captured, arrived, jpeg), end
 
     def _broken_off(self, start: int, end: int) -> bool:
-        """Whether another record begins where the picture should go on."""
+        """Return True if another record begins where the picture should continue."""
         return self._rest.find(MAGIC, start, end) >= 0
 
     def _skip(self) -> int:
-        """How many bytes to leave out up to where a record may begin."""
+        """Return how many bytes to skip to where a record may begin."""
         following = self._rest.find(MAGIC, 5)
         used = following - 4 if following > 0 else max(1, len(self._rest) - len(MAGIC) - 3)
         self.skipped += used

@@ -73,13 +73,13 @@ class Screens:
             robot.filmed = self._film
 
     def watch(self, robots: set[str]) -> None:
-        """Who is looked at now, by id."""
+        """Set the robots that are being watched, by id."""
         self._watched = robots & self._run.field.robots.keys()
         self._subscribe()
 
     @property
     def watched(self) -> list[str]:
-        """Who is looked at, by id."""
+        """Robots that are being watched, by id."""
         return sorted(self._watched)
 
     def hold(self, robots: set[str]) -> None:
@@ -135,7 +135,7 @@ class Screens:
             taken.popitem(last=False)
 
     def _figures(self, robot: str, frame: CameraFrame) -> list[Any]:
-        """Who could be in the picture: kind, number, place, heading, what they do."""
+        """Return the figures that may be in the picture: kind, number, place, heading, activity."""
         field, seen = self._run.field, frame.observation
         here, figures = (seen.x, seen.y), list[Any]()
         for id_tag, other in field.robots.items():
@@ -175,7 +175,7 @@ class OwnScreens(Screens):
 
 
 def camera_url(base: str, label: str) -> str:
-    """Where a browser finds a robot's pictures."""
+    """Return the address of a robot's pictures for a browser."""
     return f"{base}camera/{label}.mjpg"
 
 

@@ -65,7 +65,7 @@ class Contacts:
 
 
 class Jam:
-    """Whether a robot is jammed: it is told of every tick in which it strains against something.
+    """Detector of a jammed robot, fed with every tick in which the robot strains against something.
 
     Attributes:
         count: How often it became so.
@@ -85,7 +85,7 @@ class Jam:
         self._since += dt
 
     def holds(self, x: float, y: float, heading: float) -> bool:
-        """Whether it is jammed, being there [m, rad]."""
+        """Return True if it is jammed at this pose [m, rad]."""
         return self._since >= JAM_TIME and self._near(x, y, heading)
 
     def _near(self, x: float, y: float, heading: float) -> bool:
@@ -104,7 +104,7 @@ T = TypeVar("T")
 
 
 class AskedFor(Generic[T]):
-    """What is asked of a body: what holds now, and what will from later ticks on.
+    """Requests to a body: the one that holds now, and those of later ticks.
 
     What was asked for first still has its tick, however soon something newer follows.
 
@@ -130,11 +130,11 @@ class AskedFor(Generic[T]):
 
     @property
     def newest(self) -> T:
-        """What was put last."""
+        """Value that was put last."""
         return self.coming[-1][1] if self.coming else self.now
 
     def at(self, tick: int) -> T:
-        """What holds in a tick; they are asked for in their order."""
+        """Return the value that holds in a tick; ticks must be queried in order."""
         coming = self.coming
         while coming and coming[0][0] <= tick:
             self.now = coming.popleft()[1]
@@ -174,7 +174,7 @@ class Ticks:
 
     @property
     def time(self) -> float:
-        """Of the last whole tick [s]."""
+        """Time of the last whole tick [s]."""
         return self._tick * self.dt
 
     def next_tick(self) -> int:
@@ -205,7 +205,7 @@ class Ticks:
 
 
 class Body:
-    """What all that moves has in common.
+    """Base class of everything that moves.
 
     Attributes:
         name: Of the robot or person.
@@ -244,12 +244,12 @@ class Body:
 
     @property
     def in_contact(self) -> bool:
-        """Whether it touches anything now that counts as a contact."""
+        """True if it touches anything now that counts as a contact."""
         return self._touch.touching > 0
 
     @property
     def last_touch(self) -> float:
-        """When it last was in contact [s]; the time of the last tick while it still is."""
+        """Time of the last contact [s]; that of the last tick while it lasts."""
         return self._world.time if self.in_contact else self._touch.last
 
     def push(self, tick: int, dt: float) -> bool:
@@ -257,7 +257,7 @@ class Body:
         raise NotImplementedError
 
     def counts(self, other: Body | None) -> tuple[Contacts, ...]:
-        """Which of its contacts one with somebody, or a wall (None), is among."""
+        """Return the contacts among which one with a body, or a wall (None), is counted."""
         raise NotImplementedError
 
     def meets(self, other: Body | None, now: float) -> None:
@@ -282,7 +282,7 @@ TRACK: Final = 0.5  # wheels stand that share of the radius off the middle; assu
 
 
 class TickTarget(NamedTuple):
-    """What the motors are asked for, before tick `end`."""
+    """Target of the motors before tick `end`."""
 
     speed: float
     turn_rate: float
@@ -378,12 +378,12 @@ class RobotBody(Body):
 
     @property
     def jammed(self) -> bool:
-        """Whether it is stuck, by the rules of `dva_sim.worlds.bodies`."""
+        """True if it is stuck, by the rules of `dva_sim.worlds.bodies`."""
         return self._jam.holds(*self.pose())
 
     @property
     def jams(self) -> int:
-        """How often it became stuck."""
+        """Number of times that it became stuck."""
         return self._jam.count
 
     @property
@@ -398,7 +398,7 @@ class RobotBody(Body):
         return self.body.angular_velocity
 
     def pose(self) -> Pose:
-        """Where it is, as of the last whole tick; the heading counts full turns."""
+        """Return its pose as of the last whole tick; the heading counts full turns."""
         place = self.body.position
         return make_pose(place.x, place.y, self.body.angle)
 
@@ -415,7 +415,7 @@ class RobotBody(Body):
 
     @property
     def powered(self) -> bool:
-        """Whether the motors obey; without power they brake and stop, from the next tick on."""
+        """True if the motors obey; without power they brake and stop, from the next tick on."""
         return self._powered
 
     @powered.setter
@@ -503,7 +503,7 @@ class RobotBody(Body):
         return True
 
     def _is_held(self, dt: float) -> bool:
-        """Whether wheels are locked that shall stand; also where its brakes were not enough."""
+        """Return True if its locked wheels hold it; also where its brakes were too weak."""
         self._braked += dt
         if self._braked > self._patience and not self._lock.closed:
             self._lock.close(self._grip)

@@ -167,13 +167,13 @@ def _pieces(floor: NDArray[np.bool_], resolution: float) -> Labels:
 
 
 def _cuts(length: int, resolution: float) -> list[int]:
-    """Where a side of so many cells is cut into blocks of equal length."""
+    """Return where a side of so many cells is cut into blocks of equal length."""
     blocks = max(1, round(length * resolution / BLOCK))
     return [round(length * number / blocks) for number in range(blocks + 1)]
 
 
 def _joined(labels: Labels, resolution: float) -> Labels:
-    """The same with pieces too small given to the neighbour with the longest border."""
+    """Merge pieces that are too small into the neighbour with the longest shared border."""
     sizes = np.bincount(labels[labels >= 0]) * resolution**2
     borders = _borders_between(labels, len(sizes))
     owner = np.arange(len(sizes))
@@ -190,7 +190,7 @@ def _joined(labels: Labels, resolution: float) -> Labels:
 
 
 def _borders_between(labels: Labels, count: int) -> NDArray[np.int64]:
-    """How many cell edges two pieces share, shape `(count, count)`."""
+    """Count the cell edges that two pieces share, shape `(count, count)`."""
     borders = np.zeros((count, count), np.int64)
     for a, b in ((labels[1:], labels[:-1]), (labels[:, 1:], labels[:, :-1])):
         touch = (a >= 0) & (b >= 0) & (a != b)

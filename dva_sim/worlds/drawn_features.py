@@ -85,7 +85,7 @@ class DrawnWifi(DrawnFeature):
 
 
 class FeatureKind(NamedTuple):
-    """How a kind of feature is drawn, and what its properties are."""
+    """Geometry and properties of a kind of feature."""
 
     shapes: tuple[str, ...]
     model: type[DrawnFeature] = DrawnFeature

@@ -37,7 +37,7 @@ GROUND = ("room", "path", "yard")  # where two overlap, the first of these count
 
 
 def make_plan(features: Iterable[Feature], ceiling: float = CEILING) -> tuple[FloorPlan, Any]:
-    """What is on a plan, and its floor: a shapely area without the solids.
+    """Build a plan, and its floor: a shapely area without the solids.
 
     Args:
         features: In the order of the file.
@@ -151,7 +151,7 @@ def _ends(line: Any) -> list[float]:
 
 
 def _how_far_out(rooms: Lookup[Room], x: float, y: float, heading: float) -> int:
-    """What lies beyond a door: 0 a room, 1 ground outdoors, 2 nothing drawn."""
+    """Classify what lies beyond a door: 0 a room, 1 ground outdoors, 2 nothing drawn."""
     room = beyond(rooms, x, y, heading)
     return NOTHING if room is None else int(room.outdoor)
 

@@ -1,4 +1,4 @@
-"""What motors do: from what is wanted and what is measured to accelerations, without a clock.
+"""Motor models: from wanted and measured motion to accelerations, without a clock.
 
 A drive is one class, shipped or in a file of the user. It never sees the world: friction with
 the floor, walls and other bodies come on top of what it asks for.
@@ -42,13 +42,13 @@ class Drive:
         self.spec = spec
 
     def set_point(self, speed: float, turn_rate: float) -> tuple[float, float]:
-        """What the motors aim at [m/s, rad/s] when that is asked for; asked once per command."""
+        """Return the target of the motors [m/s, rad/s] for a request; called once per command."""
         return speed, turn_rate
 
     def accelerations(
         self, speed: float, turn_rate: float, now_speed: float, now_turn_rate: float, dt: float
     ) -> tuple[float, float]:
-        """What the motors try to do during a tick, along [m/s^2] and turning [rad/s^2].
+        """Return the accelerations of a tick: along [m/s^2] and turning [rad/s^2].
 
         Args:
             speed: Wanted [m/s].
@@ -187,7 +187,7 @@ class GuardedDrive(Guard, Drive):
     def _judge_motion(
         self, along: float, turn: float, now_speed: float, now_turn_rate: float, dt: float
     ) -> None:
-        """Where a tick leads to; who was pushed beyond a limit and brakes does nothing wrong."""
+        """Check the result of a tick; braking after a push beyond a limit is no fault."""
         spec, most = self.spec, self.spec.max_turn_acceleration
         speed = now_speed + dt * _within(along, -spec.max_deceleration, spec.max_acceleration)
         turn_rate = now_turn_rate + dt * _within(turn, -most, most)
@@ -232,7 +232,7 @@ class DriveSpec:
 
     @property
     def inner_radius(self) -> float:
-        """Of the largest circle around the middle that lies within the footprint [m]."""
+        """Radius of the largest circle around the middle that lies within the footprint [m]."""
         if not self.corners:
             return self.radius
         sides = zip(self.corners, (*self.corners[1:], self.corners[0]), strict=True)
@@ -274,7 +274,7 @@ def load_drive(
     options: Mapping[str, Any] | None = None,
     base: Path | None = None,
 ) -> Callable[[DriveSpec], Drive]:
-    """What makes the motors that `name` means; those of users are kept within the limits.
+    """Return a factory for the motors of a name; those of users are kept within the limits.
 
     Args:
         name: `differential`, `three_way`, a class in a file such as `mine.py:Mine`, or the name

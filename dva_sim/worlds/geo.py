@@ -58,7 +58,7 @@ class GeoFrame:
         return math.degrees(1 / (normal * cos)), math.degrees(1 / meridian)
 
     def distance(self, latitude: float, longitude: float) -> float:
-        """How far a geographic position [deg] lies from the origin, straight through the earth [m].
+        """Return how far a geographic position [deg] is from the origin, through the earth [m].
 
         The plane does not tell: to it the other side of the earth is as near as this one.
         """

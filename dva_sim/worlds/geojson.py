@@ -105,7 +105,7 @@ def _error(path: Path, text: str, index: int, problem: str) -> ConfigError:
 
 
 def _place(text: str, index: int) -> int:
-    """Where a feature begins in the text of its file."""
+    """Return where a feature begins in the text of its file."""
     features = re.compile(r'"features"\s*:\s*\[').search(text)
     at = features.end() if features else 0
     decoder, gap = json.JSONDecoder(), re.compile(r"[\s,]*")
@@ -165,7 +165,7 @@ def _in_metres(geometry: dict[str, Any], frame: GeoFrame, crs: str, fail: Fail) 
 
 
 def _of_system(crs: str) -> str:
-    """What to do about a file in another coordinate reference system."""
+    """Explain what to do about a file in another coordinate reference system."""
     if not crs or re.search(r"CRS84|4326", crs):
         return ""
     return f"; its crs is {crs!r}: save it in EPSG:4326 (WGS 84)"

@@ -97,7 +97,7 @@ class Lidar:
     def _others_near(
         self, bodies: Sequence[RobotBody], eyes: Floats, others: Sequence[Body]
     ) -> tuple[Ints, Ints]:
-        """Who is in reach of whom: places in `others`, and in `bodies`."""
+        """Return pairs within reach: indices in `others`, and in `bodies`."""
         at = np.array([(body.x, body.y, body.radius) for body in others]).reshape(-1, 3)
         away = np.hypot(at[:, 0] - eyes[:, :1], at[:, 1] - eyes[:, 1:2])
         place = {body: number for number, body in enumerate(others)}
@@ -159,7 +159,7 @@ class Lidar:
 
 
 def _distance(walls: Floats, point: Floats) -> Floats:
-    """Of each wall `(n, 4)` from a point [m]."""
+    """Return the distance of each wall `(n, 4)` from a point [m]."""
     a, along = walls[:, :2], walls[:, 2:] - walls[:, :2]
     square = np.maximum((along**2).sum(axis=1), 1e-300)
     share = np.clip(((point - a) * along).sum(axis=1) / square, 0.0, 1.0)
@@ -179,7 +179,7 @@ def _edges(others: Sequence[Body], seen: Ints, by: Ints) -> tuple[Ints, Floats]:
 
 
 def _sides(body: Body) -> Floats:
-    """Where the sides of a body are now, shape `(k, 4)` [m]."""
+    """Return the sides of a body now, shape `(k, 4)` [m]."""
     corners = np.array(_corners(body))
     cos, sin = math.cos(body.body.angle), math.sin(body.body.angle)
     xy = corners @ np.array([[cos, sin], [-sin, cos]]) + (body.x, body.y)

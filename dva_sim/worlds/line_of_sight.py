@@ -1,4 +1,4 @@
-"""What can be seen from where: walls hide what is behind them."""
+"""Lines of sight: walls hide what is behind them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Sight:
         self._kept = lru_cache(maxsize=4096)(self._between)
 
     def between(self, a: Point, b: Point) -> bool:
-        """Whether no wall stands between two places [m]; who stands still asks the same again.
+        """Return True if no wall stands between two places [m]; repeated queries are cached.
 
         A wall blocks when its ends lie on both sides of the line a-b and a and b on both
         sides of the wall: not for who stands on its line, as in an exit, however rounded.
@@ -47,7 +47,7 @@ class Sight:
         return not blocked.any()
 
     def from_point(self, a: Point, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Whether each of many places `(..., 2)` [m] can be seen from one."""
+        """Return True for each of many places `(..., 2)` [m] that can be seen from one."""
         flat = points.reshape(-1, 2)
         seen = np.ones(len(flat), bool)
         ends = self._ends.T.reshape(-1, 2, 2)

@@ -31,7 +31,7 @@ USUAL_CELLS = 0.005, 1.0  # of a map [m]
 
 @dataclass(frozen=True, eq=False)
 class OccupancyGrid:
-    """What is known of a floor, cell by cell.
+    """State of each cell of a floor: free, occupied or unknown.
 
     Attributes:
         resolution: Side of a cell [m].
@@ -79,7 +79,7 @@ class OccupancyGrid:
         return int(self.look_up(self.cells, x, y, UNKNOWN))
 
     def look_up(self, values: NDArray[Any], x: float, y: float, outside: Any) -> Any:
-        """What an array of the grid's shape holds at a point [m]; else `outside`."""
+        """Return the value of an array of the grid's shape at a point [m]; else `outside`."""
         row, column = self.to_cell(x, y)
         rows, columns = values.shape
         return values[row, column] if 0 <= row < rows and 0 <= column < columns else outside
@@ -219,7 +219,7 @@ def load_ros_map(path: str | Path) -> OccupancyGrid:
 
 @lru_cache(maxsize=16)
 def doubts_of_map(path: str | Path) -> tuple[str, ...]:
-    """What in a valid map is hardly meant so, each in a sentence without its full stop.
+    """Describe what in a valid map is probably a mistake, each in a sentence without full stop.
 
     Raises:
         ConfigError: see `load_ros_map`.
@@ -313,7 +313,7 @@ def cells_inside(
     border: NDArray[np.float64],
     window: tuple[slice, slice] = np.s_[:, :],
 ) -> NDArray[np.bool_]:
-    """Which cells of a grid that is not turned have their middle inside a border.
+    """Return which cells of an unrotated grid have their middle inside a border.
 
     A middle on the border counts where the area lies east or north of it, so that areas
     side by side share no cell and leave none out.

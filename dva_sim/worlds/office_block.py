@@ -64,22 +64,22 @@ class FloorCell(NamedTuple):
 
     @property
     def area(self) -> float:
-        """Of its floor [m^2]."""
+        """Floor area [m^2]."""
         return self.width * self.depth
 
     @property
     def door_y(self) -> float:
-        """Of the wall at the corridor [m]."""
+        """Position of the wall at the corridor [m]."""
         return self.y2 if self.door_north else self.y1
 
     @property
     def back_y(self) -> float:
-        """Of the wall opposite to that [m]."""
+        """Position of the wall opposite the corridor [m]."""
         return self.y1 if self.door_north else self.y2
 
     @property
     def outwards(self) -> float:
-        """Where its door is: 1 in the north, -1 in the south."""
+        """Direction of its door: 1 for north, -1 for south."""
         return 1.0 if self.door_north else -1.0
 
     def box(self, left: float, right: float, near: float, far: float) -> Box:
@@ -189,7 +189,7 @@ def _cells(
 
 
 def _cuts(start: float, end: float, rng: np.random.Generator) -> list[float]:
-    """Where partitions stand: rooms as wide as drawn from `WISHES`, made to fit."""
+    """Return where partitions stand: room widths drawn from `WISHES`, scaled to fit."""
     length, wishes = end - start, list[float]()
     while sum(wishes) < length:
         wishes.append(rng.uniform(*WISHES[rng.choice(len(WISHES), p=ODDS)]))
@@ -206,7 +206,7 @@ APPROACH = 1.6  # free floor behind the door of a robot bay [m]
 
 
 class Use(NamedTuple):
-    """What a room is for.
+    """Use of a room.
 
     Attributes:
         name: As people call it.
@@ -315,7 +315,7 @@ def assign(layout: Layout, bases: int) -> list[tuple[FloorCell, Use, str]]:
 
 
 def _needs(layout: Layout) -> Iterator[tuple[Use, str, Callable[[FloorCell], float]]]:
-    """What a house needs: a use, a name, and what makes a cell unfit for it."""
+    """Yield the needs of a house: a use, a name, and a measure of how unfit a cell is."""
     for number in range(1, MOST_BAYS + 1):
         name = ROBOT_BAY.name if number == 1 else f"{ROBOT_BAY.name} {number}"
         yield ROBOT_BAY, name, lambda cell: cell.wing - cell.area / 1000
@@ -358,7 +358,7 @@ def _by_size(cell: FloorCell, numbers: Iterator[int]) -> tuple[Use, str]:
 
 
 def stands(bay: FloorCell) -> list[tuple[float, float]]:
-    """Where robots stand in a bay [m]: rows from the wall opposite to its door."""
+    """Return the positions of robots in a bay [m]: rows from the wall opposite its door."""
     columns = 1 + int((bay.width - 2 * BASE_WALL) / BASE_GAP + 1e-6)
     rows = 1 + int((bay.depth - BASE_WALL - APPROACH) / BASE_GAP + 1e-6)
     first = (bay.x1 + bay.x2 - (columns - 1) * BASE_GAP) / 2

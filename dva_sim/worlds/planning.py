@@ -72,7 +72,7 @@ class Planner:
         return None if way is None else way.copy()
 
     def room_at(self, points: Floats) -> Floats:
-        """How far the nearest wall is from each of many points `(n, 2)` [m]."""
+        """Return the distance from each of many points `(n, 2)` to the nearest wall [m]."""
         return self._roadmap.room_at(points)
 
     def distance(self, start: Point, goal: Point) -> float:
@@ -87,7 +87,7 @@ class Planner:
         return self._roadmap.cost(_plain(start), _plain(goal))
 
     def line_of_sight(self, a: Point, b: Point) -> bool:
-        """Whether no wall stands between two places [m]."""
+        """Return True if no wall stands between two places [m]."""
         return self._roadmap.sight.between(a, b)
 
 
@@ -136,7 +136,7 @@ class Roadmap:
         self._field_of = lru_cache(kept)(self._field)
 
     def _around(self, discs: tuple[Disc, ...]) -> Roadmap:
-        """The same floor with some things standing on it."""
+        """Return the roadmap of the floor with some obstacles on it."""
         room = self._grid.clearance.copy()
         rows, columns = room.shape
         for x, y, radius in discs:
@@ -169,12 +169,12 @@ class Roadmap:
         return _both_ways(csr_array((cost, (a, b)), shape=(free.size, free.size)))
 
     def _length(self, start: Point, goal: Point) -> float:
-        """Of the way [m]; infinite if there is none."""
+        """Return the length of the path [m]; infinite if there is none."""
         way = self.way(start, goal)
         return math.inf if way is None else float(np.hypot(*np.diff(way, axis=0).T).sum())
 
     def cost(self, start: Point, goal: Point) -> float:
-        """Of the way, as the graph has it: the same in both directions."""
+        """Return the cost of the path in the graph: the same in both directions."""
         first, last = self._node_at(start), self._node_at(goal)
         if first is None or last is None:
             return math.inf
@@ -285,7 +285,7 @@ def _both_ways(graph: Any) -> Any:
 
 
 def _points_between(a: Floats, b: Floats, count: int) -> Floats:
-    """What `np.linspace` gives of two points, to the last bit, for three fifths of its cost."""
+    """Interpolate between two points as `np.linspace` does, to the last bit, at 60 % of the cost."""
     way, last = b - a, count - 1
     step, numbers = way / last, np.arange(count, dtype=np.float64)[:, None]
     points: Floats = numbers * step if step.all() else numbers / last * way
@@ -295,13 +295,13 @@ def _points_between(a: Floats, b: Floats, count: int) -> Floats:
 
 
 def _price(room: Floats) -> Floats:
-    """What a metre costs at a clearance [m]: 1 in the open, more near walls."""
+    """Return the cost of a metre at a clearance [m]: 1 in the open, more near walls."""
     lack: Floats = np.maximum(1.0 - room / COMFORT, 0.0)
     return 1.0 + SHYNESS * lack**2
 
 
 def _resample(points: Floats) -> Floats:
-    """The same line with points about `STEP` apart [m]."""
+    """Resample a line to points about `STEP` apart [m]."""
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))]
     at = np.linspace(0.0, along[-1], 2 + int(along[-1] / STEP))
     return np.stack([np.interp(at, along, points[:, 0]), np.interp(at, along, points[:, 1])], 1)

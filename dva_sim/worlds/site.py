@@ -71,7 +71,7 @@ class Site(FloorPlan):
     _kept: dict[object, Any] = field(default_factory=dict, repr=False)
 
     def kept(self, key: object, make: Callable[[], T]) -> T:
-        """What `make` makes: once for this site, and for copies of it on the same grid."""
+        """Return what `make` makes, cached for this site and its copies on the same grid."""
         key = self.grid, key
         if key not in self._kept:
             self._kept[key] = make()
@@ -153,7 +153,7 @@ class Site(FloorPlan):
         raise ConfigError(f"site {self.name!r} has no room {name!r}; {told}")
 
     def is_free(self, x: float, y: float, clearance: float) -> bool:
-        """Whether a disc of radius `clearance` [m] fits at a point [m], to within a cell."""
+        """Return True if a disc of radius `clearance` [m] fits at a point [m], to within a cell."""
         return self.grid.state_at(x, y) == FREE and self.grid.clearance_at(x, y) >= clearance
 
     def sample_free(
@@ -386,7 +386,7 @@ class _Places:
         return x, y
 
     def _are_free(self, points: Floats, place: Sequence[float]) -> NDArray[np.bool_]:
-        """Which points `(n, 2)` are far enough from a place [m]."""
+        """Return which points `(n, 2)` are far enough from a place [m]."""
         free: NDArray[np.bool_] = np.hypot(*(points - place).T) >= self._apart
         return free
 
@@ -474,7 +474,7 @@ def _load_site(path: Path, options: str) -> Site:
 
 
 def _site_of_plan(path: Path) -> str:
-    """Which site has a plan, or how one is written."""
+    """Name the site that has a plan, or explain how one is written."""
     for file in sorted(path.parent.glob("*.yaml")):
         with suppress(ConfigError):
             if load_yaml(file).data.get("plan") == path.name:

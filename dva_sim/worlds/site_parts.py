@@ -1,4 +1,4 @@
-"""What a site is made of: rooms, detectors, exits, zones, cameras, radio and its coverage."""
+"""Parts of a site: rooms, detectors, exits, zones, cameras, radio and its coverage."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class NamedArea:
     holes: tuple[Points, ...] = field(default=(), kw_only=True)
 
     def contains(self, x: float, y: float) -> bool:
-        """Whether a point [m] lies inside: a ray from it crosses the border an odd time."""
+        """Return True if a point [m] lies inside: a ray from it crosses the border an odd time."""
         odd = False
         for corners in self._rings:
             px, py = corners[-1]
@@ -50,7 +50,7 @@ class NamedArea:
 
     @cached_property
     def area(self) -> Any:
-        """The same as a shapely polygon."""
+        """The polygon as a shapely geometry."""
         import shapely  # late: start-up
 
         return shapely.Polygon(self.polygon, self.holes)
@@ -113,7 +113,7 @@ PROBES = (0.06, 0.2, 0.35, 0.5)  # how far from a door to look for what lies the
 
 
 def beyond(rooms: Lookup[Room], x: float, y: float, heading: float) -> Room | None:
-    """What lies on one side of a door: its middle [m], and where that side is [rad]."""
+    """Find the room on one side of a door, given its middle [m] and the direction [rad]."""
     cos, sin = math.cos(heading), math.sin(heading)
     found = (rooms.at(x + far * cos, y + far * sin) for far in PROBES)
     return next((room for room in found if room is not None), None)
@@ -127,7 +127,7 @@ class Zone(NamedArea):
 
 
 class LinkQuality(NamedTuple):
-    """What a radio link is like somewhere, on top of what it is like anyway.
+    """Quality of a radio link at a place, in addition to the link's own.
 
     Attributes:
         loss: Probability that a packet is lost, each way.
@@ -140,7 +140,7 @@ class LinkQuality(NamedTuple):
     extra_delay_s: float
 
     def is_as_bad_as(self, other: LinkQuality) -> bool:
-        """Whether any of its three numbers is: `none` loses all, whatever its rate."""
+        """Return True if any of its three numbers is at least as bad; `none` loses everything."""
         lossy = 0 < other.loss <= self.loss
         return (
             lossy
@@ -160,7 +160,7 @@ QUALITIES = {
 
 @dataclass(frozen=True, eq=False)
 class RadioCoverage(NamedArea):
-    """Where the radio link has a quality of its own."""
+    """Area in which the radio link has a quality of its own."""
 
     quality: LinkQuality = QUALITIES["good"]
 
@@ -220,7 +220,7 @@ class BaseStation(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FloorPlan:
-    """What is where on a site.
+    """Layout of a site.
 
     Attributes:
         walls: Segments x1, y1, x2, y2, opened at the doors, shape `(n, 4)` [m].
@@ -273,7 +273,7 @@ class Compartment:
 
 
 class Opening(NamedTuple):
-    """Where air, water and people pass between two compartments.
+    """Opening through which air, water and people pass between two compartments.
 
     Attributes:
         room_a: Name of a compartment.

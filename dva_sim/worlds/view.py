@@ -109,7 +109,7 @@ def draw_site(
 
 
 def limits(site: Site) -> tuple[tuple[float, float], tuple[float, float]]:
-    """What a picture of a site shows, scale bar and all: from x to x, from y to y [m]."""
+    """Return what a picture of a site shows, with the scale bar: ranges of x and of y [m]."""
     xmin, ymin, xmax, ymax = site.extent
     margin, below = (max(least, share * (xmax - xmin)) for least, share in (MARGIN, BELOW))
     return (xmin - margin, xmax + margin), (ymin - margin - below, ymax + margin)

@@ -1,4 +1,4 @@
-"""What stands on a site, as marks: detectors, bases, posts, desks, cameras, antennas; and names.
+"""Marks of a site: detectors, bases, posts, desks, cameras, antennas; and names.
 
 Names of rooms are written where they fit: smaller, in more lines, or turned; else left out.
 """
@@ -54,7 +54,7 @@ def points_per_metre(ax: Axes) -> float:
 
 
 def scale_of(ax: Axes) -> float:
-    """How large marks are: on a large site they are smaller, but not in proportion."""
+    """Return the size of marks: smaller on a large site, but not in proportion."""
     return min(1.1, max(0.45, math.sqrt(points_per_metre(ax) / FULL_SIZE)))
 
 
@@ -181,7 +181,7 @@ def write_names(ax: Axes, site: Site, least: float = 0.0) -> None:
 
 
 def _things(site: Site) -> list[Any]:
-    """What names should not cover."""
+    """Return what names should not cover."""
     marks = [(d.x, d.y, 0.3) for d in site.detectors]
     marks += [(s.x, s.y, 0.5) for s in site.base_stations]
     marks += [(c.x, c.y, 0.3) for c in site.cameras]
@@ -257,7 +257,7 @@ def _box(setting: NameLayout) -> tuple[float, float]:
 
 @lru_cache(maxsize=4096)
 def _width(line: str) -> float:
-    """Of a line, in font sizes."""
+    """Return the width of a line, in font sizes."""
     font = FontProperties(size=10)
     width, _, _ = text_to_path.get_text_width_height_descent(line, font, ismath=False)
     return float(width) / 10 + SLACK
@@ -269,7 +269,7 @@ def _boxes(middles: NDArray[np.float64], width: float, height: float) -> Any:
 
 
 def _spots(area: Any, width: float, height: float) -> NDArray[np.float64]:
-    """Where the middle of a box may lie, those near the middle of the area first."""
+    """Return possible middles of a box, those near the middle of the area first."""
     xmin, ymin, xmax, ymax = area.bounds
     if width > xmax - xmin or height > ymax - ymin:
         return np.empty((0, 2))

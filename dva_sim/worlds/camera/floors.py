@@ -35,7 +35,7 @@ DAYLIGHT, BARE_CEILING, CEILING, LAMP = (205, 222, 238), (208,) * 3, (206,) * 3,
 
 
 class Floors:
-    """What rows of pixels show where nothing stands.
+    """Colours of the floor in rows of pixels.
 
     Args:
         site: Whose floors.
@@ -171,6 +171,6 @@ def _coarser(colours: Bytes, times: int) -> Bytes:
 
 
 def _evenly(low: float, high: float) -> NDArray[np.float64]:
-    """Where lamps hang between two walls."""
+    """Return the positions of lamps between two walls."""
     count = max(1, round((high - low) / LAMPS))
     return low + (np.arange(count) + 0.5) * (high - low) / count

@@ -79,7 +79,7 @@ class Camera:
         water: Raster | None = None,
         time: float = 0.0,
     ) -> Picture:
-        """What the camera sees, `(height, width, 3)`, red, green and blue.
+        """Return the picture of the camera, `(height, width, 3)`, red, green and blue.
 
         Args:
             pose: Of the lens [m, rad].
@@ -114,7 +114,7 @@ class Camera:
         return picture
 
     def _rays(self, pose: Pose) -> Rays:
-        """Where the columns look."""
+        """Return the directions of the columns."""
         cos, sin = math.cos(pose.heading), math.sin(pose.heading)
         slopes = self._slopes
         length = np.sqrt(1 + slopes * slopes)
@@ -163,12 +163,12 @@ class Camera:
         return hits.depth, light * _dim(hits.depth)
 
     def _texels(self, fall: Floats) -> Any:
-        """How many texels above the floor is what lies so far below the lens [m]."""
+        """Return the height above the floor, in texels, of a point this far below the lens [m]."""
         texel = ((EYE_HEIGHT - fall) * self._texels_per_metre).astype(np.int32)
         return np.clip(texel, 0, TEXELS - 1, out=texel)
 
     def _first_texels(self, hits: Hits, pose: Pose) -> Any:
-        """Where the painted column of each hit begins."""
+        """Return where the painted column of each hit begins."""
         rays = self._rays(pose)
         x = pose.x + hits.depth * rays.x[hits.column]
         y = pose.y + hits.depth * rays.y[hits.column]
@@ -268,7 +268,7 @@ def _develop(colours: Any, light: Floats) -> Floats:
 
 
 def _pixels(start: float, size: float, count: int, texels: int) -> tuple[slice, Any]:
-    """Which of `count` pixels a length covers, and which texel each of them shows."""
+    """Return which of `count` pixels a length covers, and the texel that each of them shows."""
     first, last = min(count, max(0, round(start))), max(0, min(count, round(start + size)))
     last = max(first, last)
     source = (np.arange(first, last) + 0.5 - start) * (texels / size)

@@ -76,7 +76,7 @@ def _palette(outside: tuple[float, float, float]) -> NDArray[np.float64]:
 
 
 def _accents(site: Site) -> Ints:
-    """Which colour of the palette each room has, by its number from 1."""
+    """Return each room's colour in the palette, by the room's number from 1."""
     accents = [0]
     for room in site.rooms:
         if room.outdoor:
@@ -91,7 +91,7 @@ def _accents(site: Site) -> Ints:
 def _room_numbers(
     site: Site, origin: tuple[float, float], cell: float, shape: tuple[int, int]
 ) -> NDArray[np.uint16]:
-    """Which room each cell belongs to, from 1; 0 outside all."""
+    """Return the number of each cell's room, from 1; 0 outside all rooms."""
     numbers = np.zeros(shape, dtype=np.uint16)
     for number, room in enumerate(site.rooms, 1):
         # Cells whose middles lie inside.

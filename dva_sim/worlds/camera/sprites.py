@@ -49,7 +49,7 @@ class Sprite(NamedTuple):
 
 
 def view_of(heading: float, bearing: float) -> str:
-    """Which side of a figure a lens sees.
+    """Return the side of a figure that a lens sees.
 
     Args:
         heading: Of the figure [rad].
@@ -249,7 +249,7 @@ class _Pen:
         self._draw.polygon([self._at(x, y) for x, y in corners], fill=colour)
 
     def sprite(self, mirrored: bool = False) -> Sprite:
-        """What was drawn, with smooth edges."""
+        """Return the drawing with smooth edges."""
         image = self._image.transpose(Image.Transpose.FLIP_LEFT_RIGHT) if mirrored else self._image
         values = np.asarray(image, dtype=np.float32)
         rows, columns = values.shape[0] // FINER, values.shape[1] // FINER
@@ -281,7 +281,7 @@ class Figure(NamedTuple):
 
 
 def sprite_of(figure: Figure, bearing: float) -> Sprite:
-    """How somebody looks from where the lens is.
+    """Return the sprite of a figure as seen from the lens.
 
     Args:
         figure: Who.

@@ -112,7 +112,7 @@ class Surfaces:
         return places.astype(np.float32)
 
     def hits(self, pose: Pose, slopes: Floats) -> tuple[Hits, Hits]:
-        """What the columns meet: the nearest wall of each, and what stands before it.
+        """Return what the columns meet: the nearest wall of each, and what stands before it.
 
         Args:
             pose: Of the lens [m, rad].
@@ -180,7 +180,7 @@ def _spans(local: Floats, slopes: Floats) -> tuple[Any, ...]:
 
 
 def _sides_of_solids(site: Site, walls: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which walls are sides of solids, not of rooms."""
+    """Return which walls are sides of solids rather than of rooms."""
     corners = {
         corner for solid in site.solids for corner in map(tuple, np.round(solid, 3).tolist())
     }
@@ -197,7 +197,7 @@ def doorways(site: Site) -> tuple[NDArray[np.float64], Floats]:
 
 
 def _shut(doors: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which doors have a wall right across them: ways out that nobody drives through `(n,)`."""
+    """Return which doors have a wall right across them: exits that nobody drives through `(n,)`."""
     lines: Any = shapely.linestrings(walls.reshape(-1, 2, 2))
     middles: Any = shapely.points((doors[:, :2] + doors[:, 2:]) / 2)
     gaps = shapely.distance(middles[:, None], lines[None, :])

@@ -40,7 +40,7 @@ SIGN, EXIT = (40, 62, 96), (26, 122, 66)
 
 
 class Uprights:
-    """How everything upright on a site looks.
+    """Textures of everything upright on a site.
 
     Args:
         site: Whose.
@@ -155,7 +155,7 @@ def _windows(height: Any, accent: Any) -> NDArray[np.float64]:
 
 
 def _signs(site: Site) -> list[tuple[float, str, str]]:
-    """Of each door: its width [m], and its signs seen from the right of its line and the left."""
+    """Return the width [m] of each door, and its signs as seen from the right and the left."""
     signs = []
     for x1, y1, x2, y2 in doorways(site)[0].tolist():
         wide = max(float(np.hypot(x2 - x1, y2 - y1)), 0.1)
@@ -166,7 +166,7 @@ def _signs(site: Site) -> list[tuple[float, str, str]]:
 
 
 def _name(site: Site, point: Any) -> str:
-    """What a sign calls a place [m]."""
+    """Return the name of a place [m] on a sign."""
     inside = [room for room in site.rooms if not room.outdoor and room.contains(*point)]
     return inside[0].name if inside else "Exit"
 

@@ -1,4 +1,4 @@
-"""What fire, smoke and water do to a picture."""
+"""Effects of fire, smoke and water on a picture."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WATER = np.array([92, 128, 160], dtype=np.float32)
 
 
 class Rays(NamedTuple):
-    """Where each pixel of a picture looks.
+    """Direction of each pixel of a picture.
 
     Attributes:
         x: East of the lens, per metre ahead `(w,)`.
@@ -112,7 +112,7 @@ def add_smoke(
 
 
 def _in_the_layer(depth: Floats, fall: Floats, heights: Any, share: Floats) -> Floats:
-    """Which share of each pixel's ray runs above the lower face of the layer `(h, w)`."""
+    """Return the share of each pixel's ray above the lower face of the layer `(h, w)`."""
     eye, ceiling = heights
     bottom = ceiling * (1 - np.minimum(share, 1))
     here, there = np.float32(eye) - bottom, depth * -fall[:, None]

@@ -44,7 +44,7 @@ class Spaces:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of compartments."""
         return len(self.area)
 
 
@@ -93,7 +93,7 @@ class SitePoints:
         self.spaces = self.of(building.labels)
 
     def of(self, cells: NDArray[np.integer]) -> Integers:
-        """What the cells of the building's grid say at each point; -1 beyond them."""
+        """Return the value of the building's grid at each point; -1 beyond it."""
         return np.where(self._inside, cells[self._cells], -1).astype(np.int64)
 
 
@@ -123,7 +123,7 @@ def _building(site: Site) -> Building:
 
 
 class _Cut(NamedTuple):
-    """How a compartment is cut.
+    """Cut of a compartment.
 
     Attributes:
         first: Index of its first part.
@@ -200,5 +200,5 @@ class _Parting:
 
 
 def _span(cells: Integers) -> int:
-    """How many rows or columns cells lie in."""
+    """Return the number of rows or columns that cells span."""
     return int(cells.max() - cells.min()) + 1 if len(cells) else 1

@@ -1,4 +1,4 @@
-"""What detectors of each kind need to sound: smoke, heat, gas, carbon monoxide or water.
+"""Detectors and their thresholds: smoke, heat, gas, carbon monoxide or water.
 
 References:
     EN 50291-1:2018: alarm times of carbon monoxide alarms.
@@ -64,7 +64,7 @@ class CoAlarm:
 
 # --- any detector ----------------------------------------------------------------------
 class DetectorAlarm(NamedTuple):
-    """What a detector makes of a hazard that begins at 0.
+    """Response of a detector to a hazard that begins at 0.
 
     Attributes:
         sounds: Whether it sounds at an age [s], so long after it was last asked [s]; it is asked

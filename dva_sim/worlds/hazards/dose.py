@@ -1,4 +1,4 @@
-"""What heat, smoke, gas and water do to a person.
+"""Effects of heat, smoke, gas and water on a person.
 
 References:
     ISO 13571:2012, Life-threatening components of fire: heat.
@@ -30,7 +30,7 @@ WADING = 0.3  # nobody who still stands gets slower in water than this share; as
 
 @dataclass
 class Dose:
-    """What a person has taken in: 1 stands for being unable to help oneself.
+    """Dose that a person has taken in: at 1 a person can no longer escape.
 
     Attributes:
         heat: Fractional effective dose of radiant heat and hot air.
@@ -52,7 +52,7 @@ class Dose:
 
     @property
     def incapacitated(self) -> bool:
-        """Whether one of the doses has become too much."""
+        """True if one of the doses has reached its limit."""
         return self.heat >= 1.0 or self.toxic >= 1.0
 
 

@@ -205,7 +205,7 @@ def jet_speed(heat: Floats, distance: float, ceiling: float) -> Floats:
 
 
 def jet_lag(heat: Floats, distance: float, ceiling: float) -> Floats:
-    """How long the jet needs to the detector [s]: up the plume, then outwards at its speed."""
+    """Return the delay of the ceiling jet [s]: up the plume, then outwards at its speed."""
     near = 0.15 * ceiling
     up = ceiling / jet_speed(heat, 0.0, ceiling)
     if distance <= near:
@@ -286,7 +286,7 @@ def _smoke(building: Building, growth: str, peak: float, room: int) -> tuple[Mar
 
 
 def _fire_of(growth: str, peak: float) -> Fire:
-    """Of all fires that go the same way one, by its age."""
+    """Return the fire of a growth and peak, shared by all fires that grow alike."""
     return Fire.model_construct(position=(0.0, 0.0), start=0.0, growth=growth, peak=peak)
 
 
@@ -380,7 +380,7 @@ class FireField(SolvedField):
         return np.append(value * share, 0.0)
 
     def _filled(self, state: Floats) -> tuple[Floats, Floats]:
-        """Of each space: volume of its smoke [m^3], and the share of the space that it fills."""
+        """Return the volume of each space's smoke [m^3], and the share of the space that it fills."""
         spaces = self.building.spaces
         volume = np.maximum(volumes(state), 1e-9)
         return volume, np.minimum(1.0, volume / (spaces.area * spaces.ceiling))
@@ -462,7 +462,7 @@ def _radiant(radiated: float, distance: float, radius: float) -> float:
 
 
 def _within(bottom: float) -> float:
-    """How far breathing height lies within a layer whose lower face is there [m], 0 to 1."""
+    """Return how far breathing height lies within a layer with this lower face [m], 0 to 1."""
     return min(1.0, max(0.0, (BREATHING_HEIGHT - bottom) / BLUR + 0.5))
 
 

@@ -114,7 +114,7 @@ class Filling:
         return new
 
     def step_without_inflow(self, state: Floats, age: float, dt: float) -> Floats:
-        """The same once the water is shut off."""
+        """Advance a step after the water has been shut off."""
         spaces = self._spaces
         depth = np.append(state[:-1] / spaces.area, 0.0)
         a, b = depth[spaces.a], depth[spaces.b]

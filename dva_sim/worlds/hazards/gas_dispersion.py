@@ -34,7 +34,7 @@ class Draught(NamedTuple):
 
 
 class Air:
-    """How the air of a mesh moves.
+    """Air flow between the cells of a mesh.
 
     Args:
         mesh: Where.

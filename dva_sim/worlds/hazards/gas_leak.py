@@ -163,7 +163,7 @@ class GasLeak(Hazard):
 
 @lru_cache(maxsize=64)
 def _reach(release: float, level: float, diffusivity: float, loss: float) -> tuple[Floats, Floats]:
-    """How far from a steady source the gas exceeds a level: ages [s] and radii [m].
+    """Return how far from a steady source the gas exceeds a level: ages [s] and radii [m].
 
     A line source from floor to ceiling in the open, diffusing and thinned by fresh air: the
     solution that hydrologists call the leaky aquifer.

@@ -1,4 +1,4 @@
-"""What a hazard is: a growing danger, the field that it makes on a site, and how both are shown.
+"""Hazards: a growing danger, the field that it makes on a site, and how both are shown.
 
 Derive from `Hazard` and `HazardField` to make a kind of your own; worlds/HAZARDS.md says how.
 
@@ -114,7 +114,7 @@ class Hazard(Config, defer_build=False):  # its signature, which tells the setti
         raise NotImplementedError
 
     def field(self, site: Site) -> HazardField:
-        """What it does to a site."""
+        """Return the field that it makes on a site."""
         raise NotImplementedError
 
     def noticed_by(self) -> tuple[str, ...]:
@@ -126,16 +126,16 @@ class Hazard(Config, defer_build=False):  # its signature, which tells the setti
         return math.inf
 
     def sprite(self, time: float, ceiling: float) -> Sprite | None:
-        """What stands there before a robot's camera at `time` [s], below a ceiling [m]."""
+        """Return its sprite for a robot's camera at `time` [s], below a ceiling [m]."""
         return None
 
     def light(self, time: float) -> float:
-        """How much it lights up its room before a camera at `time` [s], 0 to 1."""
+        """Return how much it lights its room for a camera at `time` [s], 0 to 1."""
         return 0.0
 
 
 class HazardField:
-    """What one hazard does to the air and the floor of a site; derive from this.
+    """Effect of one hazard on the air and the floor of a site; derive from this.
 
     Only `at` has to be defined: everything else follows from it, if slowly. Nothing may depend
     on what was asked before.
@@ -153,7 +153,7 @@ class HazardField:
         self.until = math.inf
 
     def at(self, x: float, y: float, time: float) -> Conditions:
-        """What it adds to clear air at a place [m]; nothing up to its start."""
+        """Return what it adds to clear air at a place [m]; nothing up to its start."""
         raise NotImplementedError
 
     def picture(self, what: str, places: SitePoints, time: float) -> Floats | None:
@@ -171,7 +171,7 @@ class HazardField:
         )
 
     def is_hazy(self, time: float) -> bool:
-        """Whether anybody's sight is impaired at `time` [s]: quick, as cameras ask often."""
+        """Return True if anybody's sight is impaired at `time` [s]; fast, for cameras."""
         return "smoke" in self.hazard.shows and time > self.hazard.start
 
     def haze(self, places: SitePoints, time: float) -> Floats:
@@ -179,7 +179,7 @@ class HazardField:
         return self._part("extinction", places, time)
 
     def alarm(self, detector: str, x: float, y: float) -> DetectorAlarm:
-        """What a kind of detector at a place [m] makes of it, if it begins at 0 and goes on."""
+        """Return a detector's response at a place [m], if the hazard begins at 0 and goes on."""
         return alarm_in(detector, lambda age: self.at(x, y, age))
 
     def _part(self, part: str, places: SitePoints, time: float) -> Floats:
@@ -257,7 +257,7 @@ class SolvedField(HazardField):
         return self.solve()
 
     def march(self, time: float) -> tuple[March, float]:
-        """Where the state at `time` [s] is to be found: at which age of which march [s]."""
+        """Return the march that holds the state at `time` [s], and the age in it [s]."""
         (shared, step), start = self._solved, self._start
         age, stopped = time - start, self.until - start
         stopped = stopped if stopped > 0.0 else 0.0
@@ -285,7 +285,7 @@ class SolvedField(HazardField):
 
 
 def detection_time(hazard: Hazard, detector: Detector, site: Site) -> float:
-    """When a detector notices a hazard [s]; infinite if it does not within an hour."""
+    """Return when a detector notices a hazard [s]; infinite if it does not within an hour."""
     return _first(hazard, [detector] if detector.kind in hazard.noticed_by() else [], site)[1]
 
 

@@ -90,7 +90,7 @@ class SmokeLayers:
         return self._move(state, self._heat(age + dt / 2), dt)
 
     def step_without_fire(self, state: Floats, age: float, dt: float) -> Floats:
-        """The same once the fire is out."""
+        """Advance a step after the fire has been put out."""
         return self._move(state, 0.0, dt)
 
     def _move(self, state: Floats, heat: float, dt: float) -> Floats:
@@ -108,13 +108,13 @@ class SmokeLayers:
         return self._ceiling - np.minimum(depth, self._ceiling), kelvin
 
     def _risen(self, heat: float, bottom: float) -> Floats:
-        """What the plume brings into the fire room's layer each second."""
+        """Return what the plume adds to the fire room's layer each second."""
         convective, fuel = (1.0 - RADIATIVE_FRACTION) * heat, heat / HEAT_OF_COMBUSTION
         air = plume(convective, max(LOWEST, bottom))
         return np.array([air + fuel, convective, SOOT_YIELD * fuel, CO_YIELD * fuel])
 
     def _spilt(self, state: Floats, bottom: Floats, kelvin: Floats, dt: float) -> Floats:
-        """What passes through doors in a step."""
+        """Return what flows through doors in a step."""
         spaces, change = self._spaces, np.zeros_like(state)
         low = np.minimum(bottom[spaces.a], bottom[spaces.b])
         open_ = np.flatnonzero(low < spaces.top)
@@ -170,7 +170,7 @@ class SmokeLayers:
         state[:-1, HEAT] /= 1.0 + rate * dt
 
     def _overflow(self, state: Floats) -> None:
-        """What a space cannot hold is pressed where there is room, or out through the cracks."""
+        """Push what a space cannot hold to where there is room, or out through cracks."""
         room = self._area[:-1] * self._ceiling[:-1]
         volume = volumes(state[:-1])
         full = np.append(volume > room, False)

@@ -52,12 +52,12 @@ class Surroundings:
 
     @property
     def has_any(self) -> bool:
-        """Whether there is any hazard."""
+        """True if there is any hazard."""
         return bool(self._hazards)
 
     @property
     def may_be_wet(self) -> bool:
-        """Whether water ever stands on the floor."""
+        """True if water ever stands on the floor."""
         return any("water" in hazard.shows for hazard in self._hazards)
 
     def contain(self, number: int, time: float) -> None:
@@ -66,7 +66,7 @@ class Surroundings:
         field.until = min(field.until, time)
 
     def at(self, x: float, y: float, time: float) -> Conditions:
-        """What it is like at a place [m] at `time` [s], at breathing height."""
+        """Return the conditions at a place [m] at `time` [s], at breathing height."""
         here = CLEAR
         for hazard, field in zip(self._hazards, self._fields, strict=True):
             if time > hazard.start:
@@ -74,7 +74,7 @@ class Surroundings:
         return here
 
     def is_hazy(self, time: float) -> bool:
-        """Whether smoke is at eye height anywhere at `time` [s]: quick, as cameras ask often."""
+        """Return True if smoke is at eye height anywhere at `time` [s]; fast, for cameras."""
         for field in self._fields:  # noqa: SIM110 - a generator takes as long as the answer
             if field.is_hazy(time):
                 return True
