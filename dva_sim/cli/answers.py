@@ -47,7 +47,7 @@ def answers(studies: list[str], keep: list[str], page: bool, mark: bool, jobs: i
 
 
 def _folder() -> Path:
-    """Where answers are kept: beside the shipped studies."""
+    """Return where answers are kept: beside the shipped studies."""
     from dva_sim.experiments.report.kept_answers import FOLDER  # late: start-up
     from dva_sim.experiments.study.study import FOLDER as STUDIES  # late: start-up
     from dva_sim.kernel import resources  # late: start-up
@@ -85,7 +85,7 @@ def _compare(folder: Path, studies: list[str], mark: bool, jobs: int | None) -> 
 
 
 def _told(answer: KeptAnswer, now: dict[str, str]) -> tuple[str, bool]:
-    """Whether an answer is still given, in words, and whether it is not."""
+    """Describe whether an answer is still given; and whether it is stale."""
     dated = f"{answer.status}, {answer.version}, {answer.date}"
     if not answer.sampled:
         return f"measured in real time, so not compared ({dated})", False

@@ -1,4 +1,4 @@
-"""What `check` and `schema` print, and the exit code they end with."""
+"""Output and exit code of `check` and `schema`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a command and a group of commands are made, read their words, and look in help.
+"""Commands and groups of commands: how they are made, read their words, and look in help.
 
 A call makes the one command that it names: to make all of them takes as long as to load Typer.
 """
@@ -95,7 +95,7 @@ class PanelGroup(TyperGroup):
         return super().get_command(ctx, cmd_name)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """As ever; of a command that there is not, the nearest is named."""
+        """Resolve a command; for an unknown one, suggest the nearest."""
         name = args[0]
         if not ctx.resilient_parsing and self.get_command(ctx, name) is None and name[0] != "-":
             ctx.fail(f"{name!r} is not a command; {hint(name, self.list_commands(ctx))}")
@@ -112,7 +112,7 @@ class PanelGroup(TyperGroup):
 
 
 def _in_short(command: Command, room: int) -> str:
-    """What it does, without its being made."""
+    """Return a command's summary without making the command."""
     text = command.info.help if isinstance(command, typer.Typer) else command.__doc__
     return str(CommandWithExamples("", help=str(text)).get_short_help_str(room))
 

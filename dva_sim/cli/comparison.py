@@ -69,7 +69,7 @@ _MARK = "*"
 def tell(
     comparison: Comparison, measures: Sequence[str], by: Sequence[str], console: Console
 ) -> None:
-    """Which folders, which cells, and how each measure differs.
+    """Print which folders and cells are compared, and how each measure differs.
 
     Args:
         comparison: Of the two folders.
@@ -120,7 +120,7 @@ def _set(side: Results) -> str:
 
 
 def _questions(comparison: Comparison) -> list[str]:
-    """What two studies ask, if it is not the same."""
+    """Return the questions of two studies, if they differ."""
     asked = [side.question for side in comparison.sides]
     if asked[0] == asked[1]:
         return []

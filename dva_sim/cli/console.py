@@ -1,4 +1,4 @@
-"""Where commands print for people."""
+"""Terminal on which commands print for people."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ def _say_when_done(maker: subprocess.Popen[bytes], part: Path, path: Path) -> No
 
 
 def _tell(out: Path, took_s: float) -> None:
-    """What it took, and where to go from here."""
+    """Print what it took, and what to do next."""
     cpu_s = sum(os.times()[:4]) + Results.load(out).machine.get("cpu_s", 0.0)
     say(f"Took {took_s:.0f} s, and about {cpu_s:.0f} s of CPU time with those of the results.")
     say(f"In the terminal: dva-sim show {out}")

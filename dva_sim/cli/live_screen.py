@@ -44,7 +44,7 @@ COLUMNS = (
 
 
 class Board:
-    """What is known of all devices, put together from the reports of all parts."""
+    """State of all devices, assembled from the reports of all parts."""
 
     def __init__(self) -> None:
         self.devices: dict[str, dict[str, Any]] = {}
@@ -91,7 +91,7 @@ class Board:
         return Text("\n".join(story_line(line) for line in self.story[-STORY_LINES:]))
 
     def state_of_events(self) -> str:
-        """How the events stand, in a line."""
+        """Summarise the events in a line."""
         told = [f"event {e['number']} ({e['kind']}) is {e['state']}" for e in self.events]
         return "; ".join(told) or "no event was reported"
 

@@ -50,7 +50,7 @@ def plugins_as_json() -> dict[str, Any]:
 
 
 def plugin_lines() -> Iterator[str]:
-    """The same for people."""
+    """Yield the plug-ins as lines for people."""
     for number, (several, (word, plugins)) in enumerate(kinds_of_plugins().items()):
         yield f"{chr(10) if number else ''}{several}"
         for title, told in _facts(word, plugins):
@@ -121,7 +121,7 @@ class NamedThing:
 
 
 def kinds() -> list[str]:
-    """What can be listed, in the order in which it is."""
+    """Return what can be listed, in the order of the list."""
     return [*FILES, *(trial.classes for trial in TRIALS.values())]
 
 
@@ -142,12 +142,12 @@ def everything(kind: str | None = None) -> dict[str, list[NamedThing]]:
 
 
 def as_json(kind: str | None = None) -> dict[str, Any]:
-    """The same as JSON can hold it: for each kind a list of `name`, `description` and `file`."""
+    """Return the list as JSON: for each kind a list of `name`, `description` and `file`."""
     return {name: [vars(entry) for entry in found] for name, found in everything(kind).items()}
 
 
 def lines(kind: str | None = None) -> Iterator[str]:
-    """The same for people: a line for each name."""
+    """Yield the list for people: a line for each name."""
     for number, (title, entries) in enumerate(everything(kind).items()):
         yield f"{chr(10) if number else ''}{title}"
         width = max((len(entry.name) for entry in entries), default=0)
@@ -169,7 +169,7 @@ def _files(kind: str, folder: str) -> Iterator[NamedThing]:
 
 
 def _described(path: Path) -> str:
-    """What a file says of itself, without the whole of it being read as YAML."""
+    """Return a file's description, without parsing all of it as YAML."""
     try:
         head = _HEAD.search(path.read_text(encoding="utf-8") + "\n")
         found = parse_scalar(head[0]) if head else {}

@@ -23,7 +23,7 @@ from dva_sim.kernel.suggestions import hint
 
 
 def in_a_line(error: Any) -> str:
-    """What is wrong with a call, and what would be right."""
+    """Describe what is wrong with a call, and what would be right."""
     path = error.ctx.command_path if error.ctx is not None else "dva-sim"
     more, kind = f"see {path} --help", type(error).__name__
     if kind == "NoSuchOption":
@@ -124,7 +124,7 @@ class DvaSimProgram(PanelGroup):
             raise ReaderGone("nobody reads") from None
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
-        """What each number means that a command can end with."""
+        """Explain the exit codes."""
         with formatter.section("Exit codes"):
             formatter.write_dl([(str(int(code)), code.meaning) for code in ExitCode])
 

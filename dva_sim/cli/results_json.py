@@ -1,4 +1,4 @@
-"""What `show` and `compare` tell, as plain data for other programs; the keys stay as they are.
+"""Output of `show` and `compare` as plain data for other programs; keys are stable.
 
 Missing numbers are nan here, and null once printed. Levels are by factor, as in the study.
 """
@@ -68,7 +68,7 @@ def table(results: Results, name: str, most: int) -> Data:
 
 
 def columns(results: Results, tables: Sequence[str]) -> Data:
-    """What the columns of some tables mean, or of all.
+    """Explain the columns of some tables, or of all.
 
     Raises:
         ConfigError: no such table.
@@ -83,7 +83,7 @@ def compared(
     by: Sequence[str],
     verdicts: Sequence[GateVerdict],
 ) -> Data:
-    """How two results differ, and what a gate makes of it; differences are B minus A.
+    """Return how two results differ, with the verdicts of a gate; differences are B minus A.
 
     Raises:
         ConfigError: no such measure or factor.

@@ -76,7 +76,7 @@ def _open(name: str, changes: Sequence[str]) -> Site:
 
 
 def describe(site: Site) -> str:
-    """What a site is, in a line."""
+    """Describe a site in a line."""
     xmin, ymin, xmax, ymax = site.extent
     indoor = sum(not room.outdoor for room in site.rooms)
     parts = {

@@ -87,7 +87,7 @@ def _columns(run: Played) -> Sequence[Measure]:
 
 # --- a full run ----------------------------------------------------------------------
 def tell_story(playback: Playback, console: Console) -> None:
-    """What happened, in order."""
+    """Print the events of a run in order."""
     scenario = playback.scenario
     delay, phone = scenario.link.delay_s * 1000, scenario.phone.profile
     console.rule(f"{scenario.pattern}, {delay:g} ms each way, phone {phone}, seed {playback.seed}")
@@ -99,13 +99,13 @@ def tell_story(playback: Playback, console: Console) -> None:
 
 
 def tell_side_by_side(runs: Sequence[Playback], console: Console) -> None:
-    """How runs under several patterns ended, beside each other."""
+    """Print the outcomes of runs under several patterns, side by side."""
     console.rule("side by side")
     print_lines(story(runs), console)
 
 
 def tell_outcome(tables: Tables, how: str, console: Console) -> None:
-    """What came of it.
+    """Print the outcome of a run.
 
     Args:
         tables: The rows of the run, by table.
@@ -129,7 +129,7 @@ def tell_outcome(tables: Tables, how: str, console: Console) -> None:
 
 
 def _failed(row: Row) -> list[str]:
-    """What classes of the user's got wrong, if they did."""
+    """List failures of the user's classes, if there were any."""
     times = row.get("plugin_failures", row.get("policy_failed"))
     whose = "a class of yours (policy, operator, filter, ...)"
     return [f"{times} times {whose} gave no answer, or none that is allowed"] if times else []

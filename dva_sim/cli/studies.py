@@ -136,7 +136,7 @@ def screen(
 
 
 def told(path: Path) -> str:
-    """What to do next with a new study."""
+    """Return the next steps for a new study."""
     steps = (
         ("check", "finds mistakes"),
         ("run --dry-run", "how many runs that is, and how long they take"),

@@ -162,7 +162,7 @@ def _plan(found: DryRun, folder: Path) -> str:
 
 
 def _time(found: DryRun) -> str:
-    """How long it will take, and how that is known."""
+    """Describe how long it will take, and how that was estimated."""
     if found.runs == found.done:
         return "nothing is left to run"
     failed = f"a run that was tried failed: {found.failed}" if found.failed else ""
@@ -247,7 +247,7 @@ class _Lines:
 
 
 class RunPace:
-    """How fast runs are made, since the first look.
+    """Rate at which runs are completed, since the first look.
 
     Args:
         clock: Seconds of a clock that only goes forward.

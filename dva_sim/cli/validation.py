@@ -301,7 +301,7 @@ def _beside(asked: str, quick: bool, workers: int) -> ValidationResult:
 def _measured_now(
     blocks: Sequence[reference.BlockConfig], path: Path, quick: bool
 ) -> list[reference.SocketRun]:
-    """Where packets cannot be emulated, a relay of TCP over the loopback takes their place."""
+    """Measure now; where packets cannot be emulated, over a TCP relay on the loopback."""
     why = why_no_packets()
     if why:
         relay = "A relay over the loopback takes its place"

@@ -1,4 +1,4 @@
-"""How much a command prints: mistakes alone, as usual, or more than usual; or JSON alone."""
+"""Verbosity of a command: errors only, normal, or detailed; or JSON only."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def loudness(quiet: bool = False, verbose: bool = False) -> Iterator[None]:
 
 
 def is_verbose() -> bool:
-    """Whether more than usual is wanted."""
+    """Return True if detailed output is wanted."""
     return _verbose.get()
 
 
@@ -50,7 +50,7 @@ def print_json(data: Any) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """As JSON can hold it: what is missing or infinite is null, and arrays are lists."""
+    """Convert a value for JSON: missing and infinite become null, and arrays lists."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):

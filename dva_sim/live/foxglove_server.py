@@ -87,7 +87,7 @@ class FoxgloveServer:
         return f"Foxglove: {self.url} (layout: {LAYOUT})"
 
     def _listener(self) -> Any:
-        """What tells a viewer of the scene who comes late what stands there."""
+        """Return a listener that tells late viewers of the scene what is there."""
         server = self
 
         class Listener(self._sdk.ServerListener):  # type: ignore[misc,name-defined]

@@ -1,4 +1,4 @@
-"""How many devices a process can listen to: each takes some of the files that it may open."""
+"""Limit of devices per process: each needs some of the files that the process may open."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ APART: Final = 200  # for all else
 
 
 def devices_that_fit() -> int:
-    """How many there may be, with as many files as the system lets this process open."""
+    """Return how many devices fit, with as many open files as the system allows."""
     return max(1, min(MAX_DEVICES, (_usable() - APART) // PER_DEVICE))
 
 

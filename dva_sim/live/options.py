@@ -1,4 +1,4 @@
-"""How a live run, or a part of one, is to be done."""
+"""Options of a live run, or of a part of one."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ AS_IN_SCENARIO = "scenario"  # in place of keys of the emulated link
 
 @dataclass(frozen=True)
 class LiveOptions:
-    """What to run, where to listen, whom to reach.
+    """What to run, where to listen, and whom to reach.
 
     Attributes:
         scenario: Name or path.
@@ -90,12 +90,12 @@ class LiveOptions:
 
     @property
     def shows_pictures(self) -> bool:
-        """Whether robots' pictures are served: with keys only on request, since HTTP has none."""
+        """True if robots' pictures are served: with keys only on request, since HTTP has none."""
         return self.keys is None or self.camera_port is not None
 
     @property
     def records_run(self) -> bool:
-        """Whether a recording is wanted, and not traces alone."""
+        """True if a recording is wanted, and not only traces."""
         return self.record is not None and self.record.suffix.lower() == SUFFIX
 
     def read(self) -> Scenario:

@@ -51,16 +51,16 @@ Row = dict[str, Any]
 
 
 class LivePart(Protocol):
-    """What a process of a live run does."""
+    """Process of a live run."""
 
     def rows(self) -> list[Row]:
         """One line per device for the table; only what this part knows."""
 
     def settled(self) -> bool:
-        """Whether, as far as this part knows, nothing more will happen."""
+        """Return True if, as far as this part knows, nothing more will happen."""
 
     def has_company(self) -> bool:
-        """Whether anybody has ever answered, or come, whom this part is nothing without."""
+        """Return True if anybody has ever answered that this part depends on."""
 
     def keep(self, recorder: LiveRecorder) -> None:
         """Say for the recording what is new, once a second."""
@@ -70,7 +70,7 @@ class LivePart(Protocol):
 
 
 def _trace_of(label: str, stage: Stage, options: LiveOptions) -> Callable[[str], object] | None:
-    """What takes the lines of what a robot, or the DVA, decides, if that is wanted."""
+    """Return what takes the lines of decisions of a robot or the DVA, if they are wanted."""
     recorder = stage.recorder
     if isinstance(recorder, LiveRecorder) and recorder.keeps:
         return TraceLines(recorder, label)
@@ -81,7 +81,7 @@ def _trace_of(label: str, stage: Stage, options: LiveOptions) -> Callable[[str],
 
 
 class Rate:
-    """How fast a count grows."""
+    """Growth rate of a count."""
 
     def __init__(self) -> None:
         self._samples: deque[tuple[float, int]] = deque([(0.0, 0)], maxlen=int(RATE_OVER) + 1)

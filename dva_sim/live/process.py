@@ -42,7 +42,7 @@ class NobodyThere(RunsFailed):
 
 @dataclass
 class Report:
-    """What a part says once a second, as one line of JSON.
+    """Report of a part, sent once a second as a line of JSON.
 
     Attributes:
         part: `dva`, `world` or `operator`.
@@ -206,7 +206,7 @@ def _refuse_to_be_alone(
 
 
 def _time_of_day(clock: LiveClock) -> tuple[float, bool]:
-    """When the run started, by the clock on the wall [s since midnight]; exactly."""
+    """Return when the run started, by the wall clock [s since midnight], and whether exactly."""
     started = time.time() - clock.now
     local = time.localtime(started)
     whole = local.tm_hour * 3600 + local.tm_min * 60 + local.tm_sec
@@ -239,7 +239,7 @@ class _Reporter:
         self._part, self._network = part, network
 
     def report(self) -> Report:
-        """What there is to say now."""
+        """Return the present report."""
         recorder, part = self._stage.recorder, self._part
         if isinstance(recorder, LiveRecorder):
             part.keep(recorder)

@@ -157,7 +157,7 @@ class LiveRecorder(Recorder):
             self.log.delivered(now, source, node, payload)
 
     def _is_news(self, source: str, data: bytes) -> bool:
-        """Whether it is a message, of somebody who keeps no record for us."""
+        """Return True for a message from somebody who keeps no record for us."""
         if self.is_own(source) or self._room <= 0:
             return False
         if source not in self._strangers and len(self._strangers) >= MOST_STRANGERS:
@@ -195,7 +195,7 @@ class LiveRecorder(Recorder):
 
 
 def event_facts(event: Event) -> Line:
-    """What is kept of an event of the DVA, after the word `event`."""
+    """Return what is kept of an event of the DVA, after the word `event`."""
     at = [event.position.latitude, event.position.longitude]
     sent = {who: getattr(event, who) for who in SENT}
     return [
@@ -216,7 +216,7 @@ class TraceLines:
 
 
 class TraceFile:
-    """The same into a file, each line before the next decision; a full disk ends it, no robot.
+    """Trace in a file, each line before the next decision; a full disk ends it, no robot.
 
     Args:
         path: Of the file.

@@ -37,7 +37,7 @@ Say = Callable[[str], object]
 
 @dataclass(frozen=True, kw_only=True)
 class RosRobotOptions:
-    """Which robot, where its bridge is, and where it is registered.
+    """Options of a ROS robot: its name, its bridge, and its DVA.
 
     Attributes:
         ros: Of the rosbridge server, `ws://HOST:PORT`.

@@ -53,7 +53,7 @@ class RunningChannels:
         return [self._labels[robot] for robot in self._radii if robot in self._labels]
 
     def standing(self) -> Iterator[ChannelMessage]:
-        """What a viewer has to know who comes late: the site, and everybody on it."""
+        """Yield what a late viewer has to know: the site, and everybody on it."""
         yield channels.plan(self.site)
         by_name = {self._labels.get(robot, ""): radius for robot, radius in self._radii.items()}
         for name in self._bodies:

@@ -51,7 +51,7 @@ class _Child:
 
 @dataclass
 class Summary:
-    """How a live run ended.
+    """Outcome of a live run.
 
     Attributes:
         why: `settled`, `the script is done`, `time is up` or `interrupted`.
@@ -203,7 +203,7 @@ class Supervisor:
         return f"{host}:{port or free_port(host)}"
 
     def _address_of_dva(self) -> str | None:
-        """Where the DVA listens, once it does; None if the user ends the run before that."""
+        """Return the DVA's address once it listens; None if the user ends the run before."""
         deadline = time.monotonic() + SPEAK_WITHIN
         while not self._interrupted:
             self._listen()
@@ -224,7 +224,7 @@ class Supervisor:
         return "interrupted"
 
     def _some_are_done(self) -> bool:
-        """Whether a part has come to its end in good order: its time is up, so is ours."""
+        """Return True if a part has ended normally: its time is up, and so is that of the run."""
         return any(child.process.poll() == 0 for child in self._children)
 
     def _all_settled(self) -> bool:

@@ -25,7 +25,7 @@ def check_address(text: str, where: str = "") -> None:
 
 
 def problem_of(text: str) -> str:
-    """What is wrong with an address; empty if nothing is."""
+    """Return what is wrong with an address; empty if nothing is."""
     host, colon, port = text.rpartition(":")
     if "[" in text or "::" in text:
         return f"is an IPv6 address, which is not supported; give IPv4 or a name, {EXAMPLE}"

@@ -1,4 +1,4 @@
-"""What joins two nodes: ZeroMQ at one of two depths, or datagrams, and which of them is taken.
+"""Connections between two nodes: ZeroMQ at one of two depths, or datagrams, and their choice.
 
 **By message**, a reliable ordered stream: what TCP does to an application. A lost packet holds up
 everything behind it until it is sent again. It is exact without loss and below the link's rate,
@@ -141,7 +141,7 @@ class Stream:
         self._srtt = srtt + (rtt - srtt) / 8
 
     def _recovery_time(self, tries: int) -> float:
-        """When a loss is mended: by the tail-loss probe first, then by the time-out, doubling."""
+        """Return when a loss is repaired: by the tail-loss probe, then by doubling time-outs."""
         if self._srtt is None:
             return min(MAX_RTO, FIRST_RTO * 2.0**tries)
         rto = self._srtt + max(MIN_RTO, 4 * self._rttvar)
@@ -183,7 +183,7 @@ class StreamEnd(_PlainEnd):
 
     @property
     def closed(self) -> bool:
-        """Whether nothing is sent any more."""
+        """True if nothing is sent any more."""
         return self._out.closed
 
 
@@ -341,7 +341,7 @@ _Buffer = Annotated[int, Field(ge=2_048, le=100_000_000)] | None
 
 
 class ZeromqConfig(Config):
-    """What is set on every ZeroMQ socket.
+    """Options set on every ZeroMQ socket.
 
     Attributes:
         high_water_mark: Messages that a pipe holds, at both ends.
@@ -362,17 +362,17 @@ class ZeromqConfig(Config):
 
     @property
     def conflates_sender(self) -> bool:
-        """Whether publishers keep only the newest message for each subscriber."""
+        """True if publishers keep only the newest message for each subscriber."""
         return self.conflate in ("publisher", "both")
 
     @property
     def conflates_receiver(self) -> bool:
-        """Whether subscribers keep only the newest message."""
+        """True if subscribers keep only the newest message."""
         return self.conflate in ("subscriber", "both")
 
     @property
     def is_bounded(self) -> bool:
-        """Whether something may be full, or replaced, before it usually is."""
+        """True if a buffer may be full, or replaced, earlier than by default."""
         buffers = self.send_buffer_bytes, self.receive_buffer_bytes
         set_by_hand = self.high_water_mark != HIGH_WATER_MARK or buffers != (None, None)
         return set_by_hand or self.conflates_sender
@@ -380,7 +380,7 @@ class ZeromqConfig(Config):
 
 @dataclass(frozen=True)
 class Load:
-    """What one direction of a link is offered at most.
+    """Greatest load offered to one direction of a link.
 
     Attributes:
         rate_bps: In the long run, with all headers [bit/s].
@@ -448,7 +448,7 @@ class Connector:
         return ZmtpConnection(*ends, self._options(), self._options(conflate))
 
     def depth(self, out: Link, back: Link) -> str:
-        """How a connection over two links is modelled."""
+        """Choose how a connection over two links is modelled."""
         if self._transport == "datagrams":
             return "datagram"
         if self._depth != "auto":
@@ -463,7 +463,7 @@ class Connector:
 
 
 def is_calm(link: Link, load: Load) -> bool:
-    """Whether messages over a link fare as their segments would under TCP.
+    """Return True if messages over a link fare as their segments would under TCP.
 
     Nothing may get lost, late by chance or out of turn by itself; the rate must be known and
     not be used up by more than four fifths; and twice the largest burst must fit into the queue.

@@ -89,7 +89,7 @@ class KeyRing:
         return {d for d in devices if before.get(d) != self._public.get(d)}
 
     def _look(self) -> dict[Path, tuple[int, int]]:
-        """When each public file was changed, and how long it is."""
+        """Return the time of change and the size of each public file."""
         folder, found = self.folder / "public", dict[Path, tuple[int, int]]()
         try:
             for entry in os.scandir(folder):

@@ -44,7 +44,7 @@ Service = Callable[[Request], object]
 
 
 class Subscription(Protocol):
-    """What one node wants to hear of another."""
+    """Subscription of one node to a topic of another."""
 
     def close(self) -> None:
         """Leave; nothing more is delivered."""
@@ -80,7 +80,7 @@ class RequestTap(Protocol):
 
 
 class Transport(Protocol):
-    """What carries messages between nodes; a node is named by the id of its device.
+    """Transport of messages between nodes; a node is named by the id of its device.
 
     Attributes:
         taps: Who looks at what reaches a node, by the id of the node.
@@ -108,7 +108,7 @@ class Transport(Protocol):
         """Send a payload, which counts as `size` bytes [B], to the subscribers of a topic."""
 
     def ready(self, node: str, topic: str, size: int) -> bool:
-        """Whether somebody wants a topic, and `size` more bytes [B] would not have to wait."""
+        """Return True if a topic has a subscriber, and `size` more bytes [B] need not wait."""
 
     def subscribe(
         self, node: str, publisher: str, topic: str, handler: Callable[[Any], object]
@@ -170,7 +170,7 @@ class Requester:
 
     @property
     def busy(self) -> bool:
-        """Whether a further request would have to wait."""
+        """True if a further request would have to wait."""
         return len(self._open) >= self._window
 
     def open(self) -> None:

@@ -127,7 +127,7 @@ class Condition:
 
     @property
     def subscription_wait_s(self) -> float:
-        """How long a publisher waits on after its own handshake [s].
+        """Time that a publisher waits after its own handshake [s].
 
         The subscriber's handshake ends half a round trip later, and its subscription needs
         another half; with as much again as four small packets take on the link, and 5 ms.
@@ -186,7 +186,7 @@ _KINDS = get_type_hints(Condition)
 
 
 def _out_of_range(condition: Condition) -> list[tuple[str, str]]:
-    """What no link or program can have."""
+    """List values that no link or program can have."""
     wrong = []
     positive = ("hz", "hwm", "rate_kbit", "queue_pkts", "dur_s", "timeout_ms", "attempts")
     for name in (*positive, "sndbuf", "rcvbuf"):
@@ -262,7 +262,7 @@ _TIE_S = 1e-6
 
 @dataclass
 class RunLog:
-    """What happened in one run; times [s] on one clock.
+    """Log of one run; times [s] on one clock.
 
     Attributes:
         start: When the first command was due.
@@ -342,7 +342,7 @@ def _within(times: Floats, start: float, end: float) -> NDArray[np.bool_]:
 
 
 def _skipped(sent: NDArray[np.intp], applied: NDArray[np.intp]) -> float:
-    """Of the commands up to the last one applied, the share that was never applied."""
+    """Return the share of the commands, up to the last applied one, that were never applied."""
     if not len(applied):
         return math.nan
     due = sent[sent <= applied.max()]

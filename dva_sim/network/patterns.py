@@ -24,11 +24,11 @@ class Command(Protocol):
 
     @property
     def time(self) -> float:
-        """When it was made [s]."""
+        """Time at which it was made [s]."""
 
 
 class Line(Protocol):
-    """What a pattern has of a drive: a way to the robot, and an app that counts and alerts.
+    """View of a drive for a pattern: a path to the robot, and an app that counts and alerts.
 
     Attributes:
         clock: The run's.
@@ -57,7 +57,7 @@ class Line(Protocol):
 
     @property
     def busy(self) -> bool:
-        """Whether a further request would have to wait."""
+        """True if a further request would have to wait."""
 
     def request(
         self,
@@ -71,7 +71,7 @@ class Line(Protocol):
         """Publish a command on the robot's topic, to be heard or not."""
 
     def newest(self, command: Command) -> Command:
-        """What the phone says now, if the app keeps sending; else the command itself."""
+        """Return the phone's present command, if the app keeps sending; else the command itself."""
 
     def supersede(self, command: Command) -> None:
         """A command is not sent, since a newer one took its place: it is counted."""
@@ -84,7 +84,7 @@ class Line(Protocol):
 
 
 class Pattern(ABC):
-    """How commands travel. Users derive from it; each drive has a copy of its own.
+    """Base class of messaging patterns. Derive your own from it; each drive has its own copy.
 
     An emergency and all other requests never pass through here.
 
@@ -257,7 +257,7 @@ PLUGINS: Final = Plugins(
 
 
 def meaning_of(kind: type[Pattern]) -> str:
-    """What a pattern does: the first sentence of its docstring, without its full stop."""
+    """Describe a pattern: the first sentence of its docstring, without its full stop."""
     first = " ".join((inspect.getdoc(kind) or "").partition("\n\n")[0].split())
     return first[:1].lower() + first[1:].removesuffix(".")
 

@@ -58,12 +58,12 @@ class RealNetwork(ABC):
         self._addresses.pop(node, None)
 
     def address(self, node: str) -> str | None:
-        """Where a node is found, if anybody said."""
+        """Return the address of a node, if it is known."""
         return self._addresses.get(node)
 
     @abstractmethod
     def is_here(self, node: str) -> bool:
-        """Whether a node is one of this process."""
+        """Return True if a node belongs to this process."""
 
     @abstractmethod
     def join(self, node: str, host: str = "127.0.0.1", port: int = 0) -> str:

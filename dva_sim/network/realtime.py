@@ -26,7 +26,7 @@ Socket = zmq.Socket[bytes]
 
 
 def has_more(socket: Socket) -> bool:
-    """Whether something can be read.
+    """Return True if something can be read.
 
     To try in vain costs ten times as much, and the option `EVENTS` three times.
     """
@@ -71,7 +71,7 @@ class Poller:
             self._ask[source] = None
 
     def has_more(self, source: Socket) -> bool:
-        """Whether a socket has something to read; if not, its file will tell when it has."""
+        """Return True if a socket has something to read; otherwise its file will signal it."""
         more = has_more(source)
         if not more:
             self.read_out(source)
@@ -138,7 +138,7 @@ class LiveClock(Clock):
         self._poller.look(source)
 
     def has_more(self, source: Socket) -> bool:
-        """Whether a socket that is watched has something to read."""
+        """Return True if a watched socket has something to read."""
         return self._poller.has_more(source)
 
     def read_out(self, source: Socket) -> None:
@@ -224,12 +224,12 @@ class PacedClock(LiveClock):
 
     @property
     def factor(self) -> float:
-        """How many virtual seconds go by in a real one."""
+        """Virtual seconds per real second."""
         return self._factor
 
     @property
     def paused(self) -> bool:
-        """Whether virtual time stands."""
+        """True if virtual time is paused."""
         return self._halted
 
     def pace(self, factor: float | None = None, paused: bool | None = None) -> None:

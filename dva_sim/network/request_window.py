@@ -1,4 +1,4 @@
-"""How many requests a sender leaves unanswered, so that the command in force is youngest.
+"""Window of unanswered requests that keeps the command in force youngest.
 
 Too few, and commands become rare; too many, and each waits behind others, on the link or at the
 robot. The window follows two estimates, both from the times of answers: the round trip without a

@@ -101,7 +101,7 @@ HANDSHAKE_LIMIT = 10_000  # for the other end to answer, whose loop may be busy 
 
 
 class Reason(StrEnum):
-    """Why two ends did not come together; the same word at both, as far as an end can know."""
+    """Reason why two ends did not connect; the same word at both, as far as an end can know."""
 
     UNKNOWN_KEY = "unknown key"
     WRONG_SERVER_KEY = "wrong server key"
@@ -138,13 +138,13 @@ class Refusal:
 
     @property
     def gave_up(self) -> bool:
-        """Whether ZeroMQ makes no further attempt; see `Security.retry`."""
+        """True if ZeroMQ makes no further attempt; see `Security.retry`."""
         final = {Reason.UNKNOWN_KEY, Reason.PLAIN_CLIENT, Reason.PLAIN_SERVER}
         return self.peer is not None and self.reason in final
 
 
 def at_server(has_keys: bool, device: str, code: int) -> tuple[Reason, str]:
-    """What a server makes of a code that libzmq gives for a failed handshake."""
+    """Interpret, at a server, libzmq's code for a failed handshake."""
     if code == zmq.PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH:
         if not has_keys:
             return Reason.PLAIN_SERVER, "the other end has keys switched on, this one has not"
@@ -155,7 +155,7 @@ def at_server(has_keys: bool, device: str, code: int) -> tuple[Reason, str]:
 
 
 def at_client(has_keys: bool, device: str, peer: str, event: int, code: int) -> tuple[Reason, str]:
-    """What a client makes of a failed handshake: the event, and its code."""
+    """Interpret, at a client, the event and code of a failed handshake."""
     if event == zmq.EVENT_HANDSHAKE_FAILED_AUTH:
         return Reason.UNKNOWN_KEY, f"{peer} does not know the key of {device}"
     if event == zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL:
@@ -212,7 +212,7 @@ _Way = tuple[str, str, str]  # from which device to which, at which endpoint
 
 @dataclass
 class _Handshake:
-    """What a device has gone through with one endpoint since they last came together."""
+    """History of a device with one endpoint since they were last connected."""
 
     hang_ups: int = 0
     latest: Refusal | None = None
@@ -330,14 +330,14 @@ class Security:
             socket.setsockopt(zmq.CURVE_SERVERKEY, self._ring.public(peer))
 
     def trouble(self, device: str, peer: str) -> str | None:
-        """What stands between a device and its peer now: for the message after a time-out."""
+        """Return what keeps a device from its peer now, for the message after a time-out."""
         for (one, _, _), handshake in self._handshakes.get(peer, {}).items():
             if one == device and handshake.latest is not None:
                 return str(handshake.latest)
         return None
 
     def forget(self, peer: str) -> None:
-        """What was gone through with a device that is there no more."""
+        """Forget the history of a device that is gone."""
         self._handshakes.pop(peer, None)
         for socket in [s for s, (way, _) in self._greetings.items() if way[1] == peer]:
             self._end_greeting(socket)

@@ -192,7 +192,7 @@ MOST_SOCKETS: Final = 60_000
 
 
 def give_back_memory() -> None:
-    """What closed sockets have left free goes back to the system, where the C library can do that.
+    """Return memory that closed sockets have freed to the system, where the C library can.
 
     A connection takes 110 kB in pieces, between which something of others comes to lie: by itself
     the library keeps almost all of it, and with each wave of devices more pages of it are touched.
@@ -277,7 +277,7 @@ class SocketNetwork(RealNetwork):
         return node in self._routers
 
     def endpoint(self, node: str, published: bool) -> str | None:
-        """Where a node takes requests, or publishes; None if it was never introduced."""
+        """Return where a node takes requests, or publishes; None if it was never introduced."""
         address = self._addresses.get(node)
         if address is None:
             return None
@@ -455,7 +455,7 @@ class SocketNetwork(RealNetwork):
         return socket
 
     def _has_key(self, peer: str) -> bool:
-        """Whether a peer can be told from an impostor, or need not be."""
+        """Return True if a peer can be told from an impostor, or need not be."""
         return self._ring is None or peer in self._ring.devices
 
     def _reach(self, socket: Socket, peer: str) -> None:

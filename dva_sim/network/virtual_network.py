@@ -28,7 +28,7 @@ Interference = Callable[[str, str, Any, Take], None]
 
 
 class VirtualNetwork:
-    """Who is reachable, over which links; see `Transport`.
+    """Network in virtual time: reachable nodes and their links; see `Transport`.
 
     Args:
         clock: The run's clock.
@@ -75,7 +75,7 @@ class VirtualNetwork:
         self._services[node] = service
 
     def service(self, node: str) -> Service | None:
-        """What takes the requests to a node, if it is there."""
+        """Return what takes the requests to a node, if it is there."""
         return None if node in self._gone else self._services.get(node)
 
     def connect(self, node: str, peer: str, on_reply: OnReply, pipelined: bool) -> VirtualWire:
@@ -130,11 +130,11 @@ class VirtualNetwork:
         self._wanted.clear()
 
     def is_wanted(self, client: VirtualClient) -> bool:
-        """Whether somebody still wants something of a node, and that is there."""
+        """Return True if a node is present and still of interest to somebody."""
         return client.peer not in self._gone and client in self._clients[client.peer]
 
     def _subscribers(self, node: str, topic: str) -> list[VirtualSubscription]:
-        """Who wants a topic, joined or not: found out anew when somebody has come or gone."""
+        """Return the subscribers of a topic, connected or not; computed again after any change."""
         known = self._wanted.get((node, topic))
         if known is None:
             known = [
@@ -147,7 +147,7 @@ class VirtualNetwork:
 
 
 class VirtualClient:
-    """Who connects to a peer, and connects anew when the connection broke.
+    """Client that connects to a peer, and reconnects when the connection broke.
 
     Attributes:
         connection: The present one.

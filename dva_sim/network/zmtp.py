@@ -64,7 +64,7 @@ class Pipe(Generic[T]):
 
     @property
     def full(self) -> bool:
-        """Whether the next message would be refused."""
+        """True if the next message would be refused."""
         return not self._conflate and self._written - self._told >= self._mark
 
     def put(self, item: T) -> bool:
@@ -92,7 +92,7 @@ class Pipe(Generic[T]):
 
 
 class Flow(Protocol):
-    """What delivers messages and can be told to wait."""
+    """Source of messages that can be paused."""
 
     def pause(self) -> None:
         """Deliver nothing more: what comes waits, at last at the sender."""
@@ -102,7 +102,7 @@ class Flow(Protocol):
 
 
 class ReceivePipe(Pipe[T]):
-    """What a connection has delivered and its program has not read yet.
+    """Messages that a connection has delivered and its program has not read yet.
 
     It tells the connection to wait while it is full.
 
@@ -155,7 +155,7 @@ def framed(size: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class ZmtpOptions:
-    """What is set on the socket at one end.
+    """Options of the socket at one end.
 
     Attributes:
         mark: High-water mark of its send pipe, in messages.

@@ -113,7 +113,7 @@ class LinkProcess:
 
     @property
     def has_ended(self) -> bool:
-        """Whether it has ended by itself."""
+        """True if it has ended by itself."""
         return self._process.poll() is not None
 
     def ended(self) -> LinkEnded:

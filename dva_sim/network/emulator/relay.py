@@ -46,7 +46,7 @@ class RelayedStream:
     closing: bool = False
 
     def has_room(self, now: float) -> bool:
-        """Whether more may be read at a time of the link [s]."""
+        """Return True if more may be read at a time of the link [s]."""
         if not self.open or self.waiting:
             return False
         return self.flow.link.has_room(now, CHUNK_BYTES + _HEADERS_BYTES)
@@ -81,7 +81,7 @@ class Proxy(EmulatedLink[RelayedStream]):
 
     @property
     def address(self) -> str:
-        """Where the operator connects."""
+        """Address to which the operator connects."""
         return f"tcp://127.0.0.1:{self._listener.getsockname()[1]}"
 
     @override

@@ -121,7 +121,7 @@ class LinkReport:
 
     @property
     def is_disturbed(self) -> bool:
-        """Whether the machine, and not the link alone, decided when packets came out."""
+        """True if the machine, and not the link alone, determined when packets came out."""
         return self.late_p99_s > LATE_S or self.overrun_packets > 0
 
     def to_json(self) -> str:

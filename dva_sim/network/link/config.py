@@ -1,4 +1,4 @@
-"""What a link is like, as configured."""
+"""Configuration of a link."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Share = Annotated[float, Field(gt=0, le=1)]
 
 
 class Way(Config):
-    """What is otherwise in one direction; each key as of the link, and as there if left out."""
+    """Keys that differ in one direction; each as in the link, and as there if left out."""
 
     delay_s: Seconds | None = None
     jitter_s: Seconds | None = None
@@ -39,7 +39,7 @@ class Way(Config):
 
 
 class LinkConfig(Config):
-    """What lies between a robot and everybody else; `up` and `down` say what differs by direction.
+    """Link between a robot and everybody else; `up` and `down` hold what differs by direction.
 
     Attributes:
         delay_s: One-way propagation delay; the mean, where a law spreads it.
@@ -129,7 +129,7 @@ class LinkConfig(Config):
         return None if isinstance(self.delay_law, ConstantDelay) else self.delay_law
 
     def toward(self, direction: Direction) -> LinkConfig:
-        """The same link with everything as it is in one direction."""
+        """Return the link with the keys of one direction applied."""
         way = self.up if direction == "up" else self.down
         changes: dict[str, Any] = {"up": None, "down": None}
         for key in Way.model_fields if way else ():

@@ -57,7 +57,7 @@ class ConstantDelay(Config):
 
 
 class _Law(Config):
-    """What all laws can do.
+    """Interface of all laws.
 
     Attributes:
         correlation_s: Time over which delays stay alike: the normal scores of two packets sent

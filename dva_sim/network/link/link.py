@@ -112,7 +112,7 @@ class Link:
             self._is_steady = self._takes_trains = False
 
     def is_ideal(self) -> bool:
-        """Whether it loses, spreads and reorders nothing by itself, and its rate is constant."""
+        """Return True if it neither loses, spreads nor reorders packets, at a constant rate."""
         return self._is_steady and self.rate_bps is not None
 
     def carry(self, now: float, size: int) -> float | None:
@@ -176,19 +176,19 @@ class Link:
         return self._serialiser.backlog_bytes(now)
 
     def has_room(self, now: float, size: int) -> bool:
-        """Whether the queue takes a packet of so many bytes [B] at `now` [s]."""
+        """Return True if the queue takes a packet of this size [B] at `now` [s]."""
         return self._serialiser.has_room(now, size, self.room)
 
 
 def _no_deviation(now: float) -> float:
-    """Of a constant delay, where the order of packets has to be looked at all the same."""
+    """Return no deviation, for a constant delay in which the order of packets still matters."""
     return 0.0
 
 
 def make_serialiser(
     config: LinkConfig, direction: Direction, streams: Streams, name: str
 ) -> Serialiser:
-    """What gives the rate of the `up` or `down` direction of a configured link.
+    """Return a factory for the rate of the `up` or `down` direction of a configured link.
 
     A run begins somewhere in a trace; two that were recorded together begin at the same moment.
 
@@ -216,7 +216,7 @@ def _make_fates(
 
 
 def _make_wobble(way: LinkConfig, streams: Streams, name: str, make: MakeNumbers) -> Wobble | None:
-    """What spreads the delay of one direction by chance, if anything does."""
+    """Return the random deviation of the delay of one direction, if it has any."""
     if way.jitter_s:
         width = way.jitter_s
         return by_quantile(lambda u: width * (2.0 * u - 1.0), make(streams, f"{name}/jitter"))
@@ -421,7 +421,7 @@ class RadioLink(Link):
         return self.delay if self._law is None else self._base + self._deviation
 
     def _full(self, now: float, size: int, rate_bps: float) -> bool:
-        """Whether the queue before the air is full; the air takes up the rate of the place."""
+        """Return True if the queue before the radio is full; the radio has its place's rate."""
         if rate_bps != self._air.rate_bps:
             self._air.change_rate(now, rate_bps)
         return self._air.backlog_bytes(now) + size > self._air_room

@@ -1,4 +1,4 @@
-"""What takes packets off a link by chance, one by one or in bursts."""
+"""Random packet losses, one by one or in bursts."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Bursts(Config):
             )
 
     def play(self, loss: float, streams: Streams, name: str, luck: UniformNumbers) -> Fate:
-        """What takes a share `loss` of all packets, with luck of that name.
+        """Return a fate that loses a share `loss` of all packets, from the named random stream.
 
         Args:
             loss: In the long run.

@@ -32,7 +32,7 @@ class Gap(Config):
         return self
 
     def covers(self, time: float) -> bool:
-        """Whether nothing gets through at a time [s]."""
+        """Return True if nothing gets through at a time [s]."""
         since = time - self.from_s
         if self.every_s is not None and since >= 0:
             since %= self.every_s
@@ -61,10 +61,10 @@ class Partition(Gap):
     destination: str = "*"
 
     def parts(self, source: str, destination: str) -> bool:
-        """Whether the way from one node to another is concerned."""
+        """Return True if it separates one node from another."""
         return fnmatchcase(source, self.source) and fnmatchcase(destination, self.destination)
 
 
 def gaps_of(gaps: Sequence[Gap]) -> Fate:
-    """What would cross the link when there is none."""
+    """Return a fate that loses everything during gaps."""
     return lambda now, left_at: any(gap.covers(left_at) for gap in gaps)

@@ -1,4 +1,4 @@
-"""What gives a link its rate: a serial line, or a recorded one; and its queue."""
+"""Rates of links: a serial line, or a recorded one; and its queue."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ class Serialiser(ABC):
 
     @abstractmethod
     def depart(self, now: float, size: int) -> float:
-        """When the last byte of a packet of `size` bytes [B] offered at `now` has left [s]."""
+        """Return when the last byte of a packet of `size` bytes [B] offered at `now` leaves [s]."""
 
     @abstractmethod
     def last_departure(self) -> float:
-        """When the last byte that was taken has left, or will have [s]."""
+        """Return when the last accepted byte leaves, or has left [s]."""
 
     def has_room(self, now: float, size: int, room: int) -> bool:
-        """Whether a queue with `room` for so many bytes [B] takes a packet at `now`."""
+        """Return True if a queue with `room` for so many bytes [B] takes a packet at `now`."""
         return self.backlog_bytes(now) + size <= room
 
     def offer(self, now: float, size: int, room: int) -> float | None:

@@ -60,13 +60,13 @@ def read_trace(path: str) -> Floats:
 
 
 def columns_of(path: str) -> int:
-    """How many words the first line of a recorded link has that is no remark; 0 without any."""
+    """Count the words in the first line of a recorded link that is no comment; 0 without any."""
     lines = (text for _, text in _lines(path, "recorded link") if text[0] != "#")
     return len(re.split(r"[\s,;]+", next(lines, "").strip()))
 
 
 def is_trace(path: str) -> bool:
-    """Whether a file of one column holds ascending whole milliseconds, as a trace does."""
+    """Return True if a file of one column holds ascending whole milliseconds, as a trace does."""
     texts = [text for _, text in _lines(path, "recorded link")]
     times = [int(text) for text in texts if text.isdigit()]
     return len(times) == len(texts) > 0 and times == sorted(times)

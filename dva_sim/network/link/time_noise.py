@@ -160,7 +160,7 @@ class Spells:
         self._until = next(self._lengths)
 
     def is_on(self, now: float) -> bool:
-        """Whether the other state holds at `now` [s]."""
+        """Return True if the other state holds at `now` [s]."""
         while now >= self._until:
             self._is_on = not self._is_on
             self._until += next(self._lengths)
@@ -174,5 +174,5 @@ def _lengths(rng: np.random.Generator, first: float, second: float) -> Iterator[
 
 
 def normal_quantile(u: float) -> float:
-    """What a standard normal number is below with probability `u`."""
+    """Return the quantile of the standard normal distribution at probability `u`."""
     return _NORMAL.inv_cdf(min(max(u, _EDGE), 1.0 - _EDGE))

@@ -104,7 +104,7 @@ class _DdsEnd(TransportEnd):
 
 
 def _configuration(place: Rendezvous, is_near: bool) -> str:
-    """Of Cyclone DDS: this address alone, the other end by name, no multicast."""
+    """Return the configuration of Cyclone DDS: this address, the peer by name, no multicast."""
     here, there = (place.near, place.far)[:: 1 if is_near else -1]
     return (
         "<CycloneDDS><Domain id='any'><General><Interfaces>"

@@ -1,4 +1,4 @@
-"""What a transport promises: an end at the operator, which connects, and one at the robot."""
+"""Interface of a transport: an end at the operator, which connects, and one at the robot."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Receive = Callable[[bytes], bytes | None]
 
 @dataclass(frozen=True)
 class Rendezvous:
-    """Where both ends are.
+    """Addresses of both ends.
 
     Attributes:
         near: IPv4 address of the operator's machine.

@@ -39,7 +39,7 @@ _PICTURE: Final = struct.Struct("q")
 
 
 class ProgramNoteKind(IntEnum):
-    """What happened."""
+    """Kind of a note."""
 
     READY = 0
     SENT = 1
@@ -52,7 +52,7 @@ class ProgramNoteKind(IntEnum):
 
 
 class ProgramNote(NamedTuple):
-    """What happened, to which command or picture, and when by `time.monotonic` [s]."""
+    """Event of a command or picture, and its time by `time.monotonic` [s]."""
 
     kind: ProgramNoteKind
     number: int
@@ -87,7 +87,7 @@ class ProgramNotes:
 
 
 class Plan(Config):
-    """What both programs are told.
+    """Instructions for both programs.
 
     Attributes:
         transport: By name, or a file and a class.
@@ -116,7 +116,7 @@ class Plan(Config):
     picture_bytes: int = 8_000
 
     def place(self) -> Rendezvous:
-        """As a transport takes it."""
+        """Return the addresses as a transport takes them."""
         return Rendezvous(self.near, self.far, self.port, self.folder, self.ready_by)
 
 

@@ -1,4 +1,4 @@
-"""How large the congestion window is: slow start, then Reno or CUBIC. Counted in segments.
+"""Congestion window: slow start, then Reno or CUBIC; in segments.
 
 References:
     RFC 5681 (slow start, Reno), RFC 9438 (CUBIC), RFC 2861 (after idle); Ha, Rhee: Taming
@@ -151,7 +151,7 @@ class HyStart:
         self._end, self._count, self._shortest = -1, 0, inf
 
     def ends(self, window: float, rtt: float, minimum: float, acknowledged: int, sent: int) -> bool:
-        """Whether slow start should end.
+        """Return True if slow start should end.
 
         Args:
             window: Congestion window [segments].

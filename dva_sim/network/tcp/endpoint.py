@@ -87,7 +87,7 @@ class TcpEndpoint:
 
     @property
     def has_room(self) -> bool:
-        """Whether a third of the send buffer is free; less may do for a `write`."""
+        """True if a third of the send buffer is free; less may suffice for a `write`."""
         return self.sender.buffer.has_room
 
     def await_room(self) -> None:
@@ -112,7 +112,7 @@ class TcpEndpoint:
             self.sender.finish()
 
     def vanish(self) -> None:
-        """As if it had never been: not even a reset is sent."""
+        """Disappear without sending even a reset."""
         self._deaf = True
         self._forget()
 

@@ -108,7 +108,7 @@ class Receiver:
         return taken
 
     def must_acknowledge(self) -> bool:
-        """Whether an acknowledgement leaves at once."""
+        """Return True if an acknowledgement leaves at once."""
         if self.urgent:
             return True
         if not self.pending:
@@ -150,17 +150,17 @@ class Receiver:
             self._acknowledge()
 
     def _reopened(self) -> bool:
-        """Whether the window has at least doubled, and by a segment (RFC 9293, 3.8.6.2.2)."""
+        """Return True if the window at least doubled, by a segment (RFC 9293, 3.8.6.2.2)."""
         before, after = self.edge - self.next, self.read_to + self._window - self.next
         least = min(self._options.mss, self._window // 2)
         return after >= 2 * before and after - before >= least
 
     def _has_full_one(self) -> bool:
-        """Whether more than a full segment is not acknowledged."""
+        """Return True if more than a full segment is unacknowledged."""
         return self.next - self.acknowledged > self._largest
 
     def _note_size(self, size: int, pushes: bool) -> None:
-        """How large segments are, and whether one ends what its program has written.
+        """Note the size of segments, and whether one ends a write of its program.
 
         A full segment without PSH is the first part of more, so its acknowledgement waits for the
         next one even if the program reads at once.
@@ -172,7 +172,7 @@ class Receiver:
             self._pushed = max(self._pushed, int(pushes))
 
     def _note_rhythm(self, now: float) -> None:
-        """How soon the next data may be expected."""
+        """Note how soon the next data can be expected."""
         gap, base = now - self._last_data, self._options.delayed_ack
         self._last_data = now
         if gap > self._times.timeout:

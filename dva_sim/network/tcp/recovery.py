@@ -1,4 +1,4 @@
-"""What an end does about losses: when it recovers, how far, and whether it was needless.
+"""Loss recovery of an end: when it begins, how far it goes, and whether it was needless.
 
 Segments are taken for lost by time (RACK), or by three later ones acknowledged.
 
@@ -82,7 +82,7 @@ class ByTime:
             self._steps = 1
 
     def reordering_window(self, board: Scoreboard, recovering: bool) -> float:
-        """How much later than a round trip a segment may still come [s]."""
+        """Return how much later than a round trip a segment may still arrive [s]."""
         if not self._reordering and (recovering or board.sacked >= DUPLICATES):
             return 0.0
         minimum = self._times.minimum

@@ -157,7 +157,7 @@ class Timer:
 
 
 def next_on_grid(now: float, wait: float, tick: float) -> float:
-    """When a timer rings that is set `now` [s] for `wait` [s], on a grid of `tick` [s].
+    """Return when a timer set at `now` [s] for `wait` [s] fires, on a grid of `tick` [s].
 
     The time is rounded down and the wait up to ticks; the ring is then the next one of the
     wheel, never this one.
@@ -251,7 +251,7 @@ class Alarm:
         self._timer.set(max(at, now))
 
     def _stands(self, fresh: bool, probing: bool) -> bool:
-        """Whether what is set may stay: to set it again would round it differently."""
+        """Return True if the timer may stay as set; setting it again would round it differently."""
         if self._timer.deadline == inf:
             return False
         if self.kind == PROBE:

@@ -1,4 +1,4 @@
-"""What a sender keeps: bytes that wait, and segments sent and not yet acknowledged.
+"""Send queue: bytes that wait, and segments sent and not yet acknowledged.
 
 The buffer is counted as the kernel charges it: a packet costs more than its bytes.
 
@@ -72,7 +72,7 @@ class SendBuffer:
 
     @property
     def has_room(self) -> bool:
-        """Whether a third is free: what the kernel calls writable."""
+        """True if a third is free: what the kernel calls writable."""
         return 3 * self.used <= 2 * self.limit
 
     def take(self, count: int) -> int:
@@ -108,7 +108,7 @@ class SendBuffer:
         self.used -= charge
 
     def reopens(self, window: float, in_flight: int) -> bool:
-        """Whether there is room again.
+        """Return True if there is room again.
 
         Tunes the size to the congestion window, but not while that is what holds data back.
 
@@ -162,7 +162,7 @@ class SentSegment:
 
 
 class Gain:
-    """What one acknowledgement brought.
+    """Effect of one acknowledgement.
 
     Attributes:
         delivered: Segments of which nothing was known before, in order or by selection.

@@ -91,7 +91,7 @@ class Sender:
         return taken
 
     def reopens(self) -> bool:
-        """Whether a program that could not write all may write again."""
+        """Return True if a program that could not write everything may write again."""
         return self.buffer.reopens(self.window.window, self.board.in_flight)
 
     def finish(self) -> None:
@@ -229,13 +229,13 @@ class Sender:
         self._note_use(room <= 0)
 
     def _gathers(self, end: int) -> bool:
-        """Whether a small segment waits for more, as without TCP_NODELAY; the end never does."""
+        """Return True if a small segment waits for more, as without TCP_NODELAY; not the last."""
         if self._nodelay or end - self.next >= self._options.mss or end >= self.end_mark:
             return False
         return self._small_end > self.first
 
     def _note_use(self, used: bool) -> None:
-        """Whether the congestion window was filled within the last round trip."""
+        """Note whether the congestion window was filled within the last round trip."""
         out = len(self.board.queue)
         fuller = not self._window_used and out > self._most_out
         if used or fuller or self.first >= self._use_round:

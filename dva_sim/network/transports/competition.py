@@ -115,7 +115,7 @@ class SharedLine(Serialiser):
         return self._line.last_departure()
 
     def next_end(self, now: float) -> float:
-        """When the packet under way has left [s]; `now` if there is none."""
+        """Return when the packet under way has left [s]; `now` if there is none."""
         while self._ends and self._ends[0] <= now:
             self._ends.popleft()
         return self._ends[0] if self._ends else now
@@ -185,7 +185,7 @@ Floats = NDArray[np.float64]
 
 
 class CommandsConfig(Config):
-    """What the operator sends.
+    """Commands of the operator.
 
     Attributes:
         rate_hz: How often there is a new command.
@@ -199,7 +199,7 @@ class CommandsConfig(Config):
 
 
 class PicturesConfig(Config):
-    """What the robot sends back.
+    """Pictures of the robot.
 
     Attributes:
         rate_hz: How often there is a new picture.
@@ -242,7 +242,7 @@ class ContestConfig(Config):
 
 @dataclass
 class Fates:
-    """What became of the messages of one direction.
+    """Fates of the messages of one direction.
 
     Attributes:
         made: When each was ready to be sent [s].
@@ -264,7 +264,7 @@ class Fates:
 
 @dataclass(frozen=True)
 class Contest:
-    """What came of it.
+    """Outcome of a contest.
 
     Attributes:
         since: From when on it counts [s].
@@ -375,7 +375,7 @@ def ends_at(
     on_command: Callable[[int], object],
     on_picture: Callable[[int], object],
 ) -> Ends:
-    """Where a session stands: its two links, with priority at the end hosts if it has that."""
+    """Return the two links of a session, with priority at the hosts if it has that."""
     first = isinstance(config, Rtnp)
     up, down = bottleneck.link(NAME, "up", first), bottleneck.link(NAME, "down", first)
     return Ends(up, down, on_command, on_picture)

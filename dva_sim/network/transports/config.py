@@ -1,4 +1,4 @@
-"""Which transport carries commands and pictures, and its options.
+"""Transport of commands and pictures, and its options.
 
 No option of a transport that is only in the manner of its paper has a default: its numbers are not
 the paper's, so who uses it sets them and says so.

@@ -76,7 +76,7 @@ class DatagramSender:
         self._pump()
 
     def echoes(self) -> Sequence[Echo]:
-        """What the receiver at the other end tells now."""
+        """Return the feedback of the receiver at the other end."""
         now = self._clock.now
         return [(number, now - since) for number, since in self._seen]
 

@@ -32,7 +32,7 @@ class RoundTrips:
 
     @property
     def timeout(self) -> float:
-        """How long to wait for an answer before giving it up [s]."""
+        """Time to wait for feedback before giving up [s]."""
         if self.smoothed is None:
             return min(FIRST_TIMEOUT * self._backoff, LONGEST_TIMEOUT)
         plain = max(self.smoothed + 4.0 * self._variation, LEAST_TIMEOUT)
@@ -53,7 +53,7 @@ class RoundTrips:
 
 
 class Feedback:
-    """What was sent and is not known to have arrived.
+    """Datagrams that were sent and are not known to have arrived.
 
     Attributes:
         round_trips: What they were like.
@@ -70,7 +70,7 @@ class Feedback:
 
     @property
     def deadline(self) -> float:
-        """When all that is pending is given up, unless something is heard [s]."""
+        """Time at which everything pending is given up, unless feedback arrives [s]."""
         if not self._pending:
             return math.inf
         oldest = next(iter(self._pending.values()))

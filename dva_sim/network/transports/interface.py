@@ -28,7 +28,7 @@ class TransportMessage:
 
 @dataclass(frozen=True)
 class Ends:
-    """What a transport stands between.
+    """Endpoints that a transport connects.
 
     Attributes:
         up: The link that commands take.

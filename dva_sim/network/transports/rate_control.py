@@ -1,4 +1,4 @@
-"""How often a datagram may be sent: laws of rate, each a small machine that knows no clock.
+"""Laws of rate: how often a datagram may be sent; small state machines without a clock.
 
 A law is told three things: the first round trip it may count on, that a round trip has passed
 without loss, and that something was lost (once per round trip at most). It answers with the gap
@@ -19,7 +19,7 @@ from typing_extensions import override
 
 
 class RateLaw(Protocol):
-    """How often a datagram may be sent."""
+    """Law that limits how often a datagram may be sent."""
 
     @property
     def gap(self) -> float:

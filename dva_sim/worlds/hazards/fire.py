@@ -380,7 +380,7 @@ class FireField(SolvedField):
         return np.append(value * share, 0.0)
 
     def _filled(self, state: Floats) -> tuple[Floats, Floats]:
-        """Return the volume of each space's smoke [m^3], and the share of the space that it fills."""
+        """Return each space's volume of smoke [m^3], and the share of the space that it fills."""
         spaces = self.building.spaces
         volume = np.maximum(volumes(state), 1e-9)
         return volume, np.minimum(1.0, volume / (spaces.area * spaces.ceiling))
