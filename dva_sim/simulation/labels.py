@@ -1,4 +1,4 @@
-"""How factors, levels, measures and numbers are called when a reader sees them."""
+"""Names of factors, levels, measures and numbers for readers."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ _SHORT_LEVELS = (
 
 @cache
 def _keys() -> dict[str, Key]:
-    """What the scenarios' fields say of themselves; a key has one name in all models."""
+    """Return the names in the scenarios' fields; a key has one name in all models."""
     said: dict[str, Key] = {}
     for model in reversed(MODELS.values()):
         said |= keys_said_of(model.scenario)
@@ -96,7 +96,7 @@ def take_up(columns: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> None:
 
 
 def measure_called(name: str, model: str = "") -> Measure:
-    """What is known of a measure, in a certain model if it has it; else the name alone."""
+    """Return the description of a measure, in a certain model if it has it; else its name."""
     columns = MODELS[model].columns["runs"] if model in MODELS else ()
     own = next((column for column in columns if column.name == name), None)
     return own or _measures().get(name) or _TOLD.get(name) or Measure(name, "")
@@ -110,7 +110,7 @@ def factor_name(factor: str) -> str:
 
 
 def absent_at_zero(factor: str) -> str:
-    """What is not there at a level of zero: `delay` of `link.delay_s`; mostly nothing."""
+    """Return what is absent at a level of zero: `delay` of `link.delay_s`; mostly nothing."""
     said = _keys().get(factor)
     return said.absent if said else ""
 
@@ -157,7 +157,7 @@ def level_name(
 
 
 def is_in_file(level: Scalar) -> bool:
-    """Whether a level names a class in a file, as in `mine.py:Mine`."""
+    """Return True if a level names a class in a file, as in `mine.py:Mine`."""
     return isinstance(level, str) and ".py:" in level
 
 

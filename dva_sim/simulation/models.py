@@ -54,7 +54,7 @@ class OwnScenario(Config):
     description: str = ""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """What another process makes it from."""
+        """Return what another process rebuilds it from."""
         return _restored, (self.model, self.model_dump())
 
 
@@ -72,7 +72,7 @@ Operated = TypeVar("Operated", Scenario, TaskScenario, TransportScenario)
 
 
 class Model(Generic[S]):
-    """What a study does with a scenario.
+    """Base class of models: what a study does with a scenario.
 
     A user's model defines `scenario`, `columns`, `simulate` and `rows`; the rest is as here.
 
@@ -96,7 +96,7 @@ class Model(Generic[S]):
         raise NotImplementedError
 
     def rows(self, recording: Any, with_tracks: bool = False) -> Tables:
-        """What is measured of a run, by table."""
+        """Return what is measured of a run, by table."""
         raise NotImplementedError
 
     def complete(self, scenario: S, error: Fail) -> S:
@@ -155,7 +155,7 @@ class Model(Generic[S]):
         return ""
 
     def contradictions(self, scenario: S) -> list[str]:
-        """What in a scenario does not go together, each in a sentence."""
+        """List contradictory settings of a scenario, one sentence each."""
         return []
 
     # Persons of a population: names for independent runs where a model has none.
@@ -164,7 +164,7 @@ class Model(Generic[S]):
         return {}
 
     def team(self, scenario: S) -> int:
-        """How many persons of the population a run takes."""
+        """Return how many persons of the population a run needs."""
         return 1
 
     def played_by(self, scenario: S, person: int) -> S:

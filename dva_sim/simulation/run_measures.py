@@ -41,7 +41,7 @@ class RunMeasure:
 
 
 class CautionOff(RunMeasure):
-    """How cautious the person is who drives, beside the median of its population."""
+    """Caution of the driver, relative to the median of the population."""
 
     about = Measure(
         "caution_off",
@@ -51,14 +51,14 @@ class CautionOff(RunMeasure):
     )
 
     def of(self, recording: Any) -> float:
-        """The same in each run of a person."""
+        """Return the value, which is the same in each run of a person."""
         from dva_sim.simulation.full.scenes import trait_off  # late: start-up
 
         return trait_off(recording.scenario, "caution")
 
 
 class WayOff(RunMeasure):
-    """How much longer than usual the way is."""
+    """Length of the path, relative to its usual length."""
 
     about = Measure(
         "way_off_m",
@@ -69,7 +69,7 @@ class WayOff(RunMeasure):
     )
 
     def of(self, recording: Any) -> float | None:
-        """The same in each run of a seed."""
+        """Return the value, which is the same in each run of a seed."""
         from dva_sim.simulation.full.scenes import way_off  # late: start-up
 
         return way_off(recording.scenario, recording.seed)
@@ -120,7 +120,7 @@ def _loaded(name: str, stamp: int) -> RunMeasure:
 
 
 def values_of(measures: Iterable[RunMeasure], recording: Any, model: str) -> dict[str, float]:
-    """What measures say of a run of a model, nan where they say nothing.
+    """Return the values of measures for a run of a model; nan where one has none.
 
     Raises:
         ConfigError: a measure fails, or answers what is no finite number.
@@ -129,7 +129,7 @@ def values_of(measures: Iterable[RunMeasure], recording: Any, model: str) -> dic
 
 
 def value_of(measure: RunMeasure, recording: Any) -> float:
-    """What a measure says of a run; see `values_of`."""
+    """Return the value of a measure for a run; see `values_of`."""
     name = measure.about.name
     try:
         answer = measure.of(recording)
@@ -143,7 +143,7 @@ def value_of(measure: RunMeasure, recording: Any) -> float:
 
 
 def reads(measure: RunMeasure, model: str) -> bool:
-    """Whether a measure can be taken of the runs of a model, which may be in a file."""
+    """Return True if a measure, which may be in a file, can be taken of runs of a model."""
     named = (Path(name).name for name in (model, model.rpartition(":")[2]))
     return model in measure.models or any(name in measure.models for name in named)
 

@@ -70,7 +70,7 @@ def add_dva(
 
 
 def make_desk(stage: Stage, permissions: Permissions) -> Dva:
-    """What decides for the DVA, as a scenario wants it.
+    """Build the DVA that a scenario wants.
 
     Raises:
         ConfigError: a policy that cannot be loaded.
@@ -128,7 +128,7 @@ def at_event_m(scenario: Scenario) -> float:
 
 
 class _Ways:
-    """What the DVA expects of ways: the planner's length, and a pace for each kind.
+    """Travel times as the DVA expects them: the planner's length, and a pace for each kind.
 
     Args:
         stage: Where.

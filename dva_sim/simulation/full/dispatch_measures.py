@@ -1,4 +1,4 @@
-"""What people at control rooms did: how long they took, and what the policy would have done.
+"""Measures of control rooms: how long people took, and what the policy would have done.
 
 Only runs in which somebody takes part at a control room have these columns.
 """
@@ -51,7 +51,7 @@ EVENT_COLUMNS = (
 
 
 def run_measures(recording: Recording) -> Row:
-    """Of the whole run."""
+    """Return the measures of the whole run."""
     facts, horizon = recording.facts, recording.scenario.horizon_s
     overrides = [fact for fact in facts if fact.overrides]
     orders = [fact for fact in facts if _is_order(fact) and fact.role is not None]
@@ -72,7 +72,7 @@ def run_measures(recording: Recording) -> Row:
 
 
 def event_measures(event: Event | None, recording: Recording) -> Row:
-    """Of one event; nothing but its names if the DVA never knew of it."""
+    """Return the measures of one event; only its names if the DVA never knew of it."""
     orders = [f for f in recording.facts if event and f.event == event.number and _is_order(f)]
     last = orders[-1] if orders else None
     advised = last.advised if last else None
@@ -95,7 +95,7 @@ def _is_order(fact: Fact) -> bool:
 
 
 def _cost(fact: Fact) -> float | None:
-    """How much later who was sent is expected there than whom the policy would send [s]."""
+    """Return how much later the device sent is expected than the one the policy would send [s]."""
     if fact.arrival_in is None or fact.advised_in is None:
         return None
     return fact.arrival_in - fact.advised_in

@@ -1,4 +1,4 @@
-"""What goes wrong with the first drive where a scenario says so: told no, at a stated moment."""
+"""Disturbance of the first drive where a scenario has one: a refusal, at a stated moment."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the DVA was told and what it decided: kept as lines of JSON, and replayed.
+"""Trace of the DVA's inputs and decisions: kept as lines of JSON, and replayed.
 
 The DVA's decider is pure: the same messages at the same times, with the same random numbers, give
 the same replies and the same orders. The first line holds what it was made from; each other line
@@ -81,7 +81,7 @@ class TracedDva:
         return self._decided(told, lambda: self._desk.handle(message, now))
 
     def note(self, message: m.Message, now: float) -> list[Send]:
-        """What was published."""
+        """Handle a published message."""
         told = {"do": "note", "message": encode(message).decode(), "now": now}
         return self._decided(told, lambda: self._desk.note(message, now))
 
@@ -102,7 +102,7 @@ class TracedDva:
         )
 
     def tick(self, now: float) -> list[Send]:
-        """What time brings."""
+        """Handle the passing of time."""
         return self._decided({"do": "tick", "now": now}, lambda: self._desk.tick(now))
 
     def go_on(self) -> list[Send]:
@@ -146,7 +146,7 @@ class TracedDva:
         return decision
 
     def _new_roles(self) -> dict[str, Any]:
-        """What control rooms may do, if somebody was appointed since the last line."""
+        """Return the roles of control rooms, if somebody was appointed since the last line."""
         known = self._desk.roles.known
         if known == self._roles:
             return {}

@@ -223,7 +223,7 @@ def run_row(recording: Recording) -> Row:
 
 
 def _disturbance_measures(recording: Recording) -> Row:
-    """Of the first drive, if it was disturbed before it ended."""
+    """Return the measures of the first drive, if it was disturbed before it ended."""
     if recording.scenario.disturbance.kind == "none" or not recording.recorder.drives:
         return {}
     drive = recording.recorder.drives[0]
@@ -239,7 +239,7 @@ def _disturbance_measures(recording: Recording) -> Row:
 
 
 def _event_measures(recording: Recording) -> Row:
-    """Of all events that the DVA knew; the whole horizon stands for what never came.
+    """Return the measures of all events that the DVA knew; the horizon stands for missing times.
 
     False alarms are responded to, and never confirmed: only response counts them.
     """
@@ -260,13 +260,13 @@ def _mean_or(instead: float, rows: list[Row], column: str) -> float:
 
 
 def plugin_failures(recording: Recording) -> int:
-    """How often a policy, operator, filter, mapping, pattern or drive of a user failed."""
+    """Count how often a policy, operator, filter, mapping, pattern or drive of a user failed."""
     counted = recording.recorder.counters.items()
     return sum(count for what, count in counted if what.startswith("failed: an answer of "))
 
 
 def _people_measures(recording: Recording) -> Row:
-    """Of all who are on foot; nothing where there is nobody."""
+    """Return the measures of everybody on foot; nothing where there is nobody."""
     people = recording.people
     if not people:
         return {}
@@ -318,14 +318,14 @@ def drive_measures(recording: Recording) -> Row:
 
 
 def _cause(row: Row, attempts: list[DriveLog], recording: Recording) -> str:
-    """Why an event was not confirmed: a robot without power or jammed, else how it ended."""
+    """Return why an event was not confirmed: a robot without power or jammed, else how it ended."""
     if not all(recording.robots[drive.robot].powered for drive in attempts):
         return "battery"
     return "jammed" if row["jams"] else str(row["outcome"])
 
 
 def _body_measures(attempts: list[DriveLog], recording: Recording) -> Row:
-    """What the robots' bodies went through."""
+    """Return the measures of the robots' bodies."""
     robots = [recording.robots[robot] for robot in sorted({d.robot for d in attempts})]
     return {
         "path_m": sum(robot.distance for robot in robots),
@@ -440,7 +440,7 @@ def outcome_of(event: Event) -> str:
 
 
 def track_rows(recording: Recording) -> list[Row]:
-    """Where the robots were, one row per sampled moment."""
+    """Return the positions of the robots, one row per sampled moment."""
     names = [column.name for column in TRACK_COLUMNS]
     return [
         dict(zip(names, (agent, *point), strict=True))
@@ -451,7 +451,7 @@ def track_rows(recording: Recording) -> list[Row]:
 
 
 def tables_of(recording: Recording) -> dict[str, list[Row]]:
-    """What is measured of a run of the full model, but for its tracks."""
+    """Return the tables of a run of the full model, except its tracks."""
     return {
         "runs": [run_row(recording)],
         "events": event_rows(recording),

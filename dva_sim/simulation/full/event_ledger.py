@@ -45,7 +45,7 @@ Broken = tuple[str, str]
 
 
 class Debt(NamedTuple):
-    """What who has taken an order up owes: to set out, or to move.
+    """Next step that a device owes after accepting an order: to set out, or to move.
 
     Attributes:
         who: Who has the order; None: nobody owes anything.
@@ -61,7 +61,7 @@ class Debt(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """How an event stood when it was last looked at; times in [s].
+    """State of an event when it was last checked; times in [s].
 
     Attributes:
         found: What somebody has found, or done, there.
@@ -84,7 +84,7 @@ class Seen(NamedTuple):
 
 @dataclass
 class Word:
-    """What was said about one event on the network.
+    """Statement about one event on the network.
 
     Attributes:
         ordered: Who was sent there, and what goes there for them: a robot, or they themselves.
@@ -269,7 +269,7 @@ class EventLedger:
     # --- what the book shows -------------------------------------------------------------
 
     def check(self, now: float, page: Page) -> Iterator[Broken]:
-        """What is wrong with the book now."""
+        """Yield what is wrong with the event book now."""
         if now < self._now:
             yield "S7", f"time runs back, from {self._now:g} to {now:g} s"
         passed, last, self._now = now - self._now, self._now, now
@@ -454,7 +454,7 @@ class EventLedger:
         )
 
     def _debt(self, event: Event, hands: tuple[str | None, ...], old: Debt, now: float) -> Debt:
-        """What who has an event in hand owes; who has several orders may begin with any."""
+        """Return what devices with an event owe; with several orders, they may begin with any."""
         word, who = self._word(event.number), hands[1] if hands else None
         if who is None or who not in word.taken or self._has_others(who, event.number):
             return Debt(None, False, now)
@@ -472,7 +472,7 @@ class EventLedger:
         return any(other != number for other in others)
 
     def _is_found(self, event: Event, finding: str, now: float) -> bool:
-        """Whether who was sent there has said so; or a robot nearby may just have felt it."""
+        """Return True if a device sent there has said so, or a robot nearby may have sensed it."""
         if finding in self._word(event.number).found:
             return True
         lately = [robot for robot, when in self._felt.items() if now - when < FELT_LATELY]
@@ -489,7 +489,7 @@ def _keep_newest(kept: dict[Any, Any]) -> None:
 
 
 def _in_hand(event: Event) -> tuple[str | None, ...]:
-    """Who has an event in hand that is not settled; who stands by has not."""
+    """Return the devices that have an unsettled event; a stand-by does not count."""
     if event.state in IN_HAND:
         return "look", event.holder, event.responder
     if event.open and event.state is State.CONFIRMED and event.actor is not None:

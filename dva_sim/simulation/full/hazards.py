@@ -29,7 +29,7 @@ Danger = tuple[tuple[float, float], float]  # the middle and the radius of a pla
 
 @dataclass(frozen=True)
 class Hearsay:
-    """What another person reports of an incident: when [s], and where that is told to be [m]."""
+    """Report of an incident by another person: when [s], and at which position [m]."""
 
     time: float
     position: tuple[float, float]
@@ -60,11 +60,11 @@ class RunHazard:
     hearsay: tuple[Hearsay, ...] = ()
 
     def is_there(self, now: float) -> bool:
-        """Whether it has begun and is real; whether it is over by `now` [s], the field knows."""
+        """Return True if it has begun and is real; its field knows whether it is over [s]."""
         return now >= self.start and not self.false_alarm
 
     def spot(self, now: float) -> HazardSpot:
-        """What a camera may see of it at `now` [s], when it has begun."""
+        """Return what a camera may see of it at `now` [s], once it has begun."""
         hazard = self.hazard
         x, y = hazard.position
         return make_spot(self.kind, x, y, hazard.radius(now), hazard.shines)
@@ -105,7 +105,7 @@ def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> RunH
 def beginning_of(
     event: EventConfig, site: Site, streams: Streams, number: int
 ) -> tuple[float, tuple[float, float]]:
-    """When [s] and where [m] an event begins.
+    """Return when [s] and where [m] an event begins.
 
     Raises:
         ConfigError: a room that the site does not have, or no free place.
@@ -161,7 +161,7 @@ def _watched_rooms(kind: type[Hazard], site: Site) -> list[str | None]:
 
 
 class RunHazards:
-    """What is going on at the site: what is there and can be seen, and what has been dealt with.
+    """Hazards at the site: what is there and visible, and what has been dealt with.
 
     Args:
         stage: Where.
@@ -183,11 +183,11 @@ class RunHazards:
         self.contained: dict[int, float] = {}
 
     def dangers(self, now: float) -> list[Danger]:
-        """Where people should not be."""
+        """Return the places that people should avoid."""
         return [(i.hazard.position, i.hazard.danger_radius(now)) for i in self._going_on(now)]
 
     def spots(self, now: float) -> list[HazardSpot]:
-        """What can be seen of the hazards."""
+        """Return the visible parts of the hazards."""
         return [incident.spot(now) for incident in self._going_on(now)]
 
     def contain(self, kind: str, x: float, y: float) -> None:
@@ -201,20 +201,20 @@ class RunHazards:
                 self.surroundings.contain([*self._real].index(number), now)
 
     def is_there(self, kind: str, x: float, y: float) -> bool:
-        """Whether something of a kind really is near a place [m]."""
+        """Return True if a hazard of this kind really is near a place [m]."""
         spots = self.spots(self.stage.clock.now)
         return any(s.kind == kind and math.dist((s.x, s.y), (x, y)) < SAME_PLACE for s in spots)
 
     def smoke(self, a: tuple[float, float], b: tuple[float, float]) -> float:
-        """How much of the light between two places [m] is lost now: an optical depth."""
+        """Return the optical depth between two places [m] now."""
         return self.surroundings.optical_depth(a, b, self.stage.clock.now)
 
     def is_hazy(self) -> bool:
-        """Whether smoke is in anybody's sight now."""
+        """Return True if smoke is in anybody's sight now."""
         return self.surroundings.is_hazy(self._clock.now)
 
     def _going_on(self, now: float) -> list[RunHazard]:
-        """What has begun, is real, and was not dealt with yet."""
+        """Return the hazards that have begun, are real, and are not dealt with yet."""
         going_on = []
         for number, incident in self._real.items():
             if incident.start <= now < self.contained.get(number, math.inf):

@@ -1,4 +1,4 @@
-"""Where the delay comes from, from a picture's capture to its effect, as a sum that is checked.
+"""Loop delay from a picture's capture to its effect, as a sum of stages that is checked.
 
 At each moment of a drive a command is in force that rests on pictures captured some time ago.
 How long ago, averaged over the time that commands were in force, is the observation-to-effect
@@ -137,7 +137,7 @@ def delay_budget(drives: Sequence[Driven], motor: float) -> Row:
 
 
 def _stages(drive: Driven) -> Floats:
-    """Of each command: its stages but the motors, the whole as measured, its weight [s].
+    """Return for each command its stages but the motors, the measured whole, and its weight [s].
 
     The pictures behind a command are looked up at the moments that the hand still remembers
     when the filter takes its value. Commands from before the first picture are left out.

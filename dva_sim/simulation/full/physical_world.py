@@ -62,7 +62,7 @@ class Field(RunHazards):
         self.bystanders += [team.add_bystander(n + 1) for n in range(scenario.bystander.count)]
 
     def people(self) -> Iterator[tuple[str, GuardAgent | PersonGuard | BystanderAgent]]:
-        """Who is on foot, by name."""
+        """Yield everybody on foot, by name."""
         for guard in self.guards:
             yield guard.device.label, guard
         for bystander in self.bystanders:
@@ -78,7 +78,7 @@ class Field(RunHazards):
         return Truth(self.robots[robot].observe())
 
     def is_near(self, dangers: Iterable[Danger], x: float, y: float) -> bool:
-        """Whether a place [m] is within a danger's radius, with no wall between."""
+        """Return True if a place [m] is within a danger's radius, with no wall between."""
         sees = self.stage.planner.line_of_sight
         return any(
             math.dist(middle, (x, y)) < radius and sees(middle, (x, y))
@@ -86,7 +86,7 @@ class Field(RunHazards):
         )
 
     def place_of(self, device: str) -> m.Position | None:
-        """Where a robot or a guard really is, by its id."""
+        """Return the true position of a robot or guard, by its id."""
         known = self.robots.get(device)
         if known is not None:
             return m.Position(*self.stage.site.frame.to_latlon(known.body.x, known.body.y))
@@ -100,7 +100,7 @@ class Field(RunHazards):
         return {device: at for device in devices if (at := self.place_of(device)) is not None}
 
     def whereabouts(self, now: float) -> Iterator[tuple[str, TrackPoint]]:
-        """Where everybody is who is on the site, by name."""
+        """Yield the position of everybody on the site, by name."""
         self.world.advance_to(now)
         for robot in self.robots.values():
             pose, mode = robot.body.pose(), robot.controller.mode.value
@@ -158,11 +158,11 @@ class Field(RunHazards):
         device.ask(DVA, body, lambda reply: None if reply.code == m.OK else again(), again)
 
     def _sound_alarm(self) -> None:
-        """What detectors and callers report is heard by all who are in the building."""
+        """Sound the alarm that everybody in the building hears after a report."""
         for bystander in self.bystanders:
             bystander.alarm(self.stage.clock.now)
 
 
 def is_dangerous(air: Conditions) -> bool:
-    """Whether people should not be where it is like this."""
+    """Return True if people should not be in such conditions."""
     return any(is_ >= least for is_, least in zip(air, DANGEROUS, strict=True))

@@ -1,4 +1,4 @@
-"""What is left of a run when it is over: what can be shown of it, and all that is measured."""
+"""Results of a finished run: what can be shown of it, and all that is measured."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MERGED_WITHIN = 8.5  # the DVA takes reports so near each other for one event [m
 
 
 class PersonLog(NamedTuple):
-    """What became of a guard or bystander.
+    """Record of a guard or bystander.
 
     Attributes:
         name: As in `guard-1`.
@@ -89,7 +89,7 @@ def log_of(robot: RobotAgent) -> RobotLog:
 
 
 class Ending(NamedTuple):
-    """What became of an incident, as far as the DVA knows.
+    """Outcome of an incident, as far as the DVA knows.
 
     Attributes:
         outcome: `confirmed`, `refuted`, `escalated` or `expired`; `open` if none of them came
@@ -103,7 +103,7 @@ class Ending(NamedTuple):
 
 @dataclass(kw_only=True)
 class Playback:
-    """What can be told and shown of a run, with or without what ran.
+    """Everything that can be told and shown of a run, whether or not it ran here.
 
     Attributes:
         recorder: What happened, as far as it is told or seen.
@@ -138,7 +138,7 @@ class Playback:
 
     @property
     def people_decide(self) -> bool:
-        """Whether somebody takes part at a control room."""
+        """True if somebody takes part at a control room."""
         person = self.scenario.dispatch.person is not None
         return person or any(fact.role is not None for fact in self.facts)
 
@@ -172,7 +172,7 @@ class Recording(Playback):
 
 
 def ending_of(event: Event | None) -> Ending:
-    """What became of an incident that was reported as `event`, or as none."""
+    """Return the outcome of an incident that was reported as `event`, or not at all."""
     if event is None:
         return Ending("undetected", math.inf)
     if "confirmed" in event.times and event.state is not State.REFUTED:

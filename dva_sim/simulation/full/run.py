@@ -63,7 +63,7 @@ def connector_of(scenario: Scenario) -> Connector:
 
 
 def load_of(scenario: Scenario) -> Load:
-    """What a robot's link is offered at most, in the busier direction."""
+    """Return the greatest load of a robot's link, in the busier direction."""
     frame = scenario.camera.frame_bytes
     picture = frame + -(-frame // MSS) * HEADERS
     messages = MESSAGE * (scenario.command.rate_hz + OTHERS_HZ)
@@ -105,7 +105,7 @@ class RealLinks(Protocol):
 
     @property
     def network(self) -> Transport:
-        """What carries the messages."""
+        """Transport of the messages."""
 
     def join(self, kind: str, number: int) -> str:
         """Open the sockets of a device by its kind and number: its address."""
@@ -119,7 +119,7 @@ class RealLinks(Protocol):
 
 @dataclass(frozen=True)
 class Watched:
-    """How a run goes that somebody else lets pass, and where people may take part.
+    """Options of a run whose clock is driven from outside, and that people may join.
 
     Attributes:
         clock: Its time.
@@ -201,7 +201,7 @@ class Run:
             self.clock.every(FILM_PERIOD if keep_traffic else WATCH_PERIOD, self._sample)
 
     def _connected(self, seed: int, watched: Watched) -> tuple[Transport, Stage]:
-        """What carries the messages, and the stage on it."""
+        """Return the transport of the messages, and the stage on it."""
         scenario, real = self.scenario, watched.real
         if real is None:
             network: Transport = VirtualNetwork(
@@ -231,7 +231,7 @@ class Run:
         return self.recording()
 
     def recording(self, sampled: bool = True) -> Recording:
-        """What is left of it now.
+        """Return the results of the run so far.
 
         Args:
             sampled: Rules are checked, and places noted, once more.
@@ -276,7 +276,7 @@ class Run:
         return logs
 
     def _settled(self) -> bool:
-        """Whether every incident is known and closed, nobody drives, and nobody is leaving."""
+        """Return True if all incidents are known and closed, and nobody drives or is leaving."""
         events = list(self.dva.events.values())
         return (
             bool(events)

@@ -90,11 +90,11 @@ class Held(NamedTuple):
 
     @property
     def drives(self) -> bool:
-        """Whether it is for more than reading sensors."""
+        """True if it allows more than reading sensors."""
         return self.level != "sensors"
 
     def allows(self, level: str) -> bool:
-        """Whether it is for `teleoperation`, or for `missions`."""
+        """Return True if it allows `teleoperation`, or `missions`."""
         return self.level in (level, "both")
 
 
@@ -107,7 +107,7 @@ class Unanswered(NamedTuple):
 
 
 class Doing(NamedTuple):
-    """What a robot does by the newest order: `level` is as of a permission."""
+    """Activity of a robot by its newest order; `level` is that of a permission."""
 
     source: str
     session: int | None
@@ -116,7 +116,7 @@ class Doing(NamedTuple):
 
 @dataclass
 class Witness:
-    """What is known of one robot without asking it; times in [s].
+    """Facts about one robot that are known without asking it; times in [s].
 
     Attributes:
         obeys_within: How long it may take to obey a message.
@@ -173,7 +173,7 @@ class Witness:
             self.confirmed.discard(forgotten)
 
     def permits(self, source: str, session: int | None, level: str, now: float) -> Broken | None:
-        """Why a device must not act, or None."""
+        """Return why a device must not act, or None."""
         held = self.sessions.get(session or 0)
         if held is None or held.holder != source or not held.allows(level):
             return "S5", f"obeys {source}, who has no permission for {level}"
@@ -197,21 +197,21 @@ class Witness:
         self.stopped, self.hand = max(self.stopped, when), None
 
     def may_be_on_a_mission(self, now: float) -> bool:
-        """Whether it was sent on one, nobody has called it back, and the session holds."""
+        """Return True if it was sent on a mission, not called back, and the session holds."""
         does = self.does
         if does is None or does.level != "missions":
             return False
         return now <= self.over.get(does.session or 0, now)
 
     def ends(self, level: str, now: float) -> None:
-        """What it does at a level is over: no command that came before moves it."""
+        """End its activity at a level: no earlier command moves it."""
         if level == "teleoperation":
             self.allowed = min(self.allowed, now)
         if self.does is not None and self.does.level == level:
             self.does = None
 
     def obeyed_before(self, message: m.Message) -> bool:
-        """Whether it has said OK to that already, and only repeats it; noted from now on."""
+        """Return True if it has accepted that before and only repeats its OK; note it otherwise."""
         key = message.source, message.session, message.message_id
         if key in self.done:
             return True
@@ -265,7 +265,7 @@ class SafetyAudit:
             witness.obeys_within = max(witness.obeys_within, self._obeys_within)
 
     def witness(self, robot: str) -> Witness:
-        """What is known of a robot."""
+        """Return the facts about a robot."""
         known = self._witnesses.get(robot)
         if known is None:
             known = self._witnesses[robot] = Witness(self._obeys_within)
@@ -541,7 +541,7 @@ class SafetyAudit:
             yield "S2", f"is still driven by {who}, who has sent nothing valid for {silent:.0f} s"
 
     def _overdue(self, witness: Witness, motion: RobotMotion, now: float) -> None:
-        """What a robot has not answered in time counts as obeyed by then."""
+        """Treat a request that a robot has not answered in time as obeyed by then."""
         if not motion.powered:
             witness.unanswered.clear()  # it has not heard them
         if not witness.unanswered:
@@ -673,7 +673,7 @@ def _is_within(speed: float, turn_rate: float, limits: MotorLimits) -> bool:
 def _taken_by_hand(
     witness: Witness, motion: RobotMotion, limits: MotorLimits, now: float
 ) -> Iterator[Broken]:
-    """Whether a robot may be taken by hand now: only one that stands, and that nobody holds."""
+    """Yield why a robot may not be taken by hand now: it moves, or somebody holds it."""
     holder = witness.holder()
     if holder is not None:
         yield "S2", f"was taken by hand while {holder} held it"
@@ -682,13 +682,13 @@ def _taken_by_hand(
 
 
 def _stopping(motion: RobotMotion, limits: MotorLimits) -> float:
-    """How long it takes a robot to stand from full speed [s]."""
+    """Return how long a robot takes to stop from full speed [s]."""
     braking = min(limits.max_deceleration, motion.grip * G)
     return limits.max_speed / braking + 4 * limits.time_constant
 
 
 def _pushed(motion: RobotMotion, limits: MotorLimits, now: float) -> bool:
-    """What another robot has pushed moves on, until its own brakes have stopped it."""
+    """Return True while a robot that another one pushed has not been stopped by its brakes."""
     return motion.touched + _stopping(motion, limits) >= now
 
 
@@ -697,7 +697,7 @@ def _end(witness: Witness, session: int, when: float) -> None:
 
 
 def _read(data: bytes) -> m.Message | None:
-    """What whoever gets it reads, too: the same bytes are read once."""
+    """Decode a message; the same bytes are decoded once."""
     try:
         return decode(data)
     except ProtocolError:

@@ -1,4 +1,4 @@
-"""What is known of a run before it begins, beside what it is on the average: it needs no run.
+"""Covariates of a run that are known before it begins.
 
 Who drives and how far the way to the event is decide much of what a run measures, and no treatment
 changes them. A study that is told of them needs fewer runs; see `statistics.control_variates`.
@@ -21,7 +21,7 @@ SCENES = 5000
 
 
 def trait_off(scenario: Scenario, trait: str) -> float:
-    """How far the first operator is from the median of the population in a trait.
+    """Return how far the first operator is from the population's median in a trait.
 
     In standard deviations of the trait's logarithm, so that the mean over all persons is zero; zero
     where persons do not differ.

@@ -1,4 +1,4 @@
-"""What the parts of a run share: scenario, random streams, clock, network, site, and who is who.
+"""Stage of a run: scenario, random streams, clock, network, site, and the names of all agents.
 
 Ids on the wire and names for people are made here.
 """
@@ -69,7 +69,7 @@ def team_of(scenario: Scenario) -> Iterator[str]:
 
 
 def control_rooms_of(scenario: Scenario) -> dict[str, ControlRoomRole]:
-    """What control rooms may do, by id: those that a scenario names, and that of its dispatcher."""
+    """Return the roles of control rooms by id: those of a scenario, and that of its dispatcher."""
     stated = dict(scenario.dva.control_rooms)
     if scenario.dispatch.person is not None:
         stated.setdefault(label_of("control-room", 1), scenario.dispatch.person.role)
@@ -105,7 +105,7 @@ TYPES = {
 
 @dataclass
 class Stage:
-    """Where a run, or a part of one, takes place.
+    """Stage of a run, or of a part of one.
 
     Attributes:
         scenario: What the run consists of.
@@ -161,12 +161,12 @@ class Stage:
         return self.network.clock
 
     def pattern_for(self, robot: str) -> Pattern:
-        """What carries the commands of the next drive of a robot, by its id."""
+        """Return the pattern of the next drive of a robot, by its id."""
         name = self.pattern_names.get(robot, self.scenario.pattern)
         return self.pattern() if name == self.scenario.pattern else load_pattern(name)()
 
     def reach(self, robot: str) -> Reach:
-        """What a robot can do, as its operator has been taught; a stranger, what ours can."""
+        """Return a robot's limits, as taught to its operator; for unknown robots, those of ours."""
         spec = self._specs.get(robot) or next(iter(self._specs.values()))
         return Reach(spec.max_speed, spec.max_turn_rate, spec.drive(spec).turning_radius)
 

@@ -1,4 +1,4 @@
-"""Who is in a run in the flesh: robots, guards and bystanders, made where they begin.
+"""Team of a run: robots, guards and bystanders, placed where they begin.
 
 They begin at the site's bases and posts, or a given way from the event. A robot has a body, a
 battery, sensors and a computer; people on foot share physics and air with it.
@@ -247,7 +247,7 @@ class TeamBuilder:
         )
 
     def _places(self, name: str) -> list[Point]:
-        """Where a bystander works; at the first nobody stands yet."""
+        """Return the places where a bystander works; nobody is at the first one yet."""
         stage = self._stage
         starts = (*stage.site.guard_posts, *stage.site.robot_bases)
         taken = [*((pose.x, pose.y) for pose in starts), *self._first_places]
@@ -272,7 +272,7 @@ class TeamBuilder:
     # --- where they begin ----------------------------------------------------------------
 
     def _start(self, kind: str, number: int) -> Pose:
-        """Where the `number`-th robot begins and is charged, or the `number`-th guard waits.
+        """Return where the `number`-th robot begins and is charged, or the `number`-th guard waits.
 
         Raises:
             ConfigError: there is no place so far from the event as it is to begin.
@@ -329,7 +329,7 @@ class Power:
         self._body, self._base, self._clock = body, base, clock
 
     def share(self) -> float:
-        """Of the capacity that is left now; 1 without a battery."""
+        """Return the remaining share of the capacity; 1 without a battery."""
         battery, body = self._battery, self._body
         if battery is None:
             return 1.0
@@ -344,7 +344,7 @@ def _length(way: NDArray[np.float64]) -> float:
 
 
 def _cut(way: NDArray[np.float64], left: float) -> Pose | None:
-    """Where so much of a way `(n, 2)` is left [m], looking along it; None if it is shorter."""
+    """Return the pose with so much of a path `(n, 2)` left [m]; None if it is shorter."""
     steps = np.hypot(*np.diff(way, axis=0).T)
     gone = np.concatenate([[0.0], np.cumsum(steps)])
     at = float(gone[-1]) - left

@@ -1,4 +1,4 @@
-"""How busy operators are, and how they steer: pure functions over what a run has recorded.
+"""Workload and steering of operators: pure functions of what a run has recorded.
 
 References:
     O. Nakayama, T. Futami, T. Nakamura, E. R. Boer: Development of a steering entropy method for
@@ -88,7 +88,7 @@ OPERATOR_COLUMNS = (
 
 # --- spans of time -----------------------------------------------------------------------------
 def covered(spans: Iterable[Span]) -> float:
-    """How long at least one of the spans lasts [s]."""
+    """Return the length of the union of the spans [s]."""
     total, end = 0.0, -math.inf
     for since, until in sorted(spans):
         total += max(0.0, until - max(since, end))
@@ -97,7 +97,7 @@ def covered(spans: Iterable[Span]) -> float:
 
 
 def most_at_once(spans: Iterable[Span]) -> int:
-    """How many spans overlap at most."""
+    """Return the greatest number of overlapping spans."""
     changes = sorted((t, d) for since, until in spans for t, d in ((since, 1), (until, -1)))
     return max(np.cumsum([change for _, change in changes]).tolist(), default=0)
 
@@ -108,13 +108,13 @@ def in_hand(log: DriveLog, end: float) -> Span:
 
 
 def attended(log: DriveLog, end: float) -> list[Span]:
-    """When its operator looked at a robot's picture."""
+    """Return when its operator looked at a robot's picture."""
     now = [] if log.looks_since is None else [(log.looks_since, max(end, log.looks_since))]
     return log.attended + now
 
 
 def waits(log: DriveLog, end: float) -> list[Span]:
-    """When a robot waited for its operator to turn to it: for its turn, or for the eyes."""
+    """Return when a robot waited for its operator: for its turn, or for attention."""
     until = in_hand(log, end)[1]
     spans = [(log.ordered, until if log.taken_up is None else log.taken_up)]
     if log.waits_from is not None:
@@ -127,7 +127,7 @@ def waits(log: DriveLog, end: float) -> list[Span]:
 
 # --- steering ----------------------------------------------------------------------------------
 def reversals(values: Iterable[float], gap: float = GAP) -> int:
-    """How often a signal turns round, counting only changes of at least `gap`."""
+    """Count how often a signal reverses, counting only changes of at least `gap`."""
     count, direction = 0, 0
     low, high = math.inf, -math.inf
     for value in values:
@@ -142,7 +142,7 @@ def reversals(values: Iterable[float], gap: float = GAP) -> int:
 
 
 def changes(commands: Iterable[tuple[float, float]]) -> int:
-    """How often a command [m/s, rad/s] was clearly another than the last that counted."""
+    """Count how often a command [m/s, rad/s] clearly differed from the last one that counted."""
     count, last = -1, (math.inf, math.inf)
     for speed, turn in commands:
         if abs(speed - last[0]) > LEVEL_SPEED or abs(turn - last[1]) > LEVEL_TURN:
@@ -151,7 +151,7 @@ def changes(commands: Iterable[tuple[float, float]]) -> int:
 
 
 def steering_entropy(turn_rate: Floats, band: float = BAND) -> float:
-    """How unpredictably somebody steers, from 0 (like clockwork) to 1; nan for under 3 s.
+    """Return the steering entropy, from 0 (regular) to 1; nan for less than 3 s.
 
     Each value, sampled every 0.15 s, is predicted from the three before it by a Taylor expansion
     of second order; the errors fall into nine bins, and the entropy is -sum p log9 p. Published,
@@ -174,7 +174,7 @@ def steering_entropy(turn_rate: Floats, band: float = BAND) -> float:
 
 
 def sampled(log: DriveLog, end: float, step: float = STEP) -> Floats:
-    """What the phone asked for, as it stood every `step` [s]: shape `(n, 2)` [m/s, rad/s]."""
+    """Sample the phone's commands every `step` [s]: shape `(n, 2)` [m/s, rad/s]."""
     if not log.commands:
         return np.empty((0, 2))
     times, *values = np.array(log.commands).T
@@ -184,7 +184,7 @@ def sampled(log: DriveLog, end: float, step: float = STEP) -> Floats:
 
 
 def steering(logs: Sequence[DriveLog], end: float) -> Row:
-    """How these drives were steered, all together; nothing known where nobody steered."""
+    """Return how these drives were steered, taken together; nan where nobody steered."""
     samples = [sampled(log, end) for log in logs]
     minutes = sum(map(len, samples)) * STEP / 60.0
     if not minutes:
@@ -205,7 +205,7 @@ def steering(logs: Sequence[DriveLog], end: float) -> Row:
 
 
 def _strategies(logs: Sequence[DriveLog], weights: Sequence[int]) -> Row:
-    """What the ways of steering count themselves: 0 for those that neither wait nor change.
+    """Return the strategies' own counts: 0 for those that neither wait nor change.
 
     `move_waits` is how often the operators waited to see the result of a move,
     `move_and_wait_share` how much of their driving they spent in that way of steering.
@@ -218,14 +218,14 @@ def _strategies(logs: Sequence[DriveLog], weights: Sequence[int]) -> Row:
 
 
 def _is_level(samples: Floats) -> NDArray[np.bool_]:
-    """Whether the phone asks for a standing robot."""
+    """Return where the phone asks the robot to stand."""
     level: NDArray[np.bool_] = np.all(np.abs(samples) < (LEVEL_SPEED, LEVEL_TURN), axis=1)
     return level
 
 
 # --- the way -----------------------------------------------------------------------------------
 def off_the_way(log: DriveLog, track: Iterable[TrackPoint], end: float) -> Floats:
-    """How far from the way that its operator had planned the robot was, shape `(n,)` [m]."""
+    """Return the robot's distance from its operator's planned path, shape `(n,)` [m]."""
     if log.started is None or not log.ways:
         return np.empty(0)
     until = in_hand(log, end)[1]
@@ -240,7 +240,7 @@ def off_the_way(log: DriveLog, track: Iterable[TrackPoint], end: float) -> Float
 
 
 def _is_sample(point: TrackPoint) -> bool:
-    """Whether a point is one of those that every track has, however closely it was filmed."""
+    """Return True for a point that every track has, however closely it was filmed."""
     return abs(point.time / TRACK_STEP - round(point.time / TRACK_STEP)) < 1e-6
 
 
@@ -265,7 +265,7 @@ def path_error(recording: Recording) -> Row:
 
 # --- right and wrong ---------------------------------------------------------------------------
 def was_there(recording: Recording, event: int, time: float) -> bool:
-    """Whether what the DVA's event of that number is about was there at `time` [s]."""
+    """Return True if the DVA's event of that number was about something real at `time` [s]."""
     for number, incident in enumerate(recording.incidents):
         known = recording.event_of(number)
         over = recording.contained.get(number, math.inf)
@@ -294,7 +294,7 @@ def operator_rows(recording: Recording) -> list[Row]:
 
 
 def operator_row(recording: Recording, operator: str) -> Row:
-    """How one operator fared; shares are of the whole run.
+    """Return the workload of one operator; shares are of the whole run.
 
     `utilisation` is the share of time with an order in hand, `attending_share` that of looking
     at a picture. A robot waits for attention while its operator is at another one, and
@@ -338,7 +338,7 @@ _OF_A_RUN = ("utilisation", "attending_share", "queue_mean", "turns_per_min")
 
 
 def run_measures(recording: Recording) -> Row:
-    """The same for a run: shares are means over the operators, steering is over all drives."""
+    """Return the workload of a run: shares are means over operators, steering over all drives."""
     rows = operator_rows(recording)
     if not rows:
         return {}

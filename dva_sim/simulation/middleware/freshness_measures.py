@@ -1,4 +1,4 @@
-"""What is measured of commands over real middleware: what each column means, and how it is found.
+"""Measures of commands over real middleware: meaning of each column, and its computation.
 
 **Applied** is a command that arrived before any newer one: a robot drops older ones. Its **age** is
 from when it was made until then. The **age in force** at any moment is that of the newest applied
@@ -78,7 +78,7 @@ class Window(NamedTuple):
 
     @property
     def length(self) -> float:
-        """How long it is [s]."""
+        """Length of the window [s]."""
         return self.until - self.since
 
 
@@ -126,7 +126,7 @@ def gaps(applied: Floats, window: Window) -> Floats:
 def command_row(
     made: Floats, applied: Floats, window: Window, *, max_age_s: float, watchdog_s: float
 ) -> Row:
-    """What is measured of the applied commands.
+    """Return the measures of the applied commands.
 
     Args:
         made: When each was made [s], shape `(n,)`, in the order of application.
@@ -152,7 +152,7 @@ def command_row(
 
 
 def picture_row(taken: Floats, shown: Floats, window: Window) -> Row:
-    """What is measured of the pictures that arrived.
+    """Return the measures of the pictures that arrived.
 
     Args:
         taken: When each was taken [s], shape `(n,)`.

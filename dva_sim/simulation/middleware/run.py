@@ -43,7 +43,7 @@ PATIENCE_S: Final = 10.0  # for the operator's program to end
 
 
 class MiddlewareRun(NamedTuple):
-    """What is left of a run.
+    """Results of a run.
 
     Attributes:
         scenario: As it was run.
@@ -65,7 +65,7 @@ class MiddlewareRun(NamedTuple):
 
     @property
     def is_disturbed(self) -> bool:
-        """Whether the machine, and not the link alone, decided when packets came out."""
+        """True if the machine, and not the link alone, determined when packets came out."""
         return self.link.is_disturbed
 
 
@@ -133,7 +133,7 @@ def _attempt(scenario: MiddlewareScenario, seed: int, attempt: int) -> Middlewar
 
 
 def plan_of(scenario: MiddlewareScenario, folder: Path, window: Window) -> Plan:
-    """What both programs are told."""
+    """Return the instructions for both programs."""
     pictures = scenario.pictures
     return Plan(
         transport=scenario.transport.name,
@@ -169,7 +169,7 @@ def _await_end(near: subprocess.Popen[bytes], limit: float) -> None:
 
 
 def _problem(side: Side, program: subprocess.Popen[bytes], plan: Plan) -> str:
-    """Why a program has ended, unless it was done or found no connection; empty if it runs."""
+    """Return why a program failed; empty if it runs, was done or found no connection."""
     if program.poll() in (None, 0, NOT_CONNECTED):
         return ""
     said = _complaints(side, plan).read_text(errors="replace").strip()
@@ -234,12 +234,12 @@ def _link_row(run: MiddlewareRun) -> Row:
 
 
 def _times(notes: list[ProgramNote], kind: ProgramNoteKind) -> dict[int, float]:
-    """When each command or picture of some notes was made [s], by number."""
+    """Return when each command or picture of some notes was made [s], by number."""
     return {note.number: note.time for note in notes if note.kind is kind}
 
 
 def _fates(made: dict[int, float], arrived: list[ProgramNote], window: Window) -> list[Row]:
-    """When each was made and arrived, in the time of the run; nan for what never did."""
+    """Return when each was made and arrived, in the run's time; nan for what never arrived."""
     found = {note.number: note.time - window.start for note in arrived}
     return [
         {

@@ -16,7 +16,7 @@ from dva_sim.network.middleware import PLUGINS
 
 
 class TransportChoice(Config):
-    """What carries the commands.
+    """Transport of the commands.
 
     Attributes:
         name: A shipped transport, an installed one, or a file and its class.
@@ -42,7 +42,7 @@ class StreamConfig(Config):
 
 
 class ObedienceConfig(Config):
-    """What a robot obeys, as in a full scenario.
+    """Rules that a robot obeys, as in a full scenario.
 
     Attributes:
         watchdog_s: It stops when no newer command has come for so long.

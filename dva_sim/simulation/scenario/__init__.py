@@ -1,4 +1,4 @@
-"""What one run consists of: site, team, network, phone, events; units are in the keys."""
+"""Scenario of one run: site, team, network, phone, events; units are in the keys."""
 
 from dva_sim.simulation.scenario.contradictions import contradictions
 from dva_sim.simulation.scenario.loading import FOLDER, build, check_policy, load, locate_files

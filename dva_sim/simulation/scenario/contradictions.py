@@ -1,4 +1,4 @@
-"""What in a scenario works against something else in it, told before it runs.
+"""Contradictions within a scenario, reported before it runs.
 
 A contradiction is no mistake: the scenario can be run, and somebody may want to see what happens.
 Each is one sentence that names the keys and says what would go together.
@@ -35,7 +35,7 @@ _OF_SOCKETS = "zeromq"
 
 
 def contradictions(scenario: Scenario, *, live: bool = False) -> list[str]:
-    """What does not go together, a sentence for each without its full stop.
+    """List contradictory settings, a sentence each without its full stop.
 
     Args:
         scenario: As `build` makes it.
@@ -186,7 +186,7 @@ def _of_team(scenario: Scenario) -> Iterator[str]:
 
 
 def _of_time(scenario: Scenario) -> Iterator[str]:
-    """What would happen after the end."""
+    """Yield what would happen after the end."""
     end = scenario.horizon_s
     for number, event in enumerate(scenario.events):
         if event.at_s >= end:
@@ -222,5 +222,5 @@ def _moves_robots(scenario: Scenario) -> bool:
 
 
 def _drives(scenario: Scenario) -> bool:
-    """Whether operators send commands, rather than goals."""
+    """Return True if operators send commands rather than goals."""
     return _moves_robots(scenario) and scenario.control != "supervisory"

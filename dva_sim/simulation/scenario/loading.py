@@ -1,4 +1,4 @@
-"""How a scenario is read, checked and completed: what it names must be there."""
+"""Loading of scenarios: reading, checking and completing them; all names must resolve."""
 
 from __future__ import annotations
 
@@ -202,7 +202,7 @@ def _check_options(scenario: Scenario, error: Fail) -> None:
 
 
 def _check_draughts(scenario: Scenario, error: Fail) -> None:
-    """Where a draught blows is on the site, so it has to be made to judge that."""
+    """Check draughts; their places are on the site, so the site has to be built for it."""
     for number, event in enumerate(scenario.events):
         if "draught" in event.hazard:
             west, south, east, north = site_of(scenario, seed=0).extent

@@ -1,4 +1,4 @@
-"""What a scenario consists of, part by part; units are in the keys, and `Key` says their names."""
+"""Parts of a scenario; units are in the keys, and `Key` gives their names."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ AnyNumber = Annotated[float, Field(allow_inf_nan=True)]  # `make_hazard` says wh
 
 
 class SiteConfig(Config):
-    """Where it happens: a site by name or path, or a bare map in ROS map_server form.
+    """Site by name or path, or a bare map in ROS map_server form.
 
     Attributes:
         options: Of a site that is generated, such as `{seed: 7, width_m: 80}`.
@@ -192,7 +192,7 @@ class PhoneConfig(BaseModel):
 
     @property
     def changes(self) -> dict[str, Any]:
-        """What is otherwise than in the profile."""
+        """Keys that differ from the profile."""
         return dict(self.__pydantic_extra__ or {})
 
 
@@ -240,7 +240,7 @@ class OperatorConfig(OmitsUnset):
 
 
 class CommandConfig(Config):
-    """How commands are sent, the same for every pattern.
+    """Sending of commands, the same for every pattern.
 
     Attributes:
         timeout_s: Of a command that is to be answered; left out: 9 s, or as much longer as the
@@ -279,7 +279,7 @@ class RequestConfig(Config):
 
 
 class DisturbanceConfig(Config):
-    """What goes wrong with the first drive, to see how soon its operator knows.
+    """Disturbance of the first drive, to see how soon its operator notices.
 
     Attributes:
         kind: `revoke`: the DVA ends the permission. `take_over`: and gives the robot to another.
@@ -357,7 +357,7 @@ class EventConfig(Config):
 
 
 class DispatchConfig(Config):
-    """How the DVA chooses who goes, and the rules that hold whatever is chosen.
+    """Dispatch policy of the DVA, and the rules that hold whatever it advises.
 
     Attributes:
         policy: By name, or as `my_policy.py:Mine`.
@@ -399,7 +399,7 @@ class DispatchConfig(Config):
     person: DispatcherProfile | None = None
 
     def rules(self) -> Rules:
-        """As the core wants them."""
+        """Return the rules as the core wants them."""
         never = math.inf
         return Rules(
             escalate_after=never if self.escalate_after_s is None else self.escalate_after_s,
@@ -416,7 +416,7 @@ class DispatchConfig(Config):
 
 
 class AccessConfig(Config):
-    """What some devices may ask for, for a time; what no rule allows is refused.
+    """Permission of some devices for a time; what no rule allows is refused.
 
     Attributes:
         holders: Labels such as `operator-1`; left out: all.
@@ -436,7 +436,7 @@ class AccessConfig(Config):
 
 
 class DvaConfig(Config):
-    """What the DVA does beside giving orders.
+    """Duties of the DVA besides giving orders.
 
     Attributes:
         sensors: Which sensors of robots it heeds: much of it raises an event, or confirms one.

@@ -104,7 +104,7 @@ class Scenario(Config):
 
     @model_serializer(mode="wrap")
     def _as_before(self, usual: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """What is newer is written only where it is not as usual: a hash stays what it was."""
+        """Dump newer keys only where they differ from the default, so that hashes stay the same."""
         written: dict[str, Any] = usual(self)
         for part, *keys in NEWER:
             ours, usually = (
@@ -158,7 +158,7 @@ def site_of(scenario: Scenario, seed: int) -> Site:
 
 
 def robot_profiles(scenario: Scenario) -> list[RobotProfile]:
-    """What the scenario's robots are, one after the other."""
+    """Return the profiles of the scenario's robots, in order."""
     named = scenario.robot.profile
     names = (named,) if isinstance(named, str) else named
     kinds = [load_robot(name) for name in names]
@@ -188,7 +188,7 @@ def phone_profile(scenario: Scenario, error: Fail | None = None) -> PhoneProfile
 
 
 def guard_profile(scenario: Scenario) -> GuardProfile:
-    """How the scenario's guards are drawn.
+    """Return the profile from which the scenario's guards are drawn.
 
     Raises:
         ConfigError: there is no such profile or trait.
@@ -201,7 +201,7 @@ def guard_profile(scenario: Scenario) -> GuardProfile:
 
 
 def bystander_profile(scenario: Scenario) -> BystanderProfile:
-    """How the scenario's bystanders are drawn.
+    """Return the profile from which the scenario's bystanders are drawn.
 
     Raises:
         ConfigError: there is no such profile or trait.

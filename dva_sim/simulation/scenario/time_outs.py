@@ -36,12 +36,12 @@ def command_timeout_s(scenario: Scenario) -> float:
 
 
 def start_needs_s(scenario: Scenario) -> float:
-    """What the first answer over a new connection to a robot takes [s]."""
+    """Return how long the first answer over a new connection to a robot takes [s]."""
     return TRIPS_OF_A_START * round_trip_s(scenario) + mean_processing_s(scenario)
 
 
 def command_needs_s(scenario: Scenario) -> float:
-    """What the reply to a command takes, over a connection that stands [s]."""
+    """Return how long the reply to a command takes, over an open connection [s]."""
     return round_trip_s(scenario) + mean_processing_s(scenario)
 
 

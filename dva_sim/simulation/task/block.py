@@ -64,7 +64,7 @@ def rehearse(scenario: TaskScenario) -> None:
 
 
 def seat_of(scenario: TaskScenario) -> Seat:
-    """Who sits down to the block, without any idea yet how late the link makes it."""
+    """Return the person who does the block, without any estimate of the link's delay yet."""
     operator = scenario.operator
     person = draw_person(population(operator), operator.population_seed, operator.person)
     guess = person.perceptual_delay + person.hand_lag
@@ -77,7 +77,7 @@ def seat_of(scenario: TaskScenario) -> Seat:
 
 
 def practised(person: Person, number: int) -> Person:
-    """The same person after so many trials: quicker by the power law of practice.
+    """Return the person after so many trials: quicker by the power law of practice.
 
     References:
         A. Newell, P. S. Rosenbloom: Mechanisms of skill acquisition and the law of practice, 1981.
@@ -87,7 +87,7 @@ def practised(person: Person, number: int) -> Person:
 
 
 def in_a_moment(person: Person, alertness: float, task: Task) -> Person:
-    """The same person as it happens to be in one trial, quicker or slower to react.
+    """Return the person's state in one trial, quicker or slower to react.
 
     Where nothing but the first reaction is of interest, what it sees varies as well.
 

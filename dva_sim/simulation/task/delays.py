@@ -1,4 +1,4 @@
-"""How late: frames to the person, readings to the machine, and noise in the hand.
+"""Delays of a task: frames to the person, readings to the machine; and noise in the hand.
 
 Both directions are the links of the network, so that delay, jitter and loss mean what they mean
 everywhere else; a trial without any of them costs no event.

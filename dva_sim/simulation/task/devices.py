@@ -1,4 +1,4 @@
-"""What is in the hand: from the velocity that a person wants to what the machine is told.
+"""Input devices: from the velocity that a person wants to the command of the machine.
 
 A practised person knows the device, so the hand aims at what would give the wanted velocity. It
 follows with a first-order lag and with signal-dependent noise, whose size is a share of what it
@@ -31,7 +31,7 @@ CALIBRATING = 20  # samples
 
 
 class HandDevice(ABC):
-    """What every device offers to a trial.
+    """Interface of every device in a trial.
 
     Attributes:
         top: The fastest cursor that it can ask for [m/s].
@@ -70,10 +70,10 @@ class HandDevice(ABC):
 
     @abstractmethod
     def reading(self) -> Pair:
-        """What the device sends now."""
+        """Return what the device sends now."""
 
     def farthest(self) -> dict[str, float]:
-        """How far the hand went from rest, as a column; nothing where there is no rest."""
+        """Return the greatest distance of the hand from rest, as a column; nothing without rest."""
         return {}
 
 

@@ -149,11 +149,11 @@ class DriveTrial(Trial[Observation]):
         return intent.speed / self._top[0]
 
     def _motion(self, seen: Observation) -> Pair:
-        """What the person learns the delay from [m/s, rad/s]."""
+        """Return the motion from which the person learns the delay [m/s, rad/s]."""
         return seen.speed, seen.turn_rate
 
     def _judged(self, seen: Observation) -> Observation:
-        """As the person takes it: place and heading with an error."""
+        """Return the observation as the person judges it: place and heading with an error."""
         person, error = self.seat.person, self._errors
         return seen._replace(
             x=seen.x + person.position_error * next(error),
@@ -182,7 +182,7 @@ class DriveTrial(Trial[Observation]):
         return Intent(wanted.speed, (1.0 - share) * wanted.turn_rate + share * own)
 
     def row(self) -> dict[str, Any]:
-        """What is measured."""
+        """Return what is measured."""
         return {
             "steering_id": movement_laws.steering_id(self.length, self.width),
             "movement_time_s": self.now,
@@ -254,7 +254,7 @@ class HeadingTrial(DriveTrial):
         self.over = self.now + dt >= self._watched
 
     def row(self) -> dict[str, Any]:
-        """When the first correction began, and how long it grew [s]."""
+        """Return when the first correction began, and how long it grew [s]."""
         over = round(SMOOTHED / self.STEP)
         steered = np.convolve(self._steered, np.full(over, 1.0 / over), "same").tolist()
         peak = movement_laws.first_peak(steered)

@@ -87,7 +87,7 @@ def fit_line(x: Sequence[float] | Floats, y: Sequence[float] | Floats) -> Fitted
 
 
 class Crossover(NamedTuple):
-    """Where the open loop has a gain of one: frequency [rad/s] and phase margin [rad]."""
+    """Crossover of the open loop: frequency [rad/s] and phase margin [rad] at a gain of one."""
 
     frequency: float
     phase_margin: float
@@ -138,7 +138,7 @@ def crossover(frequencies: Sequence[float], loop: NDArray[np.complex128]) -> Cro
 
 
 def first_peak(values: Sequence[float], falls: float = 0.1) -> int:
-    """Where the first rise of a signal ends: before it falls by a share of its height.
+    """Return where the first rise of a signal ends: before it falls by a share of its height.
 
     Args:
         values: Of the signal, smoothed.
@@ -158,5 +158,5 @@ SMALL = 0.2  # what stays below this share of the largest is no peak
 
 
 def first_above(values: Sequence[float], level: float) -> int:
-    """Where a signal first exceeds a level; its length if it never does."""
+    """Return where a signal first exceeds a level; its length if it never does."""
     return next((n for n, value in enumerate(values) if value > level), len(values))

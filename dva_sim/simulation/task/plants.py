@@ -32,7 +32,7 @@ def noise_of(person: Person, streams: Streams, dt: float) -> Iterator[Pair]:
 
 
 def shaken(x: float, y: float, noise: Iterator[Pair]) -> Pair:
-    """What a hand does that means (x, y): off by a share of its size, in any direction."""
+    """Return the motion of a hand that means (x, y): off by a share of it, in any direction."""
     nx, ny = next(noise)
     size = math.hypot(x, y)
     return x + size * nx, y + size * ny

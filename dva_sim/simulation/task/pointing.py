@@ -42,7 +42,7 @@ SUMMED = 0.1  # over so long vision sums motion before it tells a velocity [s]
 
 
 class Places(NamedTuple):
-    """Where cursor and target were at a time [s, m]."""
+    """Positions of cursor and target over time [s, m]."""
 
     time: float
     x: float
@@ -69,7 +69,7 @@ class Motion:
         frames.append(frame)
 
     def velocities(self) -> tuple[float, float, float, float]:
-        """Of cursor and target along x and y: slopes of the least-squares lines [m/s]."""
+        """Return the velocities of cursor and target along x and y: least-squares slopes [m/s]."""
         frames = self._frames
         middle = sum(frame.time for frame in frames) / len(frames)
         squares = sum((frame.time - middle) ** 2 for frame in frames)
@@ -92,7 +92,7 @@ def summed_over(rate: float) -> float:
 
 
 class Goal(ABC):
-    """What is to be done with a cursor, and what is measured of it.
+    """Goal of a pointing trial, and its measures.
 
     Attributes:
         flat: Whether the cursor only moves along x.
@@ -114,7 +114,7 @@ class Goal(ABC):
 
     @abstractmethod
     def target(self, now: float) -> Pair:
-        """Where the target is [m]."""
+        """Return the position of the target [m]."""
 
     @abstractmethod
     def check(self, now: float, x: float, y: float, dt: float) -> bool:
@@ -126,7 +126,7 @@ class Goal(ABC):
 
     @abstractmethod
     def row(self, trial: CursorTrial) -> dict[str, Any]:
-        """What is measured."""
+        """Return what is measured."""
 
     @abstractmethod
     def draw(self, trace: Trace) -> None:
@@ -137,7 +137,7 @@ class Goal(ABC):
 
     @property
     def awaits_press(self) -> bool:
-        """Whether pressing the button does anything now."""
+        """True if pressing the button has an effect now."""
         return False
 
     def pushed(self, now: float, wanted: Velocity) -> Velocity:
@@ -145,7 +145,7 @@ class Goal(ABC):
         return wanted
 
     def holds(self, now: float) -> bool:
-        """Whether something else is being done now, during which the cursor stays."""
+        """Return True while something else is done, during which the cursor stays."""
         return False
 
 

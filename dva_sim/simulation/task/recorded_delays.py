@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FrameStream:
-    """What became of the messages of one direction.
+    """Fates of the messages of one direction.
 
     Attributes:
         period: Between two messages [s].
@@ -34,7 +34,7 @@ class FrameStream:
     delays: Floats
 
     def delay_at(self, time: float) -> float:
-        """Of the message made at `time` since the recording began, or just before [s]."""
+        """Return the delay of the message made at `time` since the recording began [s]."""
         return float(self.delays[math.floor(time / self.period + EARLY) % len(self.delays)])
 
 
@@ -52,7 +52,7 @@ class RecordedDelays:
 
     @property
     def length(self) -> float:
-        """How long the commands were recorded [s]."""
+        """Length of the recording of commands [s]."""
         return self.up.period * len(self.up.delays)
 
 

@@ -44,7 +44,7 @@ class OneWayDelay(Config):
         return self
 
     def link(self) -> LinkConfig:
-        """The same as a link of the network."""
+        """Return the delays as a link of the network."""
         return LinkConfig(
             delay_s=self.delay_s, jitter_s=self.jitter_s, loss=self.loss, rate_bps=FASTEST_LINE
         )
@@ -62,7 +62,7 @@ class Ways(Config):
 
 
 class FramesConfig(Config):
-    """How what happens is shown.
+    """Frames that show what happens.
 
     Attributes:
         rate_hz: Frames per second.
@@ -74,7 +74,7 @@ class FramesConfig(Config):
 
 
 class DeviceConfig(Config):
-    """What is in the hand.
+    """Device in the hand.
 
     Attributes:
         kind: `mouse`: the hand's place is the cursor's. `tilt_position`, `tilt_velocity`: the
@@ -103,7 +103,7 @@ class DeviceConfig(Config):
 
 
 class PlantConfig(Config):
-    """What is moved.
+    """Machine that is moved.
 
     Attributes:
         lag_s: Time constant with which it follows its command.
@@ -152,7 +152,7 @@ class TaskScenario(Config):
 
     @property
     def is_driven(self) -> bool:
-        """Whether a vehicle is driven, rather than a cursor or an arm moved."""
+        """True if a vehicle is driven, rather than a cursor or an arm moved."""
         return isinstance(self.task, VEHICLES)
 
     @model_validator(mode="after")
@@ -219,7 +219,7 @@ def _complete(scenario: TaskScenario, error: Fail) -> TaskScenario:
 
 
 def _try(get: Callable[[], T], error: Fail, path: KeyPath) -> T:
-    """What `get` gives; its mistake is told at a key of the scenario."""
+    """Return what `get` returns; report its mistake at a key of the scenario."""
     try:
         return get()
     except ConfigError as problem:

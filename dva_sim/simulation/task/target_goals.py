@@ -19,7 +19,7 @@ SAMPLE_STEPS = 5  # a tracking record keeps every fifth step
 
 
 class ToTarget(Goal):
-    """What goals with a target share."""
+    """Base class of goals with a target."""
 
     def corrected(self, share: float, now: float, at: Cursor, wanted: Velocity) -> Velocity:
         """All that is wanted here is correction: it is shared as a whole."""
@@ -32,7 +32,7 @@ class ToTarget(Goal):
 
 
 class Wandering:
-    """Where the target of a pointing trial is: it stands, or goes straight on until it turns.
+    """Target of a pointing trial that stands, or moves straight on until it turns.
 
     Args:
         task: Its speed and how often it turns.
@@ -55,7 +55,7 @@ class Wandering:
             self._turn()
 
     def at(self, now: float) -> Pair:
-        """Where it is [m]; time only goes on."""
+        """Return its position [m]; time must not go back."""
         if not self._task.target_mps:
             return self._place
         while self._turns_at <= now:

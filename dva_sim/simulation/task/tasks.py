@@ -136,7 +136,7 @@ class Tracking(Config):
 
     @property
     def frequencies(self) -> tuple[float, ...]:
-        """Of the sines, whole numbers of which fill the record [rad/s]."""
+        """Frequencies of the sines, whole numbers of which fill the record [rad/s]."""
         base = 2.0 * math.pi / self.record_s
         return tuple(base * max(1, round(w / base)) for w in self.frequencies_rad_s)
 
@@ -250,7 +250,7 @@ class HeadingStep(Config):
 
 
 class Stop(Config):
-    """Where the tip of the arm has to come to, and the work there.
+    """Goal of the arm's tip, and the work to be done there.
 
     Attributes:
         swing_m: Along the arc of the swing at the arm's middle reach.

@@ -36,7 +36,7 @@ TRACE_EVERY = 0.02  # [s]
 
 @dataclass
 class Seat:
-    """Who does the trials of a block, and what stays from one to the next.
+    """Person who does the trials of a block, and what carries over between them.
 
     Attributes:
         person: Who it is.
@@ -61,7 +61,7 @@ class Seat:
 
 @dataclass
 class Trace:
-    """What can be drawn of a trial.
+    """Trace of a trial for drawing.
 
     Attributes:
         times: [s]
@@ -104,7 +104,7 @@ class Waits:
 
 
 class WayKept:
-    """How well one stays on a way: a crossing of its edge counts once, until one is back.
+    """Departures from a path: a crossing of its edge counts once, until one is back.
 
     Args:
         limit: How far the middle may be from that of the way [m].
@@ -130,7 +130,7 @@ class WayKept:
         return inside
 
     def row(self, seconds: float) -> dict[str, float]:
-        """What is measured, over so long a time [s]."""
+        """Return what is measured, over so long a time [s]."""
         return {
             "error": float(self.crossings > 0),
             "wall_crossings": self.crossings,
@@ -139,7 +139,7 @@ class WayKept:
 
 
 class Trial(ABC, Generic[S]):
-    """What all trials have in common.
+    """Base class of all trials.
 
     Args:
         scenario: Rates, links, horizon.
@@ -186,7 +186,7 @@ class Trial(ABC, Generic[S]):
 
     @abstractmethod
     def sight(self) -> S:
-        """What a frame taken now shows."""
+        """Return what a frame taken now shows."""
 
     @abstractmethod
     def decide(self, driver: Driver, seen: S, now: float) -> None:
@@ -227,7 +227,7 @@ class Trial(ABC, Generic[S]):
             self.waits.note(self.now, moves)
 
     def commanded(self, dt: float) -> Pair:
-        """What the machine is told in a step [s]: the hand moves, is read, and that arrives."""
+        """Return the machine's command in a step [s], after the hand, its reading and the delay."""
         now, device = self.now, self.device
         device.move(dt)
         if now >= self._next_reading - 0.5 * dt:
@@ -242,7 +242,7 @@ class Trial(ABC, Generic[S]):
 
     @property
     def is_oracle(self) -> bool:
-        """Whether the reference steers, which no delay reaches."""
+        """True if the reference steers, which no delay reaches."""
         return isinstance(self._driver, Oracle)
 
     @property
@@ -253,7 +253,7 @@ class Trial(ABC, Generic[S]):
 
     @property
     def failures(self) -> int:
-        """How often a strategy of a user gave no answer that is one."""
+        """Number of invalid answers of a user's strategy."""
         return self._driver.failures if isinstance(self._driver, Strategy) else 0
 
     def _frames_due(self, now: float) -> None:

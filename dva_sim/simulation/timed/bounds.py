@@ -79,12 +79,12 @@ def _best(shift: Shift, incident: Incident, stations: list[Place]) -> float:
 
 
 def _starts(unit: Unit, stations: list[Place]) -> list[Place]:
-    """Where a unit may wait: guards at stations, too."""
+    """Return where a unit may wait; guards also at stations."""
     return [unit.base, *stations] if unit.kind == "guard" else [unit.base]
 
 
 def share_of_the_way(floor: Floats, reached: Floats, bound: Floats) -> Band:
-    """How far of the way from a floor to a bound some policies get: 0 at the floor, 1 at the bound.
+    """Return how far policies get from a floor to a bound: 0 at the floor, 1 at the bound.
 
     The share is `mean(floor - reached) / mean(floor - bound)` over shifts, each paired with itself.
     Its interval is that of a ratio of means by linearisation; the band holds for all columns at

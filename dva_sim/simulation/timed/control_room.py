@@ -31,7 +31,7 @@ from dva_sim.simulation.timed.travel import Place, Terrain
 
 
 class Team(ShiftWorld, Protocol):
-    """What of a shift is needed to say who is there and what is known of the ground."""
+    """Team of a shift, and what is known of the terrain."""
 
     scenario: TimedScenario
     streams: Streams
@@ -86,7 +86,7 @@ def place_of(terrain: Terrain, where: Point | str, number: int = 1) -> Place:
 
 
 def stations(scenario: TimedScenario, terrain: Terrain) -> dict[str, Place]:
-    """Where guards may wait, by name."""
+    """Return where guards may wait, by name."""
     return {s.name: place_of(terrain, s.at) for s in scenario.dispatch.stations}
 
 

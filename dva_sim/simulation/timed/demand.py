@@ -1,4 +1,4 @@
-"""What happens, when and where: all of it chance of the events, none of who serves them."""
+"""Demand: what happens, when and where, independent of those who respond."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ class EventDraws:
         self._notice = times(streams, f"{base}/notice", notice)
 
     def place(self, index: int) -> Place:
-        """Where event number `index` happens."""
+        """Return where event number `index` happens."""
         zone = -1
         if self._zones:
             zone = self._zones[bisect_right(self._bounds, self._zone[index])]
         return self._terrain.event_place(zone, self._x[index], self._y[index])
 
     def true(self, index: int) -> bool:
-        """Whether there is something at all."""
+        """Return True if the event is real."""
         return self._truth[index] >= self._stream.false_share
 
     def severity(self, index: int) -> float:
@@ -68,7 +68,7 @@ class EventDraws:
         return severity
 
     def repeat_after(self, index: int) -> float | None:
-        """How long after the first report a second source reports it [s]; None: never."""
+        """Return how long after the first report a second source reports it [s]; None: never."""
         repeats = self._stream.repeats
         if repeats is None or self._repeated[index] >= repeats.share:
             return None
@@ -151,7 +151,7 @@ class Demand:
 
     @property
     def exhausted(self) -> bool:
-        """Whether as many events have happened as may."""
+        """True if as many events have happened as may."""
         return self._left <= 0
 
     def share(self) -> list[float]:

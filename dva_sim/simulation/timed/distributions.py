@@ -20,7 +20,7 @@ Shape = Annotated[float, Field(gt=0, le=1e6)]
 
 
 class _Law(Config):
-    """What all laws can do; every draw is in proportion to the law's scale."""
+    """Interface of all laws; every draw scales with the law's scale."""
 
     @property
     @abstractmethod
@@ -39,7 +39,7 @@ class _Law(Config):
 
     @abstractmethod
     def sample(self, rng: np.random.Generator, count: int) -> Floats:
-        """That many draws [s], shape `(count,)`."""
+        """Draw `count` times [s], shape `(count,)`."""
 
 
 class Constant(_Law):
@@ -146,7 +146,7 @@ class Hyperexponential(_OfMean):
 
     @property
     def share(self) -> float:
-        """How often the faster of the two is drawn."""
+        """Probability of the faster of the two."""
         return 0.5 * (1.0 + math.sqrt((self.squared_cv - 1.0) / (self.squared_cv + 1.0)))
 
     @property

@@ -1,4 +1,4 @@
-"""How long a guard is within the danger radius of the event it is sent to.
+"""Exposure: time of a guard within the danger radius of the event it is sent to.
 
 Only that event counts, and the way still to go stands for the distance: the last metres lead
 straight there. On the scene the guard is within the radius until it leaves or the danger is
@@ -40,7 +40,7 @@ def approach(incident: Incident, start: float, left: float, speed: float, until:
 
 
 def on_scene(incident: Incident, start: float, until: float) -> float:
-    """The same at the place itself [s]."""
+    """Return the exposure at the place itself [s]."""
     if not incident.true or until <= start:
         return 0.0
     return max(0.0, min(until, incident.over) - start)

@@ -60,7 +60,7 @@ class Incident:
         return self._hazard.danger_radius(now)
 
     def report(self, finding: str) -> m.EventReport:
-        """What somebody says who was not sent."""
+        """Return the report of somebody who was not sent."""
         return m.EventReport(
             None, self.kind, self.place.position, self.severity, self.confidence, finding
         )

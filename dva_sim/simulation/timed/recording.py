@@ -1,4 +1,4 @@
-"""What is left of a timed run: a row for each event or sums for each batch, and integrals.
+"""Results of a timed run: a row for each event or sums for each batch, and integrals.
 
 The integrals are summed up over time from how many events wait and are served; waits are taken
 from the events' own times. So each checks the other (Little's law).
@@ -108,7 +108,7 @@ class Slices:
 
 
 class Level:
-    """How many there are of something, integrated over the measured time.
+    """Number of something, integrated over the measured time.
 
     Attributes:
         now: How many there are.

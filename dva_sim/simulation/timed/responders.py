@@ -20,7 +20,7 @@ from dva_sim.simulation.timed.travel import Place, Terrain
 
 
 class ShiftWorld(Protocol):
-    """What a unit may ask of the world, and tell it."""
+    """Interface of the world for a unit."""
 
     clock: Clock
     terrain: Terrain
@@ -38,10 +38,10 @@ class ShiftWorld(Protocol):
         """Publish where a unit is."""
 
     def incident_at(self, event: int) -> Incident:
-        """What an event of the DVA really is."""
+        """Return the true incident of an event of the DVA."""
 
     def mobilisation(self, unit: Unit, incident: Incident) -> float:
-        """What it takes this unit this time to get ready [s]."""
+        """Return how long this unit takes this time to get ready [s]."""
 
     def trip(self, unit: Unit, start: Place, goal: Place) -> float:
         """Time to get somewhere [s]; infinite if there is no way."""
@@ -50,10 +50,10 @@ class ShiftWorld(Protocol):
         """From arrival to being sure [s]."""
 
     def act(self, unit: Unit, incident: Incident) -> float:
-        """What it takes to contain it [s]."""
+        """Return how long it takes to contain it [s]."""
 
     def needs_people(self, incident: Incident) -> bool:
-        """Whether a person will be called to contain it."""
+        """Return True if a person will be called to contain it."""
 
     def spent(self, unit: Unit, phase: str, since: float) -> None:
         """A unit has been at something until now."""
@@ -70,7 +70,7 @@ class ShiftWorld(Protocol):
 
 @dataclass(slots=True)
 class Job:
-    """What a unit is at.
+    """Job of a unit.
 
     Attributes:
         order: The DVA's.
@@ -394,7 +394,7 @@ class Unit:
     # --- the small print -------------------------------------------------------------------
 
     def here(self) -> Place:
-        """Where it is now."""
+        """Return its position now."""
         leg = self.leg
         if leg is None:
             return self.place

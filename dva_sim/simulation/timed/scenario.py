@@ -1,4 +1,4 @@
-"""What one run of the timed world consists of; units are in the keys, and names are checked.
+"""Scenario of one timed run; units are in the keys, and names are checked.
 
 Nobody drives and nothing is sent over a network: responders are travel and service times. What
 is asked, decided and answered is the DVA's own core, so that a queue known from the books is a
@@ -163,7 +163,7 @@ class Group(Config):
 
 
 class Operators(Config):
-    """Who drives the robots."""
+    """Drivers of the robots."""
 
     count: Annotated[int, Field(ge=0, le=MOST_UNITS)] = 0
 
@@ -323,7 +323,7 @@ class TimedScenario(Config):
 
     @property
     def way(self) -> Literal["none", "straight", "path"] | Law:
-        """How long it takes to get somewhere."""
+        """Law of travel times."""
         if self.travel is not None:
             return self.travel
         return "path" if self.site else "straight" if self.area else "none"

@@ -275,7 +275,7 @@ def reaching(events: Columns, column: str) -> Incidence:
 
 
 def only(events: Columns, mask: NDArray[np.bool_]) -> Columns:
-    """The same columns of some events."""
+    """Return the columns of some events."""
     return {name: values[mask] for name, values in events.items()}
 
 
@@ -347,7 +347,7 @@ def _bound(events: Columns, follow: float) -> Row:
 
 
 def _team(recording: TimedRecording) -> Row:
-    """How busy everybody was, and how evenly; `load` is that of the busiest kind of people.
+    """Return how busy everybody was, and how evenly; `load` is that of the busiest kind of people.
 
     Robots do not limit a team that has more of them than operators; people do: guards look and
     contain, operators drive.

@@ -237,7 +237,7 @@ class Shift:
         self.mail.carry()
 
     def _report_again(self, incident: Incident) -> None:
-        """Who comes when it is over sees nothing to report."""
+        """Handle a repeated report; if the event is over, there is nothing to report."""
         if incident.event is not None and incident.event.open:
             self._report(incident, "second")
 
@@ -363,11 +363,11 @@ class Shift:
             self.mail.publish(unit.device, body)
 
     def incident_at(self, event: int) -> Incident:
-        """What an event of the DVA really is: the first of what was reported as it."""
+        """Return the true incident of an event: the first one reported as it."""
         return self.events[event][0]
 
     def mobilisation(self, unit: Unit, incident: Incident) -> float:
-        """What it takes this unit this time to get ready [s]."""
+        """Return how long this unit takes this time to get ready [s]."""
         return self._drawn("mobilisation", unit.group.mobilisation, incident, unit.name)
 
     def trip(self, unit: Unit, start: Place, goal: Place) -> float:
@@ -385,7 +385,7 @@ class Shift:
         return self._drawn("look", law, incident)
 
     def act(self, unit: Unit, incident: Incident) -> float:
-        """What it takes to contain it [s]: luck of the event, whoever does it."""
+        """Return how long it takes to contain it [s]; random by event, whoever does it."""
         law = self.scenario.demand[incident.stream].act or unit.group.act
         return self._drawn("act", law, incident)
 
@@ -400,7 +400,7 @@ class Shift:
         return draws[incident.index]
 
     def needs_people(self, incident: Incident) -> bool:
-        """Whether a person will be called to contain it."""
+        """Return True if a person will be called to contain it."""
         return self.scenario.dispatch.containment and incident.true and self._is_open(incident)
 
     def _is_open(self, incident: Incident) -> bool:
@@ -434,7 +434,7 @@ class Shift:
 
 
 def in_order(incident: Incident) -> bool:
-    """Whether the times of an incident's event follow each other (S7)."""
+    """Return True if the times of an incident's event are in order (S7)."""
     event = incident.event
     assert event is not None
     last = event.times["detected"] if incident.shared else incident.occurred

@@ -28,7 +28,7 @@ from dva_sim.worlds.site import DEFAULT_FRAME, FOOTPRINT, Site, load_site
 
 
 class Occurrence(Protocol):
-    """What happens somewhere, as far as ways to it are its own: the event of a stream."""
+    """Something that happens at a place, as far as paths to it are its own."""
 
     stream: int
     index: int
@@ -63,7 +63,7 @@ class Place:
 
 
 class Terrain:
-    """Where place does not matter: everything is here.
+    """Terrain without distances: everything is in one place.
 
     Attributes:
         zones: Names of the zones.
@@ -112,11 +112,11 @@ class Terrain:
         return known
 
     def event_place(self, zone: int, u: float, v: float) -> Place:
-        """Where an event happens: by two shares of luck, at a position that is its alone."""
+        """Return the place of an event by two uniform random numbers, at a position of its own."""
         return self.apart(self._middle(zone))
 
     def apart(self, place: Place) -> Place:
-        """The same place under a position of its own."""
+        """Return the place under a position of its own."""
         self._numbered = self._numbered % NUMBERED + 1
         at = place.position
         position = m.Position(at.latitude + self._apart * self._numbered, at.longitude)
@@ -141,7 +141,7 @@ class Terrain:
         return self._middle(0)
 
     def default_base(self, kind: str) -> str | None:
-        """Where responders of a kind wait if nobody says where."""
+        """Return where responders of a kind wait by default."""
         return None
 
     def spots(self, zone: int) -> list[Place]:
@@ -149,7 +149,7 @@ class Terrain:
         return [self.centre(zone)]
 
     def origin(self) -> Place:
-        """Where responders wait by default."""
+        """Return where responders wait by default."""
         return self._middle(0)
 
     def _between(self, a: Place, b: Place, share: float) -> Place:
@@ -174,7 +174,7 @@ class Terrain:
         return 0.0
 
     def along(self, a: Place, b: Place, gone: float) -> Place:
-        """Where somebody is who has gone so far [m] from `a` to `b`."""
+        """Return the place after so much of the path [m] from `a` to `b`."""
         return b
 
 
@@ -306,7 +306,7 @@ def _ways_of(site: Site) -> _Ways:
 
 @lru_cache(maxsize=8)
 def _spots_of(site: Site, count: int) -> tuple[tuple[Point, ...], ...]:
-    """The same places in every run: they belong to the site."""
+    """Return the same places in every run: they belong to the site."""
     luck = Streams(0)
     return tuple(
         tuple(site.sample_free(rng, CLEARANCE, room.name) for _ in range(count))

@@ -30,7 +30,7 @@ from dva_sim.simulation.transports.session_measures import Row, contest_row, flo
 
 
 class DriveConfig(Config):
-    """What is driven over the link.
+    """Vehicle that is driven over the link.
 
     Attributes:
         task: A way.
@@ -112,7 +112,7 @@ DRIVEN = (*names_of(DRIVEN_COLUMNS), "plugin_failures")
 
 
 class SessionRecording(NamedTuple):
-    """What is left of a run.
+    """Results of a run.
 
     Attributes:
         scenario: As it was run.
@@ -151,7 +151,7 @@ def rehearse(scenario: TransportScenario) -> None:
 
 
 def recording_of(scenario: TransportScenario, contest: Contest) -> RecordedDelays:
-    """What the session did to commands and pictures while it was measured."""
+    """Return the delays of commands and pictures while the session was measured."""
     return RecordedDelays(
         _stream(contest, contest.commands, scenario.commands.rate_hz),
         _stream(contest, contest.pictures, scenario.pictures.rate_hz),

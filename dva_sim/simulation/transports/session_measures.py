@@ -1,4 +1,4 @@
-"""What is measured of a session on a congested link: what each column means, and how it is found.
+"""Measures of a session on a congested link: meaning of each column, and its computation.
 
 **Delivered** is a message all of which has arrived before the run was over, some time after the
 last message that counts.
@@ -128,7 +128,7 @@ def flow_rows(contest: Contest) -> list[Row]:
 
 # --- messages ----------------------------------------------------------------------------
 def applied(arrived: Floats) -> NDArray[np.bool_]:
-    """Which messages, in the order of making, arrived before all newer ones, shape `(n,)`."""
+    """Return which messages, in order of making, arrived before all newer ones, shape `(n,)`."""
     newer = np.minimum.accumulate(arrived[::-1])[::-1]
     first_newer = np.append(newer[1:], math.inf)
     return np.isfinite(arrived) & (arrived <= first_newer)
@@ -181,7 +181,7 @@ def mean(values: Sequence[float] | NDArray[Any]) -> float:
 
 
 def _counted(contest: Contest, fates: Fates) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """When they were made, when they arrived, and which are counted; shape `(n,)` each."""
+    """Return when messages were made and arrived, and which are counted; shape `(n,)` each."""
     made, arrived = np.array(fates.made), np.array(fates.arrived)
     return made, arrived, (made >= contest.since) & (made < contest.until)
 
