@@ -1,4 +1,4 @@
-"""What every agent has: an identity, a way to talk, and a place in the timeline."""
+"""Base of every agent: an identity, messaging, and lines in the timeline."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ Handler = Callable[[m.Message], m.Reply]
 
 
 def urgent(message: m.Message) -> bool:
-    """Whether a message overtakes everything else."""
+    """Return True if a message overtakes everything else."""
     return isinstance(message.body, m.Emergency)
 
 
@@ -237,7 +237,7 @@ class AgentDevice:
         requester.request(encode(message), answered, failed)
 
     def _requester(self, peer: str, urgent: bool) -> Requester:
-        """What asks a peer, over a connection of its own for what is urgent."""
+        """Return the requester for a peer, with a connection of its own for urgent messages."""
         key = peer, urgent
         if key not in self._requesters:
             self._requesters[key] = Requester(
@@ -450,7 +450,7 @@ class AgentDevice:
 
     @property
     def round_trips(self) -> list[float]:
-        """How long the last requests to each peer took [s], on the acknowledged channel."""
+        """Durations of the last requests to each peer [s], on the acknowledged channel."""
         return [
             trip
             for asker in self._requesters.values()

@@ -87,7 +87,7 @@ class WaitingHabits(Sparse):
 
 
 class CorrectingHabits(Sparse):
-    """How a person corrects the course of a vehicle.
+    """Habits in correcting the course of a vehicle.
 
     Attributes:
         evidence_rad: Sum of the error of the turn rate over time at which a correction begins.
@@ -107,7 +107,7 @@ class CorrectingHabits(Sparse):
 
 
 class AimingHabits(Sparse):
-    """How a person makes aimed movements; some of these are fitted, see the validation.
+    """Habits in making aimed movements; some are fitted, see the validation.
 
     Attributes:
         shortest_s: Duration of the shortest movement.
@@ -213,7 +213,7 @@ class CloseQuarterHabits(Sparse):
 
 
 class StuckHabits(Sparse):
-    """When a person takes its robot to be stuck, and what it does then.
+    """Habits with a robot that seems stuck.
 
     Attributes:
         still: Speed [m/s] and turn rate [rad/s] below which a robot stands.
@@ -391,7 +391,7 @@ class WalkingHabits(Sparse):
 
 
 class LeavingHabits(Sparse):
-    """When a person takes the air for too much, and how it gets out.
+    """Habits in leaving bad air.
 
     Attributes:
         untenable_c: Air temperature in which nobody stays.

@@ -1,4 +1,4 @@
-"""What an operator is shown of the world: observations, frames, and how far one sees in smoke.
+"""Operators' view of the world: observations, frames, and visibility in smoke.
 
 A robot's camera makes them (`robot.field_of_view`), operators see nothing else.
 
@@ -128,7 +128,7 @@ def _hazard(kind: object, *numbers: float) -> SeenHazard:
 
 
 class Cameras(NamedTuple):
-    """Where the pictures of robots are to be had, and where an operator's screen looks for them.
+    """Sources of robots' pictures, and the addresses where an operator's screen finds them.
 
     Attributes:
         url: Of a robot's camera, by its label and address.

@@ -39,7 +39,7 @@ class Trait(Config):
 
 
 class Population(Config):
-    """Where persons are drawn from.
+    """Population from which persons are drawn.
 
     Attributes:
         perceptual_delay_s: From a picture on the screen to a decision.
@@ -132,7 +132,7 @@ class Population(Config):
         return {name: value for name, value in self if isinstance(value, Trait)}
 
     def with_medians(self, medians: Mapping[str, float]) -> Population:
-        """The same population around other medians; see `with_medians`."""
+        """Return the population with other medians; see `with_medians`."""
         return with_medians(self, medians, "operator")
 
 
@@ -140,7 +140,7 @@ P = TypeVar("P", bound=Config)
 
 
 def with_medians(profile: P, medians: Mapping[str, float], whose: str) -> P:
-    """The same profile around other medians; the spreads between persons stay.
+    """Return the profile with other medians; the spreads between persons stay.
 
     Args:
         profile: Whose fields are traits, or numbers that all persons share.

@@ -30,7 +30,7 @@ BENT = 1.5  # design: way along a route to what one moves straight; around a rig
 
 
 def wrap(angle: float) -> float:
-    """The same angle in (-pi, pi] [rad]."""
+    """Wrap an angle to (-pi, pi] [rad]."""
     return math.remainder(angle, 2.0 * math.pi)
 
 
@@ -65,7 +65,7 @@ def _leg(ax: float, ay: float, bx: float, by: float) -> _Leg:
 
 @dataclass(slots=True)
 class _Place:
-    """Where on a route somebody is.
+    """Position on a route.
 
     Attributes:
         leg: On which piece.
@@ -181,7 +181,7 @@ class Route:
         self.points, self.length = points, self._line.at[-1]
 
     def twin(self) -> Route:
-        """The same route for somebody else: what both look for at one place is found once."""
+        """Return the route for another follower; look-ups of both are shared."""
         twin = copy(self)
         twin.points = self.points.copy()
         return twin
@@ -193,7 +193,7 @@ class Route:
         return at[-1] - at[self._place.leg]
 
     def ahead(self, x: float, y: float, heading: float, look_ahead: float) -> Ahead:
-        """What to aim at from a pose; never steps back along the route.
+        """Return the point to aim at from a pose; it never goes back along the route.
 
         Args:
             x: Position [m].
@@ -234,7 +234,7 @@ class Route:
 
 
 class View(NamedTuple):
-    """What a driver knows of the robot that it drives.
+    """State of the robot, as its driver knows it.
 
     Attributes:
         now: The driver's own clock [s].
@@ -251,7 +251,7 @@ make_view = maker(View)
 
 
 class Intent(NamedTuple):
-    """What a driver wants the robot to do now: speed [m/s], turn rate [rad/s]."""
+    """Wanted motion of the robot: speed [m/s], turn rate [rad/s]."""
 
     speed: float
     turn_rate: float
@@ -262,7 +262,7 @@ make_intent = maker(Intent)
 
 @dataclass(frozen=True)
 class Reach:
-    """What the robot, or the cursor, can do.
+    """Limits of the robot, or of the cursor.
 
     Attributes:
         speed: At most [m/s].
@@ -314,7 +314,7 @@ class PurePursuit:
         self._turning = False
 
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
-        """What to ask a robot for, to follow a route.
+        """Return the command for a robot that follows a route.
 
         Args:
             route: The way to go.

@@ -113,7 +113,7 @@ class ControlRoomAgent:
                 self.on_record(said)
 
     def _note(self, status: m.EventStatus) -> None:
-        """How an event stands; answers may overtake what was published."""
+        """Note the state of an event; replies may overtake publications."""
         number, known = status.event_id, self.events.get(status.event_id)
         if known is not None and (status.age, status.decisions) < (known.age, known.decisions):
             return
@@ -138,7 +138,7 @@ class ControlRoomAgent:
             self.on_dispatch(self.dispatch)
 
     def _on_request(self, message: m.Message) -> m.Reply:
-        """What the DVA says to a holder of robots: nothing that it has not asked for."""
+        """Answer a request of the DVA to a holder of robots: it has asked for nothing."""
         body, answer = message.body, m.Reply(message.message_id, m.OK, "")
         if message.source != self.device.dva:
             text = "only the DVA says such things"

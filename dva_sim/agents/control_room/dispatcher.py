@@ -23,7 +23,7 @@ MOST_TRIES = 3  # design: of one decision, when others decide meanwhile
 
 @dataclass
 class Turned:
-    """What has been done about an event.
+    """Actions taken on an event.
 
     Attributes:
         acknowledged: Whether it has been acknowledged, by whomever.
@@ -142,7 +142,7 @@ class ScriptedDispatcher:
         self._done()
 
     def _wish(self, status: m.EventStatus, proposal: m.Proposal) -> m.Body | None:
-        """What it wants done; None: what the policy has done, or nothing that can be."""
+        """Return what it wants done; None if the policy has done it, or nothing can be done."""
         number, seen, task = status.event_id, status.decisions, proposal.task
         rule = self._rule(status, proposal)
         if rule is None:

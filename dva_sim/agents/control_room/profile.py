@@ -1,4 +1,4 @@
-"""How a scripted dispatcher works: how long it takes, and when it knows better."""
+"""Profile of a scripted dispatcher: its reaction times, and when it overrules the policy."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class Overrule(Config):
-    """When a person decides otherwise than the policy; what is left out may be anything.
+    """Condition under which a person overrules the policy; omitted keys match anything.
 
     Attributes:
         kind: Of the event.

@@ -1,4 +1,4 @@
-"""Which screen an operator looks at, and where it sits: who it is, and what is at hand.
+"""Attention of an operator: the screen it looks at, and its equipment.
 
 A person looks at one screen at a time, and takes a moment to find its way into another. A robot
 that is where it was sent waits for a judgement: who has waited longest is served first, until
@@ -59,7 +59,7 @@ def next_screen(
     seen: Sequence[float],
     glance: float,
 ) -> int:
-    """Which screen to look at.
+    """Choose the screen to look at.
 
     Args:
         now: [s]
@@ -123,7 +123,7 @@ class Attention:
             self._turn_to(self._best())
 
     def looks_at(self, screen: Screen) -> bool:
-        """Whether the person sees what is on a screen now."""
+        """Return True if the person sees what is on a screen now."""
         return screen is self._current and self._clock.now >= self._since
 
     def _reconsider(self) -> bool:
@@ -163,7 +163,7 @@ class Attention:
 
 @dataclass(frozen=True, kw_only=True)
 class OperatorSetup:
-    """How an operator works, beside who it is.
+    """Equipment of an operator, apart from the person.
 
     Attributes:
         pattern: Makes what carries the commands of a drive of a robot, by its id.

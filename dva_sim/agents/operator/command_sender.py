@@ -135,7 +135,7 @@ class CommandSender:
             self._look()
 
     def _make(self) -> Made | None:
-        """What the phone says now, if it is worth a message.
+        """Return the phone's present command, if it is worth a message.
 
         Nobody drives before the first picture: without its tick the robot could not bound
         the age of a command that waits for a connection to open.

@@ -1,4 +1,4 @@
-"""How a person comes to know the delay: by matching what it sees to what it did."""
+"""Estimation of the delay by a person: matching what it sees to what it did."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class DelayEstimate:
         self._last = None
 
     def _past(self, steps: int) -> Floats:
-        """What was asked for, `(2, lags)`, the mean over some steps up to each; oldest first."""
+        """Return past requests, `(2, lags)`, averaged over some steps up to each; oldest first."""
         past = self._asked[:, self._filled - len(self._lags) - steps + 1 : self._filled]
         if steps == 1:
             return past
@@ -136,7 +136,7 @@ class DelayEstimate:
 
 
 class PeriodEstimate:
-    """How often commands get through, as a person sees it: by when what it asks for takes effect.
+    """Estimate of the period at which commands get through, from when requests take effect.
 
     A change that is asked for takes effect after the delay and the time until the next command
     gets through. So times to effects differ by up to the period, a move lasts by up to a period
@@ -195,7 +195,7 @@ class PeriodEstimate:
         return self.value
 
     def _learn(self, move: _Move, now: float, delay: float, *, moves: bool) -> _Move | None:
-        """What a picture says of a move: the move, as long as more of it is to be seen."""
+        """Learn from a picture of a move; the move, as long as more of it will be seen."""
         if move.seen is None and moves:
             lag = now - move.begun
             if lag < self.EARLY * delay:
@@ -279,7 +279,7 @@ class _Channel:
 
 
 class Timing:
-    """How a person misjudges a time: by a share of it that changes from moment to moment.
+    """Misjudgement of a time by a person: a share of it that changes from moment to moment.
 
     Args:
         habits: How much, and how fast that changes.
@@ -295,7 +295,7 @@ class Timing:
         self._last, self._state = 0.0, float(rng.normal())
 
     def at(self, now: float) -> float:
-        """What a time is taken to be at `now` [s], as a multiple of it."""
+        """Return the perceived length of a time at `now` [s], as a multiple of it."""
         keep = math.exp(-max(now - self._last, 0.0) / self._habits.recalls_s)
         fresh = math.sqrt(1.0 - keep * keep)
         self._state = keep * self._state + fresh * float(self._rng.normal())
@@ -303,7 +303,7 @@ class Timing:
         return math.exp(self._habits.misjudges * self._state)
 
     def judged(self, delay: float, usual: float, now: float) -> float:
-        """What a delay is taken to be at a moment [s]: only what is new of it is misjudged.
+        """Return the perceived delay at a moment [s]: only its new part is misjudged.
 
         Args:
             delay: As it was learnt [s].

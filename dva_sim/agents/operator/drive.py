@@ -67,7 +67,7 @@ class CloseQuarters:
 
     @property
     def on(self) -> bool:
-        """Whether the person drives carefully now."""
+        """True if the person drives carefully now."""
         return self._from is not None
 
     def notice(self, now: float, seen: Observation, asked: float, delay: float) -> bool:
@@ -178,11 +178,11 @@ class Teleoperation(Work):
             self._let_go_until = now + seat.person.reaction
 
     def beginning(self) -> m.Body:
-        """What to ask the robot for."""
+        """Return the request that begins the drive."""
         return m.StartTeleOp()
 
     def ending(self) -> m.Body:
-        """What to tell the robot when it is over."""
+        """Return the request that ends it."""
         return m.StopTeleOp()
 
     def _see(self, observation: Observation) -> None:
@@ -253,7 +253,7 @@ class Teleoperation(Work):
                 self._device.tell(f"{what}: {plugged_in.first_failure}", "drive")
 
     def _steer(self, seen: Observation, delay: float, usual: Callable[[float], Intent]) -> Intent:
-        """What to ask for; close quarters are for who knows that a guard holds the robot back.
+        """Return the command to give; the guard's narrow mode is for those who know it holds them.
 
         Args:
             seen: What is seen now.
@@ -295,7 +295,7 @@ class Teleoperation(Work):
         return None if self.over else self._way(seen)
 
     def _keep_off(self, seen: Observation) -> float:
-        """How far before the event to stop [m]; no wall may stand between."""
+        """Return how far before the event to stop [m]; no wall may stand between."""
         keeps_off = self._seat.person.habits.looking.keeps_off_m
         if not self._looking.has_place_before_it(seen, 2 * keeps_off):
             return 0.0
@@ -334,7 +334,7 @@ class Teleoperation(Work):
         return route
 
     def _gets_nowhere(self, left: float) -> bool:
-        """Whether the way left [m] has not become less for a long time, whatever was tried."""
+        """Return True if the remaining path [m] has long not become shorter, despite all attempts."""
         now = self._clock.now
         if self._looking.at_place:
             return False
@@ -344,7 +344,7 @@ class Teleoperation(Work):
         return left > nearer and now - self._nearer_at > self._seat.person.patience
 
     def _is_stuck(self, seen: Observation) -> bool:
-        """Whether the robot has stood for too long although it was asked to move.
+        """Return True if the robot has stood for too long although it was asked to move.
 
         Who moves and waits asks for a while only: the time counts from the first asking, waits
         included. How long is too long is of the delay when motion was last seen, since a guess

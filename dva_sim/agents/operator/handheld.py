@@ -1,4 +1,4 @@
-"""What persons at a console hold in their hands, and what they want with it."""
+"""Devices in the hands of persons at a console, and their input."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Said = Callable[[bool, str], object]
 
 
 class Input(NamedTuple):
-    """What a person wants: its number, when it came [s], and shares of the robot's limits."""
+    """Input of a person: its number, when it came [s], and shares of the robot's limits."""
 
     number: int
     time: float
@@ -25,7 +25,7 @@ class Input(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Console:
-    """What persons at a console work with.
+    """Equipment of persons at a console.
 
     Attributes:
         setup: Pattern, rate, time-outs, as of simulated operators.

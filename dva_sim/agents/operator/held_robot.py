@@ -99,7 +99,7 @@ class HeldRobot:
 
     @property
     def is_driven(self) -> bool:
-        """Whether the robot has been asked to be driven, and not to stop."""
+        """True if the robot has been asked to be driven, and not to stop."""
         return self.phase in ("starting", "driving")
 
     # --- permission ----------------------------------------------------------------------
@@ -238,7 +238,7 @@ class HeldRobot:
             self._alert(f"{self.label}: {self._silence()} after {self.device.attempts} attempts")
 
     def _silence(self) -> str:
-        """That nothing was answered, in words, with the address that was tried."""
+        """Format the message that an address did not answer."""
         where = f" at {self._address}" if self._address else ""
         return f"link lost: no answer{where}"
 
@@ -337,7 +337,7 @@ class HeldRobot:
         device.clock.every(1.0, lambda: self._listen(log), start=device.clock.now + 1.0)
 
     def want(self, number: int, speed: float, turn: float) -> None:
-        """What the person wants from now on, as shares of what the robot can do."""
+        """Set what the person wants from now on, as shares of what the robot can do."""
         now, reach = self.device.clock.now, self._console().reach(self.robot)
         self._wished = Input(number, now, speed, turn)
         self.steered(self._wished)

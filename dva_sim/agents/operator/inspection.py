@@ -1,4 +1,4 @@
-"""How an operator becomes sure that an event is there, or not, from the pictures of its place.
+"""Inspection of an event: how pictures convince an operator that it is there, or not.
 
 Each look at a picture says a little for or against, with noise. What speaks for it adds up; what
 speaks against it takes that away again, but not below nothing: who has long seen nothing is not
@@ -39,7 +39,7 @@ def clearness(angle: float, half_seen: float) -> float:
 
 
 def worth(gap: float) -> float:
-    """What the pictures of the last `gap` [s] are worth, in time looked at a moving one [s].
+    """Return the weight of the pictures of the last `gap` [s], as time of a moving picture [s].
 
     So evidence comes as fast as fresh pictures do, up to three a second.
     """
@@ -47,7 +47,7 @@ def worth(gap: float) -> float:
 
 
 class Evidence:
-    """What speaks for an event, as one person weighs it.
+    """Evidence for an event, as one person weighs it.
 
     In a clear picture the level drifts by `sensitivity / 2` a second towards the criterion if the
     event fills the picture, and away from it if it is not there; the noise has a variance of 1 a
@@ -77,12 +77,12 @@ class Evidence:
 
     @property
     def sure(self) -> bool:
-        """Whether the person says that it is there."""
+        """True if the person says that it is there."""
         return self.level >= self.criterion
 
     @property
     def leans(self) -> bool:
-        """Whether the person is more than half convinced."""
+        """True if the person is more than half convinced."""
         return self.level >= self._habits.leans_from * self.criterion
 
     def weigh(self, duration: float, clear: float, contrast: float) -> None:
@@ -138,7 +138,7 @@ class Looking:
 
     @property
     def wants_nearer(self) -> bool:
-        """Whether the place could not be seen for some time."""
+        """True if the place could not be seen for some time."""
         return self._blind > self._habits.nearer_after_s
 
     def look(self, now: float, seen: Observation) -> Conclusion | None:
@@ -160,7 +160,7 @@ class Looking:
         self._last, self.at_place = None, False
 
     def has_place_before_it(self, seen: Observation, within: float) -> bool:
-        """Whether the place is near [m], and by the map no wall stands between."""
+        """Return True if the place is near [m], and no wall of the map stands between."""
         here = seen.x, seen.y
         near = math.dist(here, self._place) < within
         return near and self._planner.line_of_sight(here, self._place)

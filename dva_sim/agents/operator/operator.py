@@ -50,7 +50,7 @@ class OperatorAgent:
 
     @property
     def activity(self) -> str:
-        """What the person is doing, in words."""
+        """Activity of the person, in words."""
         return ", ".join(map(self._doing, self.works.values())) or "waiting"
 
     def _doing(self, work: Work) -> str:
@@ -95,7 +95,7 @@ class OperatorAgent:
             work.end("gave up", "the permission was revoked")
 
     def _may_ask_again(self, work: Work) -> bool:
-        """Whether an order that a robot refuses is tried once more: the DVA is asked first."""
+        """Return True if a refused order is tried once more, after asking the DVA."""
         times = 1 + self._asked_again(work)
         self._again = work.order, times
         return times <= (ASK_BEFORE if work.log.started is None else ASK_AFTER)
@@ -105,7 +105,7 @@ class OperatorAgent:
         return times if order is work.order else 0
 
     def _gives_up(self, robot: str, asker: str) -> bool:
-        """Whether somebody may have a robot: not while it is driven, or watched, to an event."""
+        """Return True if somebody may have a robot: not while it goes, or watches, at an event."""
         work = self.works.get(robot)
         keeps = work is not None and not work.over and work.log.started is not None
         label = self.device.label_of(robot)

@@ -59,7 +59,7 @@ class PersonAgent:
 
     @property
     def activity(self) -> str:
-        """What the person is doing, in words."""
+        """Activity of the person, in words."""
         driven = [held.label for held in self.robots.values() if held.is_driven]
         if driven:
             return f"drives {' and '.join(driven)}"
@@ -68,7 +68,7 @@ class PersonAgent:
         return "waiting" if self.attended else "nobody there"
 
     def steer_by(self, tilt: Callable[[], GivenTilt | TiltSources] | None) -> None:
-        """What makes the commands of the next drives; None: what is wanted enters as tilt."""
+        """Set what makes the commands of the next drives; None: input is entered as tilt."""
         self._tilt = tilt or (lambda: GivenTilt(self.console.phone))
 
     # --- what the person does ------------------------------------------------------------
@@ -150,7 +150,7 @@ class PersonAgent:
                 self._alert(f"{held.label}: somebody has pressed the emergency stop")
 
     def want(self, number: int, speed: float, turn: float) -> None:
-        """What the person wants of all robots alike: shares of their limits, turns to the left."""
+        """Set what the person wants of all robots: shares of their limits, positive to the left."""
         for held in self.robots.values():
             held.want(number, speed, turn)
 

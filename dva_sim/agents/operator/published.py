@@ -1,4 +1,4 @@
-"""What operators are compared with, and which of it may be fitted to: two files, read together.
+"""Published data that operators are compared with, and the split into fitted and held out.
 
 Which delays these data cover is said here as well: beyond them, what simulated operators do is
 an extrapolation.
@@ -79,7 +79,7 @@ class CheckConfig(Config):
 
 
 class SupportConfig(Config):
-    """Which delays published data cover.
+    """Range of delays that published data cover.
 
     Attributes:
         strategies: Whom they speak of.
@@ -152,14 +152,14 @@ class TargetFile(Config):
 
 
 class RuleConfig(Config):
-    """When a validation passes: shares of the lines that must pass."""
+    """Conditions for passing a validation: shares of the lines that must pass."""
 
     exact: Share
     held_out: Share
 
 
 class SplitFile(Config):
-    """Which checks may be fitted to: lists of checks by publication.
+    """Split of the checks: lists of checks by publication.
 
     Attributes:
         description: What it is.
@@ -253,16 +253,16 @@ class TargetLine:
 
     @property
     def has_band(self) -> bool:
-        """Whether there is anything to judge it by."""
+        """True if there is a band to judge it by."""
         return self.low is not None or self.high is not None
 
     def holds(self, value: float) -> bool:
-        """Whether a value lies in the band; nan never does."""
+        """Return True if a value lies in the band; nan never does."""
         above = self.low is None or value >= self.low
         return self.has_band and above and (self.high is None or value <= self.high)
 
     def is_sure(self, low: float, high: float) -> bool:
-        """Whether an interval lies on the side that is asked for, if one is."""
+        """Return True if an interval lies on the required side, if one is required."""
         above = self.above is None or low > self.above
         return above and (self.below is None or high < self.below)
 
@@ -334,7 +334,7 @@ def _complete(checks: Mapping[str, CheckConfig], kinds: Mapping[str, LineKind]) 
 
 @cache
 def supports_of(strategy: str) -> tuple[SupportConfig, ...]:
-    """What is known of a strategy, from short delays on; nothing if no published data speak of it.
+    """Return the ranges known for a strategy, from short delays on; empty without data.
 
     The delay is that of everything but the person: filter, sampling, link, computers, frames.
     Pointing was watched at lags of up to 0.225 s (MacKenzie & Ware 1993), an excavator at 1.5 s;

@@ -1,4 +1,4 @@
-"""What an app makes of being told no: pure, the same for every pattern and whoever drives.
+"""Refusals, as an app handles them: pure, and the same for every pattern and driver.
 
 A command that was requested is answered. Of one that was published nothing comes back, but the
 robot says on its topic who holds it, and how the newest command of that device fared.

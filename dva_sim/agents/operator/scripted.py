@@ -56,7 +56,7 @@ class ScriptedOperator:
 
     @property
     def activity(self) -> str:
-        """What it does, in words."""
+        """Activity, in words."""
         return "done" if self.done else "follows a script"
 
     def start(self) -> None:
@@ -168,7 +168,7 @@ def _drive(
 
 
 def _answer(reply: m.Reply | None) -> str:
-    """What a robot made of a request, in words."""
+    """Describe a robot's answer to a request."""
     if reply is None:
         return "no answer"
     return "obeyed" if reply.code == m.OK else f"refused ({m.CODE_NAMES[reply.code]})"

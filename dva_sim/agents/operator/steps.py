@@ -1,4 +1,4 @@
-"""What whoever drives a robot has to go through, person or simulated: picture, start, giving back.
+"""Steps of driving a robot, for persons and simulated operators: picture, start, release.
 
 Pure of any judgement: each step says how it went, and whoever takes it decides what follows.
 """

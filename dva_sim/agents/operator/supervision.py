@@ -1,4 +1,4 @@
-"""What an operator does about one order with one robot, from the permission to the outcome.
+"""Supervision of one order with one robot, from the permission to the outcome.
 
 Supervisory control: the operator gives the goal, the robot acts, the operator judges.
 
@@ -73,11 +73,11 @@ class Work:
         )
 
     def beginning(self) -> m.Body:
-        """What to ask the robot for."""
+        """Return the request that begins it."""
         raise NotImplementedError
 
     def ending(self) -> m.Body:
-        """What to tell the robot when it is over."""
+        """Return the request that ends it."""
         raise NotImplementedError
 
     def begin(self) -> None:
@@ -146,11 +146,11 @@ class Supervision(Work):
     level, verb, wish = "missions", "watches", "send"
 
     def beginning(self) -> m.Body:
-        """What to ask the robot for."""
+        """Return the request that begins it."""
         return m.Inspect(self.order.event_id, self.order.kind, self.order.position)
 
     def ending(self) -> m.Body:
-        """What to tell the robot when it is over."""
+        """Return the request that ends it."""
         return m.CancelMission()
 
     def begin(self) -> None:
@@ -174,7 +174,7 @@ class Supervision(Work):
             self.end(*found)
 
     def _ask(self) -> None:
-        """How does the mission stand? The next time is when this was answered."""
+        """Ask how the mission stands; again when this was answered."""
         if self.over:
             return
 

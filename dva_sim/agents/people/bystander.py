@@ -165,7 +165,7 @@ class BystanderAgent(OnFoot):
             self._leave_at(now + self._occupant.premovement)
 
     def _feels_fire(self) -> bool:
-        """Whether it feels a fire so near that it waits for nothing."""
+        """Return True if it feels a fire so near that it leaves at once."""
         return self.exposure.conditions.heat_flux >= self._habits.too_near_kw_m2
 
     def _notices(self, now: float) -> bool:

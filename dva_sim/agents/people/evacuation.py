@@ -1,4 +1,4 @@
-"""What guards and bystanders go through in bad air, and how they get out of it.
+"""Guards and bystanders in bad air, and how they get out of it.
 
 A person looks at the air around it twice a second: that adds to its dose, and sets its pace. Who
 has to leave goes to the nearest safe place, not through what nobody endures; it looks along its
@@ -72,22 +72,22 @@ class Escape(NamedTuple):
 
 
 def strain(conditions: Conditions, most: Conditions) -> float:
-    """How much of a limit it is: 1 where the first of the conditions reaches it."""
+    """Return the conditions as a share of a limit: 1 where the first of them reaches it."""
     return max(is_ / limit for is_, limit in zip(conditions, most, strict=True))
 
 
 def is_untenable(conditions: Conditions) -> bool:
-    """Whether nobody goes there, or stays."""
+    """Return True if nobody goes there, or stays."""
     return strain(conditions, UNTENABLE) >= 1.0
 
 
 def is_deadly(conditions: Conditions) -> bool:
-    """Whether not even who is in smoke already goes there."""
+    """Return True if not even people who are in smoke already go there."""
     return strain(conditions, DEADLY) >= 1.0
 
 
 def refuges_of(site: Site) -> list[Point]:
-    """Where people of a site are safe [m]: its exits; else the guard posts; else robot bases.
+    """Return safe places of a site [m]: its exits; else the guard posts; else robot bases.
 
     An exit lies in the line of the outer wall: the place is just within.
     """
@@ -167,7 +167,7 @@ def _nearest_first(
 
 
 def _judge(way: Floats, limit: StrainLimit, close: float) -> tuple[bool, list[Point]]:
-    """Whether a way keeps a limit, and the bad places to go around.
+    """Return whether a path keeps a limit, and the bad places to avoid.
 
     No way keeps it that is bad from begin to end, and longer than `close` [m]: only who stands
     in what is deadly runs however far, if it gets no worse.
@@ -183,7 +183,7 @@ def _judge(way: Floats, limit: StrainLimit, close: float) -> tuple[bool, list[Po
 
 
 def _length(way: Floats) -> float:
-    """Of a way [m]."""
+    """Return the length of a path [m]."""
     return float(np.hypot(*np.diff(way, axis=0).T).sum())
 
 
@@ -250,29 +250,29 @@ class Exposure:
 
     @property
     def is_too_much(self) -> bool:
-        """Whether the person has to leave: the air is untenable, or its dose is."""
+        """True if the person has to leave: the air is untenable, or the dose too high."""
         return self.is_hurt or strain(self.conditions, self._untenable) >= 1.0
 
     @property
     def is_hurt(self) -> bool:
-        """Whether the dose is more than somebody goes on working with."""
+        """True if the dose is more than a person goes on working with."""
         return max(self.dose.heat, self.dose.toxic) >= HURT
 
     def is_bad(self, place: tuple[float, float]) -> bool:
-        """Whether it is untenable at a place [m] now."""
+        """Return True if a place [m] is untenable now."""
         return strain(self._air(*place, self._clock.now), self._untenable) >= 1.0
 
     def is_deadly(self, place: tuple[float, float]) -> bool:
-        """Whether nobody would go through a place [m] now."""
+        """Return True if nobody would pass a place [m] now."""
         return strain(self._air(*place, self._clock.now), self._deadly) >= 1.0
 
     @property
     def limits(self) -> tuple[StrainLimit, StrainLimit]:
-        """What to keep off: what is untenable, or where that cannot be, what is deadly."""
+        """Limits to keep: what is untenable, or where that is impossible, what is deadly."""
         return self._strain(self._untenable), self._strain(self._deadly)
 
     def _strain(self, most: Conditions) -> StrainLimit:
-        """How much of some limit it is at a place now."""
+        """Return the limit as a measure of strain at a place now."""
         return lambda place: strain(self._air(*place, self._clock.now), most)
 
 
@@ -362,20 +362,20 @@ class OnFoot:
 
     @property
     def x(self) -> float:
-        """Where the person is, or was last [m]."""
+        """Present or last position of the person [m]."""
         return self.walking.place[0]
 
     @property
     def y(self) -> float:
-        """Where the person is, or was last [m]."""
+        """Present or last position of the person [m]."""
         return self.walking.place[1]
 
     @property
     def heading(self) -> float:
-        """Where it looks [rad]."""
+        """Direction in which it looks [rad]."""
         return self.walking.heading
 
     @property
     def dose(self) -> Dose:
-        """Of heat and poison, so far."""
+        """Dose of heat and poison so far."""
         return self.exposure.dose

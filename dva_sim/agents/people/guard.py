@@ -138,7 +138,7 @@ class GuardAgent(OnFoot):
         self._finish("failed")
 
     def _goal(self, errand: Errand) -> tuple[Point, Callable[[Point], bool]]:
-        """Where the way leads to, and from where on it need not be gone to its end."""
+        """Return the destination of a path, and a test whether a point on it is near enough."""
         place = self._xy(errand.place)
         if errand.order is None:
             return place, lambda at: False
@@ -153,7 +153,7 @@ class GuardAgent(OnFoot):
         return math.dist(self.walking.place, self._xy(place)) < self._habits.is_there_m
 
     def _is_near_enough(self, order: m.Order, place: Point, at: Point) -> bool:
-        """Whether what is to be looked at, or dealt with, can be so from here."""
+        """Return True if the order can be carried out from here."""
         has_valve = order.task == "contain" and not _is_extinguished(order.kind)
         ahead = self.walking.places_ahead(1.0, self._habits.keeps_off_m) if has_valve else []
         return any(map(self.exposure.is_bad, ahead)) or self._is_in_reach(order, place, at)
@@ -164,7 +164,7 @@ class GuardAgent(OnFoot):
         return self._sees(order.kind, at, place, within)
 
     def _sees(self, kind: str, at: Point, place: Point, within: float) -> bool:
-        """Whether a place is so near [m], and neither wall nor thick smoke between.
+        """Return True if a place is near enough [m], with neither wall nor thick smoke between.
 
         As for cameras, smoke hides no fire: who stands before thick smoke has found one.
         """
@@ -251,7 +251,7 @@ class GuardAgent(OnFoot):
             self._way_out.look_ahead()
 
     def _is_deadly_ahead(self) -> bool:
-        """Whether an errand leads on into what nobody survives, before it is near enough."""
+        """Return True if an errand leads into deadly conditions before it is near enough."""
         if self.activity != "walking":
             return False
         far = self._habits.looks_ahead_m
@@ -259,7 +259,7 @@ class GuardAgent(OnFoot):
         return any(map(self.exposure.is_deadly, ahead))
 
     def _goes_on_from(self, at: Point) -> bool:
-        """Whether a place [m] is not near enough yet to what the guard is sent to."""
+        """Return True if a place [m] is not near enough yet to the goal."""
         order = self._protocol.order
         return order is None or not self._is_in_reach(order, self._xy(order.position), at)
 
@@ -278,7 +278,7 @@ class GuardAgent(OnFoot):
         return self._sees(order.kind, at, place, within) and self._is_there(order.kind, *place)
 
     def _safe_places(self) -> list[Point]:
-        """Where to withdraw to: its post, unless it is bad there, and the ways out."""
+        """Return where to withdraw to: its post, unless that is bad, and the exits."""
         post = [] if self.exposure.is_bad(self._post) else [self._post]
         return [*post, *(place for place in self._refuges if place != self._post)]
 
@@ -295,7 +295,7 @@ class GuardAgent(OnFoot):
 
 
 def _is_extinguished(kind: str) -> bool:
-    """Whether what messages call so is dealt with by an extinguisher, not at a valve."""
+    """Return True for an event that an extinguisher ends, rather than a valve."""
     return KINDS[kind].contained_by == "extinguisher"
 
 

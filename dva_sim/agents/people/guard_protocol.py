@@ -1,4 +1,4 @@
-"""What a guard makes of what the DVA says. Pure: it takes messages and tells what to do now.
+"""Protocol of a guard with the DVA. Pure: takes messages and returns what to do now.
 
 The newest order holds. It takes the place of an older one at once, also of work at an event: so
 the guard and the DVA never disagree on what the guard does. Whom the DVA should not call away is
@@ -33,7 +33,7 @@ class Errand:
 
 
 class GuardDecision(NamedTuple):
-    """What follows from a message.
+    """Consequence of a message.
 
     Attributes:
         code: Reply code; anything but OK means that nothing has changed.
@@ -124,7 +124,7 @@ class GuardProtocol:
         return self._set_out(Errand(place), now)
 
     def _set_out(self, errand: Errand, now: float) -> GuardDecision:
-        """Who is under way already, or stands there, need not get ready again."""
+        """Set out on an errand; a guard under way, or on scene, need not get ready again."""
         order = errand.order
         if self.errand is None:
             is_there = order is not None and order.event_id == self._stands_at
@@ -144,7 +144,7 @@ class GuardProtocol:
         return GuardDecision(m.OK, bid_on=announcement if self.order is None else None)
 
     def _awarded(self, event: int, now: float) -> GuardDecision:
-        """As an order to look; an award comes to who has bid, so an order in between is newer."""
+        """Treat an award like an order to look; an order sent in between is newer."""
         held = self.order
         if held is not None and (held.event_id, held.task) == (event, "confirm"):
             return GuardDecision(m.OK, "has it already")

@@ -1,4 +1,4 @@
-"""How people keep out of each other's way, and who goes first through a door. Pure.
+"""Avoidance among people on foot, and priority at doors. Pure.
 
 Somebody who walks looks over a fan of directions around the one wanted. In each, the way is free
 up to where one would touch somebody, if everybody else kept on, or a wall. Two rules follow:
@@ -90,7 +90,7 @@ def is_clear(
     others: Sequence[Mover],
     habits: WalkingHabits = USUAL,
 ) -> bool:
-    """Whether nobody would be touched by walking on and on: then the rules keep the direction.
+    """Return True if walking on would touch nobody; then the rules keep the direction.
 
     Asked first, since mostly it is so, and it costs little.
     """
@@ -161,7 +161,7 @@ def doors_on(way: Floats, middles: Floats) -> list[Door]:
 
 
 class Courtesy:
-    """What one person does about the doors on its way.
+    """Courtesy of one person at the doors on its way.
 
     Args:
         doors: On the way, in its order.
@@ -197,7 +197,7 @@ class Courtesy:
 def _comes_through(
     door: Door, me: Body, near: Sequence[Body], habits: WalkingHabits
 ) -> Body | None:
-    """Who comes towards a door and has it first, being nearer; or is a robot in it."""
+    """Return who approaches a door and has priority, being nearer, or a robot in it."""
     mine, (ux, uy) = _towards(door, me)
     for other in near:
         its = math.dist((other.x, other.y), (door.x, door.y))
@@ -232,7 +232,7 @@ def past(
     room: Callable[[Floats], Floats],
     sideways: float = USUAL.sideways_m,
 ) -> Point | None:
-    """Where to step next to squeeze past a robot, sideways [m]; None: there is no gap.
+    """Return the next step to squeeze past a robot, sideways [m]; None: there is no gap.
 
     First in front of the wider gap, then straight through it.
 
@@ -257,6 +257,6 @@ def past(
 
 
 def _towards(door: Door, me: Body) -> tuple[float, Point]:
-    """How far away a door is [m], and in which direction."""
+    """Return how far away a door is [m], and in which direction."""
     gap = math.dist((me.x, me.y), (door.x, door.y))
     return gap, ((door.x - me.x) / gap, (door.y - me.y) / gap)

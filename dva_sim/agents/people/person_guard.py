@@ -86,12 +86,12 @@ class PersonGuard(OnFoot):
 
     @property
     def order(self) -> m.Order | None:
-        """What the DVA asks for, until it is settled."""
+        """Order of the DVA, until it is settled."""
         return self._protocol.order
 
     @property
     def activity(self) -> str:
-        """What the person is doing, in words."""
+        """Activity of the person, in words."""
         if self._needs_help:
             return "needs help"
         if not self.attended:
@@ -103,7 +103,7 @@ class PersonGuard(OnFoot):
         return {"departed": "walking", "arrived": "looking"}.get(self._stage, "getting ready")
 
     def goal(self) -> tuple[Point, float, list[list[float]]] | None:
-        """Where the order leads: the place [m], and the way there, its length and points [m]."""
+        """Return the order's place [m], and the path there: its length and points [m]."""
         if self.order is None:
             return None
         place = self._xy(self.order.position)

@@ -1,4 +1,4 @@
-"""Who people on foot are: guards and bystanders, drawn from profiles."""
+"""Profiles of people on foot: guards and bystanders."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SLOWEST, FASTEST = 0.6, 2.2  # design: where the law of walking speeds is cut [m
 
 
 class PaceProfile(Config):
-    """How fast people of some kind walk.
+    """Walking speeds of a kind of people.
 
     Attributes:
         walking_mean_mps: Mean over persons.
@@ -38,7 +38,7 @@ class PaceProfile(Config):
 
 
 class GuardProfile(PaceProfile):
-    """How guards are drawn.
+    """Profile from which guards are drawn.
 
     Attributes:
         mobilisation_s: From the order to the first step.
@@ -102,7 +102,7 @@ class Walker:
 
 
 class BystanderProfile(PaceProfile):
-    """How people are drawn who work at a site and have no part in its surveillance.
+    """Profile of people who work at a site and have no part in its surveillance.
 
     Attributes:
         premovement_s: From the alarm, or from noticing the danger, to the first step outwards.

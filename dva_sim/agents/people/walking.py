@@ -117,13 +117,13 @@ class Walking:
 
     @property
     def place(self) -> Point:
-        """Where the person is now [m]."""
+        """Present position of the person [m]."""
         self._ground.advance_to(self._clock.now)
         return self.body.x, self.body.y
 
     @property
     def walks(self) -> bool:
-        """Whether it is on its way."""
+        """True if it is on its way."""
         return self._walk is not None
 
     def go(
@@ -204,7 +204,7 @@ class Walking:
             self._clock.call_after(CALM if calm else STEP, self._step, walk)
 
     def _is_held_up(self, walk: Walk, ahead: Ahead) -> bool:
-        """Whether others keep one from coming nearer to an end that is near; notes progress."""
+        """Return True if others keep it from a goal that is near; notes progress."""
         now, own = self._clock.now, self._own
         if ahead.remaining < walk.least - own.nearer_m:
             walk.least, walk.nearer_at, walk.looks_around = ahead.remaining, now, now + own.tired_s
@@ -232,7 +232,7 @@ class Walking:
     def _among(
         self, walk: Walk, ahead: Ahead, speed: float, near: Sequence[Body]
     ) -> tuple[float, float, float]:
-        """Where to look [rad] and how to walk [m/s] among others."""
+        """Return where to look [rad] and how to walk [m/s] among others."""
         body, heading, own = self.body, ahead.bearing, self._own
         me = Mover(body.x, body.y, *body.velocity, body.radius)
         movers = [Mover(o.x, o.y, *o.velocity, o.radius) for o in near]
@@ -248,7 +248,7 @@ class Walking:
         return heading, *velocity(me, heading, speed, movers, self._planner.room_at, own)
 
     def _past_others(self, walk: Walk, ahead: Ahead) -> float:
-        """Where to, seen from farther off: who steps aside does not want back at once [rad]."""
+        """Return the direction from farther off; after stepping aside one does not turn back [rad]."""
         x, y = self.body.x, self.body.y
         far = walk.route.point_at(walk.gone + self._own.look_past_m)
         if not self._planner.line_of_sight((x, y), far):
@@ -256,7 +256,7 @@ class Walking:
         return math.atan2(far[1] - y, far[0] - x)
 
     def _others(self) -> list[Body]:
-        """Who is near."""
+        """Return the bodies nearby."""
         body = self.body
         around = self._ground.neighbours(body.x, body.y, self._reach)
         reach = self._own.reach_m
@@ -266,7 +266,7 @@ class Walking:
     # --- in the way --------------------------------------------------------------------
 
     def _slot(self, walk: Walk, near: Sequence[Body]) -> Point | None:
-        """Where to squeeze past a robot that holds one up; sideways until it is passed."""
+        """Return where to squeeze past a robot that blocks the way; sideways until it is passed."""
         body, own = self.body, self._own
         squeezes = body.radius == own.sideways_m
         robots = (o for o in near if isinstance(o, RobotBody))

@@ -90,7 +90,7 @@ class Avoidance:
     room_at: Callable[[Floats], Floats]
 
     def yields_to(self, here: Point, others: Sequence[Nearby]) -> list[bool]:
-        """Of each, whether the other one goes first."""
+        """Return for each other robot whether it goes first."""
         room = self.room_at(np.array([here, *((other.x, other.y) for other in others)])).tolist()
         is_narrow = room[0] - self.radius < NARROW
         return [
@@ -140,7 +140,7 @@ class Avoidance:
         return _blocked(others, gaps[:, best], keep[:, 0], way, lane)
 
     def _keeps_to_walls(self, points: Floats, base: Floats) -> NDArray[np.bool_]:
-        """Where lanes `(k, n, 2)` have room; the planned way has as much as there is."""
+        """Return where lanes `(k, n, 2)` have room; the planned path has as much as there is."""
         room = self.room_at(points.reshape(-1, 2)).reshape(points.shape[:2])
         needed = np.minimum(self.radius + LANE_ROOM, np.maximum(self.room_at(base), self.radius))
         needed = np.minimum(needed, room[:, :1] + STEP)  # who is too near already may get away
@@ -149,7 +149,7 @@ class Avoidance:
         return kept
 
     def _foreseen(self, way: Floats, here: Point, others: Sequence[Nearby]) -> Floats:
-        """Where others will be when one has come so far on one's way: `(2, others, n)` [m].
+        """Predict where others will be along one's path: `(2, others, n)` [m].
 
         Who goes first is expected to go on as it does; who does not, to stay where it is.
         """
@@ -200,7 +200,7 @@ class Avoidance:
         return None
 
     def _can_reach(self, here: Floats, place: Floats, others: Sequence[Nearby]) -> bool:
-        """Whether the straight way keeps off walls and others."""
+        """Return True if the straight path keeps clear of walls and others."""
         line = np.linspace(here, place, 2 + int(math.dist(here, place) / 0.1))
         room = self.room_at(line) - self.radius
         if (room < min(0.02, float(room[0]) - 0.01)).any():
@@ -215,7 +215,7 @@ class Avoidance:
 def _blocked(
     others: Sequence[Nearby], gaps: Floats, keep: Floats, way: Floats, lane: Lane
 ) -> Blocked:
-    """Who is in the way first on a lane: gaps `(others, n)` and what to keep `(others, 1)`."""
+    """Return who blocks a lane first: gaps `(others, n)` and distances to keep `(others, 1)`."""
     tight = gaps < keep
     at = np.where(tight.any(axis=1), way[tight.argmax(axis=1)], math.inf)
     order = np.lexsort((gaps.min(axis=1), at))
@@ -243,7 +243,7 @@ def _to_the_left(points: Floats) -> Floats:
 
 
 def _gradient(points: Floats) -> Floats:
-    """As NumPy's along a line `(n, 2)`, which takes five times as long."""
+    """Differentiate along a line `(n, 2)` as NumPy does, in a fifth of the time."""
     between = np.empty_like(points)
     between[1:-1] = (points[2:] - points[:-2]) / 2.0
     between[0], between[-1] = points[1] - points[0], points[-1] - points[-2]
@@ -251,7 +251,7 @@ def _gradient(points: Floats) -> Floats:
 
 
 def _shifts(way: Floats, offset: float, sides: Floats, holds: Floats) -> Floats:
-    """How far to the left lanes run, from where one is to the side, and back: `(k, n)` [m]."""
+    """Return the offsets to the left of lanes, from the present one, aside and back: `(k, n)` [m]."""
     out = np.minimum(way / RAMP, 1.0)
     back = np.minimum(np.maximum((way - holds[:, None]) / RAMP, 0.0), 1.0)
     side = sides[:, None]
@@ -259,7 +259,7 @@ def _shifts(way: Floats, offset: float, sides: Floats, holds: Floats) -> Floats:
 
 
 def _keeps(others: Sequence[Nearby]) -> Floats:
-    """What a lane has to keep to each, shape `(others, 1, 1)` [m]."""
+    """Return the distance a lane has to keep from each, shape `(others, 1, 1)` [m]."""
     return np.array([other.keep + LANE_SPARE for other in others])[:, None, None]
 
 

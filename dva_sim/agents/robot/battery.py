@@ -13,7 +13,7 @@ JOULES: Final = 3600.0  # in a watt-hour
 
 
 class BatteryProfile(Config):
-    """What a battery holds and what draws on it; the shipped numbers are assumed.
+    """Capacity of a battery and its consumers; the shipped numbers are assumed.
 
     Attributes:
         idle_w: What computer, sensors and radio draw, driving or not.
@@ -53,12 +53,12 @@ class Battery:
 
     @property
     def share(self) -> float:
-        """Of the capacity, 0 to 1."""
+        """Remaining share of the capacity, 0 to 1."""
         return self.energy / self._full
 
     @property
     def empty(self) -> bool:
-        """Whether nothing is left: its robot has no power until it has been charged."""
+        """True if it is empty: its robot has no power until it has been charged."""
         return self.energy <= 0.0
 
     def advance(self, time: float, distance: float, work: float, at_base: bool) -> None:

@@ -1,4 +1,4 @@
-"""Who is near a robot, and the guard that slows it before contact: coordinated control.
+"""Collision guard: robots nearby, and slowing before contact; coordinated control.
 
 The guard is a loop at the robot. It never makes a robot faster and never turns it: who drives
 stays in charge of where to go, and can always turn away on the spot. It knows the plan of the site
@@ -153,7 +153,7 @@ class CollisionGuard:
         others: Sequence[Nearby],
         reach: float,
     ) -> float:
-        """How far the robot gets along an arc before it is too near to something [m].
+        """Return how far the robot gets along an arc before it is too near to something [m].
 
         A gap counts only while it shrinks: what is too near already may be driven away from.
 

@@ -40,7 +40,7 @@ PUBLISHED: Final = object()  # stands for whoever publishes commands: one at a t
 
 
 class Standing(IntEnum):
-    """What reason a robot has to listen to whoever a message is of."""
+    """Standing of a message's sender: why a robot should listen to it."""
 
     HOLDER = 0  # has proved it: by the session, or as the robot has subscribed to it
     DVA = 1  # says so; without keys anybody can
@@ -105,14 +105,14 @@ class FairQueue:
         self._lines: OrderedDict[LineOf, Line] = OrderedDict()
 
     def count(self, holders: bool) -> int:
-        """How many are the holder's, or are not."""
+        """Return how many are the holder's, or are not."""
         return sum(map(len, self._beside(holders).values()))
 
     def _beside(self, holders: bool) -> dict[LineOf, Line]:
         return {k: v for k, v in self._lines.items() if (self._standing(v[0]) == 0) is holders}
 
     def has(self, standing: Standing) -> bool:
-        """Whether one of a standing is next in its line."""
+        """Return True if a message of this standing is next in its line."""
         return any(self._standing(line[0]) is standing for line in self._lines.values())
 
     def put(self, letter: Letter) -> Letter | None:
@@ -182,7 +182,7 @@ Read = Callable[[Request], Message | None]
 
 
 def _nobody_waits(_: Letter) -> None:
-    """What finds no room is counted, and that is all."""
+    """Drop a message without room; it is counted."""
 
 
 class CommandQueue:
@@ -239,7 +239,7 @@ class CommandQueue:
 
     @property
     def hears_the_dva(self) -> bool:
-        """Whether something that claims to be of the DVA waits, or is being worked on."""
+        """True if a message that claims to be the DVA's waits, or is being worked on."""
         at_work = self._busy and self._last is DVA
         return at_work or self._waiting.has(DVA)
 
@@ -350,7 +350,7 @@ class CommandQueue:
         return None
 
     def _strangers_rest(self) -> bool:
-        """Whether they have to wait although nobody else does.
+        """Return True if unknown senders have to wait although nobody else does.
 
         Behind a message of the holder there is most time until its next one.
         """
@@ -421,7 +421,7 @@ class ServiceLaw(Config):
         return self
 
     def sample(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
-        """That many draws [s], shape `(count,)`."""
+        """Draw `count` service times [s], shape `(count,)`."""
         if self.law == "exponential":
             return self.mean_s * rng.standard_exponential(count)
         if self.cv is None:
@@ -451,7 +451,7 @@ def mean_of(service: float | ServiceLaw) -> float:
 
 
 def service_times(service: float | ServiceLaw, rng: np.random.Generator) -> Callable[[], float]:
-    """What gives the service time of each message [s], one after the other."""
+    """Return a generator of service times, one for each message [s]."""
     if isinstance(service, ServiceLaw):
         return _draws(service, rng).__next__
     return lambda: service

@@ -1,4 +1,4 @@
-"""What a robot obeys: modes, sessions, order and age of commands, watchdog, emergency.
+"""Controller of a robot: modes, sessions, order and age of commands, watchdog, emergency.
 
 Pure: it takes messages with their times and returns what to answer and how to move.
 """
@@ -22,7 +22,7 @@ PATIENCE = 3.0  # so long an order waits for what the DVA says of its sender, or
 
 
 class Mode(StrEnum):
-    """What a robot is doing."""
+    """Mode of a robot."""
 
     IDLE = "Idle"
     MISSION = "Mission"
@@ -33,7 +33,7 @@ IDLE, MISSION, TELEOPERATION = Mode  # a member is looked up in its class fiftee
 
 
 class TimedSetPoint(NamedTuple):
-    """How to move, and until when at the latest: speed [m/s], turn rate [rad/s], time [s]."""
+    """Set point with an end: speed [m/s], turn rate [rad/s], time [s]."""
 
     speed: float
     turn_rate: float
@@ -49,7 +49,7 @@ Mission = m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
 
 
 class Decision(NamedTuple):
-    """What follows from a message.
+    """Consequence of a message.
 
     Attributes:
         code: Reply code; anything but OK means that nothing has changed.
@@ -72,7 +72,7 @@ _make_decision = maker(Decision)
 
 @dataclass(frozen=True)
 class Limits:
-    """How long a robot trusts what it was told.
+    """Time limits after which a robot no longer trusts what it was told.
 
     Attributes:
         watchdog: A command is in force for at most this long after its reception [s].
@@ -188,7 +188,7 @@ class RobotController:
                 return Decision(m.NOT_SUPPORTED, f"a robot does not take {type(body).__name__}")
 
     def knows(self, message: m.Message) -> bool:
-        """Whether a message proves that it is of the holder, by the session."""
+        """Return True if the session proves that a message is the holder's."""
         grant = self.grant
         return (
             grant is not None
@@ -368,7 +368,7 @@ class RobotController:
         return Decision(m.BUSY, f"{MOST_OBSERVERS} observers are all that this robot serves")
 
     def _subscription(self, message: m.Message, body: m.DevSub) -> Decision:
-        """Whether somebody may subscribe to a sensor: each one is permitted by name (S5)."""
+        """Decide on a subscription to a sensor: each one is permitted by name (S5)."""
         grants = (self.grant, self.observers.get(message.source))
         held = [g for g in grants if g is not None and g.holder == message.source]
         if body.sensor not in {sensor.name for sensor in self.sensors}:
@@ -383,7 +383,7 @@ class RobotController:
 
     @property
     def free(self) -> bool:
-        """Whether it stands idle, and nobody holds it: then it can be sent somewhere."""
+        """True if it is idle and nobody holds it: then it can be sent somewhere."""
         idle = self.mode is IDLE and self.by_hand is None
         return idle and self.owner is None and self.grant is None
 
@@ -401,7 +401,7 @@ class RobotController:
         return self.owner or (self.grant.holder if self.grant is not None else "nobody")
 
     def may_read(self, device: str) -> bool:
-        """Whether a device holds any permission to read sensors."""
+        """Return True if a device holds any permission to read sensors."""
         return device in self.observers or (self.grant is not None and self.grant.holder == device)
 
     def _what_there_is(self) -> str:
@@ -409,7 +409,7 @@ class RobotController:
         return f"there are {', '.join(names) or 'none'}"
 
     def _refusal(self, message: m.Message, level: str) -> Decision | None:
-        """Why a source may not act now, or None (S5)."""
+        """Return why a source may not act now, or None (S5)."""
         grant = self.grant
         if grant is None or grant.holder != message.source:
             return Decision(m.NOT_PERMITTED, f"{message.source} holds no permission here")
@@ -420,7 +420,7 @@ class RobotController:
         return None
 
     def _order(self, message: m.Message) -> Decision | None:
-        """Why an order may not act now, or None: orders of a session act once and in order.
+        """Return why an order may not act now, or None: orders of a session act once, in order.
 
         A copy of an old one that comes late, after its reply was forgotten, ends here.
         """
@@ -430,7 +430,7 @@ class RobotController:
         return None
 
     def _begin(self, arrived: float, moving: bool) -> Decision | None:
-        """Why no new activity may begin now, or None."""
+        """Return why no new activity may begin now, or None."""
         if arrived <= self.emergency_at:
             return Decision(m.STALE, "sent before the emergency")
         if self.mode is not IDLE:

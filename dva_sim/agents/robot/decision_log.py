@@ -1,4 +1,4 @@
-"""What a robot's controller was told and what it decided: kept as lines of JSON, and replayed."""
+"""Log of a robot controller's inputs and decisions: kept as lines of JSON, and replayed."""
 
 from __future__ import annotations
 

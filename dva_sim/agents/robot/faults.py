@@ -1,4 +1,4 @@
-"""What can be made to go wrong with a robot while it runs, and be put right again.
+"""Faults of a robot that can be injected and removed while it runs.
 
 Nothing of it is chance, and nothing of it is in the robot until somebody asks for it: a run without
 faults does what it did before. What is wrong is said in the robot's story, and so is its end.
@@ -41,7 +41,7 @@ class RobotFaults:
 
     @property
     def any(self) -> bool:
-        """Whether anything is wrong now."""
+        """True if any fault is active."""
         flags = self.drops_replies, self.frozen, self.camera_lost, self.stuck
         return self.processing_s is not None or any(flags)
 

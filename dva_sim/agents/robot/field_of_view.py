@@ -57,7 +57,7 @@ class FieldOfView:
     def look(
         self, x: float, y: float, heading: float, hazards: Iterable[HazardSpot]
     ) -> tuple[SeenHazard, ...]:
-        """Which hazards are in the picture taken from a pose [m, rad]."""
+        """Return the hazards in a picture taken from a pose [m, rad]."""
         seen = []
         for hazard in hazards:
             dx, dy = hazard.x - x, hazard.y - y
@@ -78,7 +78,7 @@ class FieldOfView:
         return tuple(seen)
 
     def visibility(self, x: float, y: float, heading: float) -> float:
-        """How far what does not shine is made out from a pose [m, rad], at most `CLEAR` [m].
+        """Return how far things that do not glow are visible from a pose [m, rad]; at most `CLEAR`.
 
         By the thicker of the smoke just before the camera and that along its axis: clean air
         beyond a wall lets nobody see through the smoke before it.

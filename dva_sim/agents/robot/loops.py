@@ -1,4 +1,4 @@
-"""What a robot does again and again: missions, and the guard around whoever drives it."""
+"""Periodic work of a robot: missions, and the guard around its driver."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Surrounded:
         self.reach = Reach(spec.max_speed, spec.max_turn_rate)
 
     def nearby(self) -> tuple[Nearby, ...]:
-        """Who is in sight now."""
+        """Return the bodies in sight now."""
         return who_is_near(self.world, self.body, SENSOR_REACH, self.planner.line_of_sight)
 
 

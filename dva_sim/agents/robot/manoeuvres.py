@@ -35,7 +35,7 @@ PASSED = 0.10  # gap left between the way and who has passed [m]
 
 
 class Sensed(NamedTuple):
-    """What a robot knows at a moment, by its sensors and its map.
+    """State of a robot as known by its sensors and its map.
 
     Attributes:
         now: [s]
@@ -53,7 +53,7 @@ class Sensed(NamedTuple):
 
     @property
     def here(self) -> Point:
-        """Where it is [m]."""
+        """Position [m]."""
         return self.view.x, self.view.y
 
 
@@ -75,7 +75,7 @@ class Manoeuvre:
     reason: str
 
     def step(self, seen: Sensed) -> Intent | None:
-        """What to do now; None when it is over."""
+        """Return what to do now; None when the manoeuvre is over."""
         raise NotImplementedError
 
 
@@ -156,7 +156,7 @@ class Aside(Manoeuvre):
         return turn if abs(wrap(bearing - seen.view.heading)) > 0.3 else turn._replace(speed=SLOWLY)
 
     def _is_free(self, seen: Sensed) -> bool:
-        """Whether nobody is on the way ahead, or will be in a moment."""
+        """Return True if nobody is on the path ahead, or will be in a moment."""
         for other in seen.nearby:
             for ahead in (0.0, 1.0, 2.0):
                 x, y = other.x + ahead * other.vx, other.y + ahead * other.vy
@@ -196,17 +196,17 @@ class Inspection:
         self._turned, self._heading = 0.0, 0.0
 
     def begins(self, seen: Sensed) -> bool:
-        """Whether the robot is where it can look from; from then on it is."""
+        """Return True once the robot is where it can look from."""
         if self._since == math.inf and self._is_at_view(seen):
             self._since = seen.now
         return self._since < math.inf
 
     def is_over(self, seen: Sensed) -> bool:
-        """Whether it has looked for long enough."""
+        """Return True if it has looked for long enough."""
         return seen.now - self._since > INSPECT_FOR
 
     def finding(self, seen: Sensed) -> str:
-        """What is in view, in words."""
+        """Describe what is in view."""
         what = self._event.replace("_", " ") if self._in_view(seen) else "nothing"
         return f"{what} {IN_VIEW}"
 

@@ -73,7 +73,7 @@ class ManualControl:
             robot.mode_changed("")
 
     def _done(self, who: str, what: str, decision: Decision, now: float) -> None:
-        """What was decided moves the robot, and the safety audit is told."""
+        """Apply a decision to the motors, and tell the safety audit."""
         robot = self._robot
         robot.device.recorder.on_hand(ByHand(robot.device.id_tag, who, what, now))
         if decision.set_point is not None:

@@ -85,7 +85,7 @@ GIVE_UP_AFTER = 60.0  # [s]
 
 
 class PilotStep(NamedTuple):
-    """What follows: how to move, and how the mission stands, as in `MissionStatus`."""
+    """Consequence of a step: how to move, and the mission's state as in `MissionStatus`."""
 
     intent: Intent
     state: str
@@ -142,7 +142,7 @@ class Pilot:
         self._progress = (math.inf, math.inf)  # the shortest way left [m], and since when [s]
 
     def step(self, seen: Sensed) -> PilotStep:
-        """What to do now."""
+        """Return what to do now."""
         if seen.charge < RESERVE and not self._errand.home:
             return self._end("failed", "battery")
         seen = self._with_patience(seen)
@@ -237,7 +237,7 @@ class Pilot:
     # --- in the way --------------------------------------------------------------------
 
     def _with_patience(self, seen: Sensed) -> Sensed:
-        """Who has waited for long goes nearer to people, until none is in sight."""
+        """Let a robot that has waited for long go nearer to people, until none is in sight."""
         waited = seen.now - self._blocked_since > SQUEEZE_AFTER
         people = any(o.kind == "person" for o in seen.nearby)
         self._squeezing = people and (self._squeezing or waited)
@@ -278,13 +278,13 @@ class Pilot:
         return self._move(seen, Intent(speed, turn), "waiting", f"{what} is in the way")
 
     def _is_taken(self, left: float, other: Nearby) -> bool:
-        """Whether somebody stands where one wants to go, and one is as near as can be."""
+        """Return True if somebody stands at the goal, and the robot is as near as it can be."""
         stands = math.hypot(other.vx, other.vy) < STILL
         gap = math.dist((other.x, other.y), self._goal) - other.radius
         return stands and left < CLOSE_BY and gap < self._radius + other.keep
 
     def _lets_pass(self, seen: Sensed, other: Nearby) -> bool:
-        """Whether to step aside: once for each who goes first and does not go away."""
+        """Return True if it should step aside: once for each who goes first and does not leave."""
         x, y = seen.here
         apart = math.dist(seen.here, (other.x, other.y))
         goes_away = (other.vx * (other.x - x) + other.vy * (other.y - y)) > 0.05 * apart

@@ -1,4 +1,4 @@
-"""What kinds of robots there are: their profiles, as users write them."""
+"""Profiles of robots, as users write them."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class RobotProfile(Config):
         return self
 
     def drive_spec(self) -> DriveSpec:
-        """The same for the physics.
+        """Return the drive's limits for the physics.
 
         Raises:
             ConfigError: there is no such drive.
@@ -121,7 +121,7 @@ def read_robot(document: Document) -> RobotProfile:
 
 
 def _convex(corners: tuple[Corner, ...]) -> bool:
-    """Whether they go once around the origin, always to the left."""
+    """Return True if the corners go once around the origin, always to the left."""
     turned = 0.0
     for number, (bx, by) in enumerate(corners):
         (ax, ay), (cx, cy) = corners[number - 1], corners[(number + 1) % len(corners)]

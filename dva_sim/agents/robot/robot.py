@@ -54,7 +54,7 @@ STANDING = 0.02  # below this the wheels count as still [m/s, rad/s]
 
 @dataclass(frozen=True, kw_only=True)
 class RobotSetup:
-    """How a robot is connected.
+    """Connections of a robot.
 
     Attributes:
         pattern: How SetTeleOp reaches it.
@@ -178,7 +178,7 @@ class RobotAgent:
         clock.every(STATUS_PERIOD, self._publish_status)
 
     def observe(self) -> Observation:
-        """What the camera sees now."""
+        """Return what the camera sees now."""
         now = self.device.clock.now
         self._world.advance_to(now)
         body, view, tick = self.body, self._setup.view, self.controller.tick(now)
@@ -209,7 +209,7 @@ class RobotAgent:
 
     @property
     def stale(self) -> bool:
-        """Whether the newest command of its holder came too late to be obeyed."""
+        """True if the newest command of its holder came too late to be obeyed."""
         return self._fared == m.STALE
 
     @property
@@ -219,12 +219,12 @@ class RobotAgent:
 
     @property
     def holder(self) -> tuple[str | None, float]:
-        """Who may act on it, by id, and for how long already [s]."""
+        """Current holder, by id, and for how long already [s]."""
         return self._holder, self.device.clock.now - self._held_since
 
     @property
     def is_moving(self) -> bool:
-        """Whether its wheels turn now."""
+        """True if its wheels turn now."""
         self._world.advance_to(self.device.clock.now)
         return abs(self.body.turn_rate) > STANDING or abs(self.body.speed) > STANDING
 
@@ -315,7 +315,7 @@ class RobotAgent:
         return queue.DVA if message.source == self.controller.dva else queue.STRANGER
 
     def _standing(self, letter: Letter) -> Standing:
-        """Who publishes commands is the holder: the robot has subscribed to it."""
+        """Return the standing of a publisher: the holder, since the robot subscribed to it."""
         if letter.request is None or letter.message is None:
             return queue.HOLDER
         return self._standing_of(letter.message)
@@ -424,7 +424,7 @@ class RobotAgent:
             self.trace.happened(what, self.device.clock.now)
 
     def _note_holder(self, message: m.Message, code: int) -> None:
-        """How the holder's commands fare; who listens hears at once when that changes."""
+        """Note how the holder's commands fare; listeners hear of a change at once."""
         holder = self._holder
         if isinstance(message.body, DRIVING) and message.source == holder:
             self._fared = code
@@ -451,7 +451,7 @@ class RobotAgent:
             self.device.publish(HOLDER, m.RobotHolder(self._holder, None, held, fares or None))
 
     def _follow_up(self, message: m.Message, decision: Decision) -> Decision:
-        """What a decision means to others than the motors."""
+        """Apply a decision to everything but the motors."""
         match message.body:
             case m.DevSub() as wish:
                 return Decision(*self._sensing.subscribe(message.source, wish))
@@ -504,7 +504,7 @@ class RobotAgent:
         self.body.drive(set_point.speed, set_point.turn_rate, set_point.until)
 
     def mode_changed(self, source: str) -> None:
-        """What it does is another thing now, by the word of a source."""
+        """Note that its activity has changed, on the order of a source."""
         mode = self.controller.mode
         if not self.device.silent:
             self.device.tell(f"is now in mode {mode}", "mode")

@@ -203,7 +203,7 @@ class FaultConfig(Config):
         return self
 
     def time(self, luck: np.random.Generator) -> float:
-        """When it happens [s]."""
+        """Return when it happens [s]."""
         if self.mean_time_s is not None:
             return float(luck.exponential(self.mean_time_s))
         return self.at_s or 0.0
@@ -318,7 +318,7 @@ class RobotSensor:
 
 
 class Around(Protocol):
-    """What it is like at a place: the hazards of a run."""
+    """Conditions at a place: the hazards of a run."""
 
     def at(self, x: float, y: float, time: float) -> Conditions:
         """The conditions at a point [m] and time [s]."""
@@ -327,7 +327,7 @@ class Around(Protocol):
 def sources_of(
     world: World, body: RobotBody, around: Around, lidar: Lidar, charge: Callable[[], float]
 ) -> dict[str, Source]:
-    """What each kind of sensor of a robot measures, where the robot is.
+    """Return what each kind of sensor measures where the robot is.
 
     Args:
         world: The physics.

@@ -141,7 +141,7 @@ class Accelerometer:
         self._x, self._y, self._z = self.offset[0] + x, self.offset[1] + y, self.offset[2] + z
 
     def sample(self, pitch: float, roll: float) -> Triple:
-        """What the part tells of a phone at rest at these angles [rad]: x, y, z [m/s^2]."""
+        """Return the reading of a phone at rest at these angles [rad]: x, y, z [m/s^2]."""
         x, y, z = next(self._errors)
         flat = GRAVITY * cos(pitch)
         x += self._x + GRAVITY * sin(pitch)

@@ -35,7 +35,7 @@ def calibrated(profile: PhoneProfile, reference: Triple) -> Calibration:
 
 
 class TiltCommand(NamedTuple):
-    """What the phone sends.
+    """Command of the phone.
 
     Attributes:
         speed: [m/s]
@@ -100,7 +100,7 @@ class Trail:
         self._hand = hand
 
     def captured(self) -> float:
-        """When the pictures behind the filter's value were captured, on average [s]."""
+        """Return when the pictures behind the filter's value were captured, on average [s]."""
         return self._begun + self._filter.value()[0]
 
     @property
@@ -110,7 +110,7 @@ class Trail:
 
     @property
     def asked(self) -> float:
-        """When the picture was captured that is followed now [s]."""
+        """Capture time of the picture that is followed now [s]."""
         return self._begun + self._asked
 
 
@@ -169,7 +169,7 @@ class TiltApp:
         self._due = math.inf if self._batch is None else now + self._app.max_delay
 
     def sample(self, at: float, acceleration: Triple) -> None:
-        """What the part measured at a time [s], never before an earlier one: x, y, z [m/s^2]."""
+        """Take in a reading at a time [s], never before an earlier one: x, y, z [m/s^2]."""
         self.take_values(at - 2 * TIE)
         self._heard_at, reading = at, self._read(*acceleration)
         if self._held:
@@ -205,7 +205,7 @@ class TiltApp:
         self._trail.follow(captured)
 
     def next_look(self, now: float, rate_hz: float) -> float:
-        """When the app next considers sending [s]: its period, or when a batch is complete."""
+        """Return when the app next considers sending [s]: its period, or a complete batch."""
         if self.keeps_alive:
             return now + 1.0 / rate_hz
         if self._batch is None or self._ideal:
@@ -247,17 +247,17 @@ class TiltApp:
 
     @property
     def failures(self) -> int:
-        """How often in this drive a user's filter or mapping gave no answer that is one."""
+        """Number of invalid answers of a user's filter or mapping in this drive."""
         return self._filter.failures + self._mapping.failures
 
     @property
     def first_failure(self) -> str:
-        """What was wrong with it first, in a line."""
+        """Description of the first invalid answer, in a line."""
         return self._filter.first_failure or self._mapping.first_failure
 
     @property
     def _next_sample(self) -> float:
-        """When the next sample is to be expected [s]."""
+        """Time of the next expected sample [s]."""
         return self._heard_at + self._period
 
     def _advance(self, now: float) -> None:
@@ -291,7 +291,7 @@ class TiltApp:
                 return
 
     def _watch(self, dt: float) -> None:
-        """What the display shows after a sample."""
+        """Update the display after a sample."""
         if self._batch is None:
             self.shown = self._mapping.command(*self._filter.value(), dt)
 

@@ -44,7 +44,7 @@ class Calibration:
         self._speed_step, self._turn_step = speed_step, turn_step
 
     def reading(self, ax: float, ay: float, az: float) -> Reading:
-        """What is read from a sample: level, turn [deg/s]; z only tells which side is up."""
+        """Return level and turn [deg/s] of a sample; z only tells which side is up."""
         if az * self._z < 0.0:
             return NEUTRAL  # upside down against the reference: nobody steers so
         return (ax - self._x) / self._speed_step, (ay - self._y) / self._turn_step

@@ -30,7 +30,7 @@ ORIENTATIONS: Final = tuple(_SCREEN)
 
 
 def to_tilt_axes(measured: Triple, orientation: int = 0, ios: bool = False) -> Triple:
-    """What a browser told, as the pipeline reads it: x forwards, y to the left, z up.
+    """Convert a browser's reading to the pipeline's axes: x forwards, y to the left, z up.
 
     Args:
         measured: x, y, z in the axes of the phone [m/s^2].

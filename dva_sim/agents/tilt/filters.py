@@ -210,7 +210,7 @@ class NoFilter(Filter):
 
 
 def median(values: Iterable[float]) -> float:
-    """Of a short list: `sorted` is many times faster than `numpy.median` here."""
+    """Return the median of a short list; `sorted` is many times faster than `numpy.median`."""
     ordered = sorted(values)
     count = len(ordered)
     middle = count >> 1
@@ -255,7 +255,7 @@ def load_filter(
     options: Mapping[str, Any] | None = None,
     base: Path | None = None,
 ) -> Callable[[float], Filter]:
-    """What makes the filter that `name` means, told the mean time between samples [s].
+    """Return a factory for the filter of a name, which is told the mean time between samples [s].
 
     Arguments as of `Plugins.load`.
 
@@ -268,7 +268,7 @@ def load_filter(
 def load_guarded_filter(
     name: str, chosen: Mapping[str, Any] | None = None
 ) -> Callable[[float], Filter]:
-    """As `load_filter`, for a run: a user's filter is kept within what can be sent.
+    """Return `load_filter`'s factory with a user's filter kept within what can be sent.
 
     Raises:
         ConfigError: as `load_filter`.
@@ -292,7 +292,7 @@ def check_filter(filter_: Filter) -> None:
 
 
 def is_age(age: object) -> bool:
-    """Whether it can be an age: a finite number, at least 0."""
+    """Return True for a valid age: a finite number, at least 0."""
     return isinstance(age, Real) and 0.0 <= float(age) < math.inf
 
 

@@ -41,7 +41,7 @@ class GivenTilt(TiltApp):
         self._tilt = self._tilted()
 
     def ask(self, now: float, speed: float, turn_rate: float) -> None:
-        """What is wanted from `now` on: speed [m/s], turn rate [rad/s]."""
+        """Set what is wanted from `now` on: speed [m/s], turn rate [rad/s]."""
         self._advance(now)
         self.followed(now)
         self._wanted = limited(speed / SPEED_PER_LEVEL, math.degrees(turn_rate))
@@ -63,7 +63,7 @@ class GivenTilt(TiltApp):
         self.take_values(now)
 
     def _tilted(self) -> Triple:
-        """What a perfect part measures of the tilt that is asked [m/s^2]."""
+        """Return what a perfect part measures of the wanted tilt [m/s^2]."""
         within = max(LEAST_WITHIN, self._period)
         pitch, roll = self._pose(*self._mapping.tilt_for(self._wanted, self.shown, within))
         flat = GRAVITY * math.cos(pitch)

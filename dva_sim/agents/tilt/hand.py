@@ -70,7 +70,7 @@ class Hand:
         self._pitch = self._roll = 0.0
 
     def step(self, pitch: float, roll: float, dt: float) -> tuple[float, float]:
-        """Where the phone is after `dt` [s] of aiming at `pitch` and `roll` [rad]."""
+        """Return the phone's pose after `dt` [s] of aiming at `pitch` and `roll` [rad]."""
         keep, new, most, swing, drive = self._tuned.get(dt) or self._tune(dt)
         one, other, off_pitch, off_roll = next(self._luck)
         noise = self._noise
@@ -91,7 +91,7 @@ class Hand:
         return self._pitch + self._tremor * one.real, self._roll + self._tremor * other.real
 
     def _tune(self, dt: float) -> tuple[float, float, float, complex, float]:
-        """What depends on the length of a step alone; there are few of them."""
+        """Return what depends only on the length of a step; there are few of them."""
         keep = math.exp(-dt / self._lag) if self._lag > 0.0 else 0.0
         damping = self._damping
         swing = cmath.exp(complex(-damping, 2.0 * math.pi * TREMOR_HZ) * dt)
@@ -104,7 +104,7 @@ class Hand:
 
 
 def _luck(rng: np.random.Generator, block: int) -> Iterator[tuple[complex, complex, float, float]]:
-    """What drives the tremor of pitch and roll, and how far each is aimed wrong; without end.
+    """Yield the random drive of the tremor in pitch and roll, and the aiming errors, endlessly.
 
     All are standard normal, and the same ones whatever the block.
     """

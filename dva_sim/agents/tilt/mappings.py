@@ -125,7 +125,7 @@ class DifferentialMapping(AbsoluteMapping):
 
 
 class LeakyMapping(DifferentialMapping):
-    """The same, but a phone held level lets its turn rate go back to zero.
+    """Rate control in which the turn rate of a phone held level decays to zero.
 
     Args:
         gain: Growth of the turn rate for each degree per second of the reading [1/s].
@@ -243,7 +243,7 @@ def load_mapping(
     options: Options[str, Any] | None = None,
     base: Path | None = None,
 ) -> Callable[[], Mapping]:
-    """What makes the mapping that `name` means.
+    """Return a factory for the mapping of a name.
 
     Args:
         name: A shipped name, a class in a file such as `mine.py:Mine`, or the name under which

@@ -25,7 +25,7 @@ class MeasuredTilt(TiltApp):
             super().sample(at, acceleration)
 
     def reading(self, acceleration: Triple) -> Reading:
-        """What the calibration reads from a sample, without limits: level, turn [deg/s]."""
+        """Return the calibrated reading of a sample, without limits: level, turn [deg/s]."""
         return self._app.reading(*acceleration)
 
     def next_look(self, now: float, rate_hz: float) -> float:

@@ -126,7 +126,7 @@ class Phone(TiltApp):
     def ask(
         self, now: float, speed: float, turn_rate: float, captured: float | None = None
     ) -> None:
-        """What the person wants from `now` on: speed [m/s], turn rate [rad/s].
+        """Set what the person wants from `now` on: speed [m/s], turn rate [rad/s].
 
         A person who wants to stand tilts a level beyond the reference, to be sure. When the
         picture behind it was `captured` [s] is carried along for the recorder; now, if none was.

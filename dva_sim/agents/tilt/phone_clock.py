@@ -1,4 +1,4 @@
-"""When a phone's samples were taken, by our clock: the phone's own times, set by what came soonest.
+"""Times of a phone's samples by our clock: the phone's times, set by the earliest arrivals.
 
 A phone tells its times by a clock of its own, which began some time and goes a little fast or slow.
 Samples come late by the network, never early. So the offset between the clocks is at most what the
@@ -28,11 +28,11 @@ class PhoneClock:
         self._told, self._came, self._last = -math.inf, -math.inf, -math.inf
 
     def is_old(self, told: float) -> bool:
-        """Whether what was told for a time [s] has been overtaken: it says nothing any more."""
+        """Return True if what was told for a time [s] is obsolete."""
         return self._told - ANEW < told <= self._told
 
     def times_of(self, told: Sequence[float], came: float) -> list[float]:
-        """When samples were taken, by our clock [s]: not in the future, nor before earlier ones.
+        """Return when samples were taken by our clock [s]: not in the future, and in order.
 
         Args:
             told: When, by the phone, rising [s]; at least one.

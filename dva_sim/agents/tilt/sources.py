@@ -20,7 +20,7 @@ STICK_HOLDS: Final = 0.3  # design: after input by stick samples do not act for 
 
 
 class TiltSources:
-    """What makes commands of whatever a person steers with.
+    """Sources of commands from whatever a person steers with.
 
     Args:
         profile: How it reads, filters, maps and sends.
@@ -74,7 +74,7 @@ class TiltSources:
         return self._acting.look(now)
 
     def reading(self, acceleration: Triple) -> Reading:
-        """What the calibration reads from a sample, without limits: level, turn [deg/s]."""
+        """Return the calibrated reading of a sample, without limits: level, turn [deg/s]."""
         return self._measured.reading(acceleration)
 
     @property
@@ -94,7 +94,7 @@ class TiltSources:
 
     @property
     def is_tilted(self) -> bool:
-        """Whether the phone itself is what acts."""
+        """True if the phone itself is tilted."""
         return self._acting is self._measured
 
     @property

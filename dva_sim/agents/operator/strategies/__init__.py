@@ -1,4 +1,4 @@
-"""How operators steer: from what they see, or (the reference) from what is.
+"""Steering strategies of operators: by what they see, or, for the reference, by the truth.
 
 A strategy stands on what persons, routes and observations are, and knows no robot. Begin with
 `base.Strategy`, then `pursuit`; `loading` finds one by its name.

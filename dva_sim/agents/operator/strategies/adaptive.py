@@ -58,7 +58,7 @@ class Corrections:
 
     @property
     def late(self) -> float:
-        """How much later the middle of a correction is than its beginning [s]."""
+        """Time from the beginning to the middle of a correction [s]."""
         return 0.5 * self._habits.grows_s * self._tempo
 
     def steer(self, now: float, wanted: float) -> float:
@@ -161,7 +161,7 @@ class Adaptive(Strategy):
         return wanted
 
     def workload(self) -> Mapping[str, float]:
-        """How often the person waited, and how much of the time it moved and waited."""
+        """Return how often the person waited, and the share of time it moved and waited."""
         if self._aims.total:
             return {"waits": 0.0, "move_and_wait_share": self._aims.waited / self._aims.total}
         total = sum(self._times.values())
@@ -173,7 +173,7 @@ class Adaptive(Strategy):
         return self._pursuit if self.using == "closed" else self._moves
 
     def _prefers_to_wait(self, left: float, delay: float) -> float:
-        """How much more the person likes to move and wait, with so much way left [m]; 1: as much.
+        """Return the preference for waiting, with so much path left [m]; 1: indifferent.
 
         It is the ratio of the two times that it expects, times its unease at the delay. In a closed
         loop that is the pace that the delay allows, and the time to close an error.

@@ -1,4 +1,4 @@
-"""What a strategy is asked, what it answers, and how it moves a cursor if it says nothing else.
+"""Interface of strategies, and how one moves a cursor by default.
 
 A strategy is how a kind of person turns what it sees into what it wants. It sees frames that are
 late by perception and judged with an error, and what the person takes the delay to be; there is no
@@ -20,7 +20,7 @@ from dva_sim.kernel.plugins import FAILURES, Guard, said
 
 
 class PointView(NamedTuple):
-    """What a person knows who moves a cursor to a target; as in `View`.
+    """Knowledge of a person who moves a cursor to a target; as in `View`.
 
     Attributes:
         luck: Standard normal numbers, by which its movements miss and it makes up its mind.
@@ -33,7 +33,7 @@ class PointView(NamedTuple):
 
 
 class PathView(NamedTuple):
-    """What a person knows who moves a cursor through a tunnel; as in `View`.
+    """Knowledge of a person who moves a cursor through a tunnel; as in `View`.
 
     Attributes:
         path: The middle line of the tunnel [m]; its end is the target.
@@ -46,7 +46,7 @@ class PathView(NamedTuple):
 
 
 class Strategy:
-    """How a kind of operator steers; derive from this to make another kind.
+    """Base class of steering strategies; derive your own from it.
 
     One is made for each drive or trial: it may remember what it saw in that, and nothing else.
     It has no luck: errors and noise are the person's, outside.
@@ -69,7 +69,7 @@ class Strategy:
         self.person, self.reach = person, reach
 
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
-        """What to ask a robot for, to follow a route.
+        """Return the command for a robot that follows a route.
 
         Args:
             route: The way to go.
@@ -79,14 +79,14 @@ class Strategy:
         raise NotImplementedError
 
     def point(self, view: PointView) -> Velocity:
-        """What velocity to give a cursor, to bring it to its target and keep it there [m/s].
+        """Return the velocity for a cursor, to bring it to its target and keep it there [m/s].
 
         If a strategy says nothing else: the crossover law, as `cursor.towards` has it.
         """
         return towards(view.seen, view.delay, self.person, self._most)
 
     def follow(self, view: PathView) -> Velocity:
-        """What velocity to give a cursor, to go through a tunnel without leaving it [m/s].
+        """Return the velocity for a cursor, to pass through a tunnel without leaving it [m/s].
 
         If a strategy says nothing else: as fast as the delay allows, as `cursor.through` has it.
         """
@@ -105,12 +105,12 @@ class Strategy:
         return off + drift * view.delay <= seen.tolerance
 
     def workload(self) -> Mapping[str, float]:
-        """What this way of steering asked of the person so far, by name with its unit."""
+        """Return the effort of this way of steering so far, by name with its unit."""
         return {}
 
     @property
     def _most(self) -> float:
-        """As fast as the person cares to go [m/s]."""
+        """Greatest speed that the person is willing to use [m/s]."""
         return self.person.pace * self.reach.speed
 
 
@@ -143,7 +143,7 @@ class GuardedStrategy(Guard, Strategy):
         return slowed(*got, self.reach.speed)
 
     def workload(self) -> Mapping[str, float]:
-        """What the user's counts, if it can tell."""
+        """Return the workload that the user's strategy reports, if it does."""
         try:
             return {str(name): float(value) for name, value in self.strategy.workload().items()}
         except FAILURES as error:

@@ -1,4 +1,4 @@
-"""How a person brings a cursor to its target, or through a tunnel, under delay.
+"""Moving a cursor to its target, or through a tunnel, under delay.
 
 References:
     D. T. McRuer, H. R. Jex: A review of quasi-linear pilot models. IEEE Trans. Human Factors in
@@ -100,7 +100,7 @@ def through(path: Route, seen: Sighting, delay: float, person: Person, most: flo
 
 
 def slowed(vx: float, vy: float, most: float) -> Velocity:
-    """The same direction, no faster than `most` [m/s]."""
+    """Return the velocity in the same direction, no faster than `most` [m/s]."""
     speed = math.hypot(vx, vy)
     return (vx * most / speed, vy * most / speed) if speed > most else (vx, vy)
 
@@ -130,7 +130,7 @@ def _bend(path: Route, along: float, look: float) -> float:
 
 
 def _direction(path: Route, along: float, by: float) -> Velocity:
-    """Which way a path goes at a place on it, seen over so much of it either way [m]."""
+    """Return the direction of a path at a place, averaged over so much of it either way [m]."""
     along = min(max(along, by), path.length - by)
     (ax, ay), (bx, cy) = path.point_at(along - by), path.point_at(along + by)
     length = math.hypot(bx - ax, cy - ay)

@@ -56,7 +56,7 @@ def load_strategy(
     options: Mapping[str, Any] | None = None,
     base: Path | None = None,
 ) -> Callable[[Person, Reach], Driver]:
-    """What makes the strategy that `name` means, for a person and what it steers.
+    """Return a factory for the strategy of a name, for a person and what it steers.
 
     Those of users are kept within the limits, whatever they answer (`GuardedStrategy`).
 

@@ -25,7 +25,7 @@ MovePart = tuple[float, float, float]  # how long [s], and two wanted values
 
 
 class Moves:
-    """What a person does who moves and waits.
+    """Moves of a person who moves and waits.
 
     Args:
         reaction: Of the person [s].
@@ -46,12 +46,12 @@ class Moves:
         self._still_since: float | None = None
 
     def usual_wait(self, delay: float) -> float:
-        """How long a wait takes if all goes well, at this delay [s]."""
+        """Return how long a wait takes if all goes well, at this delay [s]."""
         return delay + self._least_wait
 
     @property
     def rests(self) -> bool:
-        """Whether no move is being made."""
+        """True if no move is being made."""
         return not self._parts
 
     def halt(self, now: float, peak: float) -> None:
@@ -75,7 +75,7 @@ class Moves:
         return ends[0][1:]
 
     def next(self, now: float, delay: float, pace: float) -> Pair | None:
-        """What is wanted now: a part of the move, or nothing moving; None: it is time for another.
+        """Return what is wanted now: part of the move, or standing still; None: time for another.
 
         Args:
             now: [s]
@@ -97,7 +97,7 @@ class Moves:
         return (0.0, 0.0) if self._waits_on(now, delay) else None
 
     def _waits_on(self, now: float, delay: float) -> bool:
-        """Whether the picture has not yet shown the move, or not yet that it is over."""
+        """Return True if the picture has not yet shown the move, or its end."""
         if self._ended is None:
             return False
         waited = now - self._ended
@@ -109,7 +109,7 @@ class Moves:
 
 
 def straight_way(route: Route, here: Pair, along: float, most: float, slack: float) -> float:
-    """How far ahead on a route one can go straight [m], at most `most`.
+    """Return how far ahead on a route one can go straight [m], at most `most`.
 
     Args:
         route: [m]
@@ -125,7 +125,7 @@ def straight_way(route: Route, here: Pair, along: float, most: float, slack: flo
 
 
 def _apart(route: Route, here: Pair, along: float, way: float) -> float:
-    """How far a route lies from the straight line from here to a place ahead on it [m]."""
+    """Return how far a route departs from the straight line to a place ahead on it [m]."""
     (ax, ay), (bx, by) = here, route.point_at(along + way)
     length = math.hypot(bx - ax, by - ay)
     if length == 0.0:
@@ -195,11 +195,11 @@ class MoveAndWait(Strategy):
         return self._straight(view.now, x - seen.x, y - seen.y)
 
     def workload(self) -> Mapping[str, float]:
-        """How often the person waited to see the result of a move, and that it always does so."""
+        """Return how often the person waited for the result of a move; it always does so."""
         return {"waits": float(self.moves.waits), "move_and_wait_share": 1.0}
 
     def trusted_in(self, half_width: float) -> float:
-        """How far a cursor is moved in a tunnel in one move [m]."""
+        """Return how far a cursor is moved in a tunnel in one move [m]."""
         return self.person.caution * half_width / max(self.person.motor_noise, SHORTEST)
 
     def halt(self, now: float) -> None:
@@ -250,7 +250,7 @@ class MoveAndWait(Strategy):
         return self.moves.begin(now, [(lasts, vx, vy)], self._flow(vx, vy))
 
     def _lasting(self, way: float, most: float) -> float:
-        """How long a move, or a turn, takes at most so fast [s].
+        """Return how long a move, or a turn, takes at this speed [s].
 
         What is shorter than the period may be lost, and a command lasts for whole periods.
         """
@@ -260,9 +260,9 @@ class MoveAndWait(Strategy):
         return period * max(1.0, math.ceil(lasts / period - WHOLE))
 
     def _pace(self, speed: float, turn_rate: float) -> float:
-        """How fast a robot moves, driving or turning, as a share of what it can."""
+        """Return the speed of a robot, driving or turning, as a share of its limit."""
         return abs(speed) / self.reach.speed + abs(turn_rate) / self.reach.turn_rate
 
     def _flow(self, vx: float, vy: float) -> float:
-        """How fast a cursor moves, as a share of what it can."""
+        """Return the speed of a cursor, as a share of its limit."""
         return math.hypot(vx, vy) / self.reach.speed

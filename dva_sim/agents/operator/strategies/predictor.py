@@ -77,11 +77,11 @@ class Predictor(Strategy):
         return wanted
 
     def workload(self) -> Mapping[str, float]:
-        """That of the inner strategy."""
+        """Return the workload of the inner strategy."""
         return self._inner.workload()
 
     def _left(self, delay: float) -> float:
-        """What the prediction leaves of a delay [s]."""
+        """Return the delay that the prediction leaves [s]."""
         return (1.0 - self._quality) * delay
 
     def _moved_on(self, seen: Observation, now: float, delay: float) -> Observation:
@@ -97,7 +97,7 @@ class Predictor(Strategy):
         return seen._replace(x=x, y=y, heading=heading, speed=speed, turn_rate=turn_rate)
 
     def _cursor(self, seen: Sighting, now: float, delay: float) -> Sighting:
-        """The same of a cursor; its target goes on as it is seen to go."""
+        """Predict a cursor; its target is assumed to keep moving as it is seen to."""
         x, y, vx, vy = seen.x, seen.y, seen.vx, seen.vy
         for lasts, one, other in self._unseen(now, delay):
             vx, vy = self._quality * one, self._quality * other
@@ -113,7 +113,7 @@ class Predictor(Strategy):
         )
 
     def _unseen(self, now: float, delay: float) -> list[tuple[float, float, float]]:
-        """What was asked for since `now - delay`: for how long [s], and what."""
+        """Return the requests since `now - delay`: for how long [s], and what."""
         asked, since, end = self._asked, now - delay, now
         while len(asked) > 1 and asked[1][0] < now - self._remembers:
             asked.popleft()
@@ -145,7 +145,7 @@ class Truth(Generic[S]):
 
 @final
 class Oracle:
-    """The same steering as `pursuit`, from where what is asked for now takes effect.
+    """`pursuit` from where present requests take effect: the reference without delay.
 
     It is no `Strategy`, as it sees nothing. Nothing derives from it: it alone is told the truth.
 
@@ -163,18 +163,18 @@ class Oracle:
         raise TypeError(f"{cls.__name__} cannot derive from Oracle, which alone is told the truth")
 
     def drive(self, route: Route, truth: Truth[Observation], stop_before: float) -> Intent:
-        """What to ask a robot for."""
+        """Return the command for a robot."""
         return self._inner.drive(route, View(*_known(truth)), stop_before)
 
     def point(self, truth: Truth[Sighting]) -> Velocity:
-        """What velocity to give a cursor [m/s]."""
+        """Return the velocity for a cursor [m/s]."""
         return self._inner.point(PointView(*_known(truth)))
 
     def follow(self, path: Route, truth: Truth[Sighting]) -> Velocity:
-        """What velocity to give a cursor in a tunnel [m/s]."""
+        """Return the velocity for a cursor in a tunnel [m/s]."""
         return self._inner.follow(PathView(*_known(truth), path))
 
 
 def _known(truth: Truth[T]) -> tuple[float, T, float]:
-    """When that is, by the clock of what is steered [s], the state, and the delay [s]."""
+    """Return when that is, by the clock of the machine [s], the state, and the delay [s]."""
     return 1e-3 * truth.state.tick, truth.state, truth.delay

@@ -64,7 +64,7 @@ class TwoPoint(Pursuit):
         return intent
 
     def _begin(self) -> None:
-        """As if one had driven straight along a straight road so far."""
+        """Begin as if it had driven straight along a straight road so far."""
         self._near = self._far = self._steering = self._turn_rate = 0.0
         self._corrected = -math.inf
 

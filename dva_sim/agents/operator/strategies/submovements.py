@@ -1,4 +1,4 @@
-"""How a person moves a cursor: one aimed movement after the other, by an imperfect prediction.
+"""Movements of a cursor: one aimed movement after the other, by an imperfect prediction.
 
 A movement is planned as a whole, from where the cursor will be once everything that was asked for
 has happened, and then runs its course; meanwhile nothing is corrected. It ends beside the target by
@@ -156,7 +156,7 @@ class Submovements:
         return min(delay, self._usual) + self._person.compensates * new
 
     def _rests_until(self, delay: float) -> float:
-        """When it may act again [s]: at once, or once it has seen what came of the last."""
+        """Return when it may act again [s]: at once, or once the last result is visible."""
         ended = self._begun + self._lasts
         new = max(delay - self._usual, 0.0) * (1.0 + self._habits.ruffled * self._failures)
         if self._boldness < 1.0 - waited_share(new, self._person.waits_from):
