@@ -1,4 +1,4 @@
-"""What a console is asked for, read and judged before anything starts."""
+"""Options of a console, read and checked before anything starts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DEFAULT = "hands-on"
 
 @dataclass(frozen=True, kw_only=True)
 class ConsoleOptions(PageOptions):
-    """What to run, and where it is to be seen.
+    """What to run, and where to show it.
 
     Attributes:
         scenario: By name or path.
@@ -60,7 +60,7 @@ class ConsoleOptions(PageOptions):
     foxglove: int | None = None
 
     def kept_results(self) -> KeptResults | None:
-        """What makes tables of what people do, if they are wanted.
+        """Return what makes tables of people's drives, if they are wanted.
 
         Raises:
             ConfigError: the folder holds something already.
@@ -71,7 +71,7 @@ class ConsoleOptions(PageOptions):
         return KeptResults(self.results, *asked)
 
     def motion_folder(self) -> Path | None:
-        """Where phones' motion is kept, made if need be.
+        """Return the folder for phones' motion, created if need be.
 
         Raises:
             ConfigError: it cannot be.
@@ -84,7 +84,7 @@ class ConsoleOptions(PageOptions):
         return self.keep_motion
 
     def sockets(self) -> MakeSockets | None:
-        """What makes the sockets of real links."""
+        """Return what makes the sockets of real links."""
         if self.links == "modelled":
             return None
         host = own_address(self.host) if self.host in ("0.0.0.0", "::") else self.host

@@ -334,7 +334,7 @@ class Teleoperation(Work):
         return route
 
     def _gets_nowhere(self, left: float) -> bool:
-        """Return True if the remaining path [m] has long not become shorter, despite all attempts."""
+        """Return True if the remaining path [m] has long not become shorter."""
         now = self._clock.now
         if self._looking.at_place:
             return False

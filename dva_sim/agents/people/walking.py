@@ -248,7 +248,7 @@ class Walking:
         return heading, *velocity(me, heading, speed, movers, self._planner.room_at, own)
 
     def _past_others(self, walk: Walk, ahead: Ahead) -> float:
-        """Return the direction from farther off; after stepping aside one does not turn back [rad]."""
+        """Return the direction from farther off; who stepped aside does not turn back [rad]."""
         x, y = self.body.x, self.body.y
         far = walk.route.point_at(walk.gone + self._own.look_past_m)
         if not self._planner.line_of_sight((x, y), far):

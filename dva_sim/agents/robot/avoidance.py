@@ -251,7 +251,7 @@ def _gradient(points: Floats) -> Floats:
 
 
 def _shifts(way: Floats, offset: float, sides: Floats, holds: Floats) -> Floats:
-    """Return the offsets to the left of lanes, from the present one, aside and back: `(k, n)` [m]."""
+    """Return the lateral offsets of lanes, from the present one, aside and back: `(k, n)` [m]."""
     out = np.minimum(way / RAMP, 1.0)
     back = np.minimum(np.maximum((way - holds[:, None]) / RAMP, 0.0), 1.0)
     side = sides[:, None]

@@ -17,7 +17,7 @@ BYE: Final = "bye-"  # ids of what is asked for in the name of a page that is go
 
 
 class Answers:
-    """What was answered to actions, by the ids that pages give them; the oldest are forgotten.
+    """Answers to actions, by the ids that pages give them; the oldest are forgotten.
 
     Attributes:
         given: The answers, as lines; None while one is still to come.

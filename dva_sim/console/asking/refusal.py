@@ -1,4 +1,4 @@
-"""How an action ends: answered, or refused with the reason."""
+"""Outcome of an action: an answer, or a refusal with its reason."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ NO_ANSWER: Final = "the DVA does not answer"
 
 
 class Said(Protocol):
-    """Whoever waits for the answer to an action."""
+    """Callback for the answer to an action."""
 
     def __call__(self, ok: bool, text: str, /, **more: Unpack[Answered]) -> object:
         """Told whether it was done, what there is to say of it, and what was asked for."""

@@ -1,4 +1,4 @@
-"""Who sits where: pure, without a clock and without sockets.
+"""Seats and their clients: pure, without a clock and without sockets.
 
 A client that takes control gets a seat, and keeps it until it gives it up or is gone. What it
 wants must come again and again while it holds on: who falls silent is stopped.
@@ -29,7 +29,7 @@ class TakenSeat:
 
 
 class Seats:
-    """Which client sits where.
+    """Assignment of clients to seats.
 
     Attributes:
         taken: By client.

@@ -1,4 +1,4 @@
-"""What people at an attached console ask for: it becomes messages, and nothing else."""
+"""Actions of people at an attached console: each becomes messages, and nothing else."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What messages tell of robots that are lost, and of who is left to be sent."""
+"""Facts for alarms from messages: lost robots, and responders that are available."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class ToldFacts:
         return ()
 
     def is_somebody_free(self) -> bool:
-        """Whether somebody is listed who was sent to no open event."""
+        """Return True if somebody is listed who is assigned to no open event."""
         events = self._system.agent.events.values()
         engaged = {status.responder for status in events if status.closed_for is None}
         return any(

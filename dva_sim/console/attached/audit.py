@@ -41,7 +41,7 @@ class AskedDecision:
     finish: Callable[[], object] | None = None
 
     def is_told_by(self, record: m.AuditRecord) -> bool:
-        """Whether a record can be that of this decision."""
+        """Return True if a record can be that of this decision."""
         fits = record.action == self.action and self.event in (None, record.event_id)
         return fits and self.record is None
 
@@ -138,5 +138,5 @@ class AttachedAudit(Audited):
 
 
 def _action(what: str) -> str:
-    """What the DVA calls an action of a page."""
+    """Return the DVA's name for an action of a page."""
     return "set_dispatch" if what == "dispatch_mode" else what.removeprefix("event_")

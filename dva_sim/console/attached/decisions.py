@@ -1,4 +1,4 @@
-"""What people at an attached console decide on events: messages of its own control room.
+"""Decisions of people at an attached console: messages of its own control room.
 
 Whether that is allowed, the DVA says: it alone knows the role of each control room.
 """
@@ -111,7 +111,7 @@ class AttachedDecisions:
         self._system.agent.ask(body, answered, partial(unanswered, said))
 
     def _seen(self, event: int) -> int | None:
-        """How many decisions on an event are known here."""
+        """Return how many decisions on an event are known here."""
         status = self._system.agent.events.get(event)
         return None if status is None else status.decisions
 

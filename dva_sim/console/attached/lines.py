@@ -87,7 +87,7 @@ def nowhere(frame: GeoFrame) -> SiteShown:
 def positions(
     devices: Mapping[str, ToldDevice], numbers: dict[str, int], frame: GeoFrame
 ) -> list[list[int]]:
-    """Who has said where it is."""
+    """Return the positions of everybody who has reported one."""
     rows = []
     for id_tag, told in devices.items():
         status = told.status
@@ -119,12 +119,12 @@ def robot_row(told: ToldDevice, number: int, now: float) -> RobotRow:
 
 
 def sensors_of(told: ToldDevice) -> list[str]:
-    """What a device can measure, in words."""
+    """Describe what a device can measure."""
     return [f"{sensor.name} [{sensor.unit}]" for sensor in told.sensors]
 
 
 def readings_of(told: ToldDevice, now: float) -> list[str]:
-    """What its sensors show, in words; a value that is not told any more is unknown."""
+    """Describe the values of its sensors; a value that is no longer reported is unknown."""
     return [f"{sensor.name} {_reading(sensor, told, now)}" for sensor in told.sensors]
 
 

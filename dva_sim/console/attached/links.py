@@ -1,4 +1,4 @@
-"""How an attached console takes part: its clock, and what carries its messages."""
+"""Clock and transport of an attached console."""
 
 from __future__ import annotations
 

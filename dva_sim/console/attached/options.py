@@ -1,4 +1,4 @@
-"""Where the DVA is that a console attaches to, and by which keys."""
+"""Address of the DVA that a console attaches to, and its keys."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FIRST_FREE = 1001  # numbers of control rooms that no scenario gives, for who ha
 
 @dataclass(frozen=True, kw_only=True)
 class AttachOptions(PageOptions):
-    """What to attach to, and where it is to be seen.
+    """DVA to attach to, and where to show it.
 
     Attributes:
         dva: Address of the DVA, `HOST:PORT`.
@@ -64,7 +64,7 @@ class AttachOptions(PageOptions):
             return str(way.getsockname()[0])
 
     def check(self) -> None:
-        """Whether it can be.
+        """Check that it is possible.
 
         Raises:
             ConfigError: the address is none, or no audit log can be kept where it is wanted.
@@ -75,7 +75,7 @@ class AttachOptions(PageOptions):
             check_target(self.audit)
 
     def site(self) -> Site | None:
-        """What is known of the place.
+        """Return the site, as far as it is known.
 
         Raises:
             ConfigError: the scenario, or its site, cannot be read.

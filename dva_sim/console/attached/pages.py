@@ -1,4 +1,4 @@
-"""What pages of an attached console are told: each thing as it changes, and no more often.
+"""Updates for the pages of an attached console: each on change, and no more often.
 
 While the DVA does not answer, what it last said stays shown, with a word that says so.
 """
@@ -33,7 +33,7 @@ FIRST_SCENE: Final = 1.5  # so long a position is waited for, where no site is k
 
 
 class AttachedPages:
-    """What of a system elsewhere is told; see `ConsoleSubject`.
+    """State of a remote system for pages; see `ConsoleSubject`.
 
     Args:
         system: To which the console is attached.
@@ -87,7 +87,7 @@ class AttachedPages:
     # --- what is told ----------------------------------------------------------------------
 
     def _tell_scene(self) -> None:
-        """Whoever is new gets a number; an unknown place lies where somebody first is."""
+        """Tell the scene: a new device gets a number; an unknown site lies around the first one."""
         system = self.system
         system.find_place()
         if self.clock.now < FIRST_SCENE and not system.is_placed:
@@ -125,7 +125,7 @@ class AttachedPages:
         )
 
     def _tell_alarms(self) -> None:
-        """As long as it is not known how events stand, alarms stay as they are."""
+        """Tell alarms; while the state of events is unknown, alarms stay as they are."""
         system, now_ms = self.system, self.system.now_ms
         is_known = system.is_told and system.answers
         known = self.alarms.look(self._events(), [], now_ms) if is_known else None

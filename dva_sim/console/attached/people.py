@@ -1,4 +1,4 @@
-"""Who decides at the pages of an attached console: all by the console's own control room."""
+"""People who decide at an attached console: all through the console's own control room."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ class AttachedPeople:
         self.by_client.pop(client, None)
 
     def author(self, client: str) -> str:
-        """What the person of a page is called."""
+        """Return the name of a page's person."""
         known = self.by_client.get(client)
         return name_of_page(client) if known is None else known[0]
 
     def lines(self, allowed: str) -> list[RoomEntry]:
-        """Who decides, with what both the DVA and the address of the page allow."""
+        """Return who decides, within what both the DVA and the page's address allow."""
         most = ControlRoomRole(allowed)
         return [
             {"label": name, "role": str(own if most.includes(own) else most), "client": client}

@@ -28,7 +28,7 @@ SOMEWHERE: Final = GeoFrame(0.0, 0.0)
 
 
 class AttachedSystem:
-    """What runs at another DVA.
+    """System at another DVA.
 
     Args:
         options: Where the DVA is.
@@ -82,12 +82,12 @@ class AttachedSystem:
 
     @property
     def answers(self) -> bool:
-        """Whether the DVA has said something a moment ago."""
+        """True if the DVA has been heard recently."""
         return self.clock.now - self._heard < UNHEARD
 
     @property
     def role(self) -> str:
-        """What the DVA lets this console do: `look`, `drive`, `dispatch` or `supervise`."""
+        """Role that the DVA grants this console: `look`, `drive`, `dispatch` or `supervise`."""
         dispatch = self.agent.dispatch
         return (dispatch.role if dispatch is not None else None) or "look"
 
@@ -119,7 +119,7 @@ class AttachedSystem:
         self.agent.ask(m.GetSensorInfo(), answered)
 
     def _note_record(self, record: m.AuditRecord) -> None:
-        """What somebody has decided, in words."""
+        """Note somebody's decision, in words."""
         about = f" about event {record.event_id}" if record.event_id is not None else ""
         refused = f", refused: {record.text}" if record.code != m.OK else ""
         said = f"{record.action.replace('_', ' ')}{about}{refused}"
@@ -134,12 +134,12 @@ class AttachedSystem:
         return round(1000 * self.clock.now)
 
     def place_of(self, x: float, y: float) -> m.Position:
-        """Where on earth a place of the map lies [m]."""
+        """Return the geographic position of a place on the map [m]."""
         return m.Position(*self.frame.to_latlon(x, y))
 
     @property
     def is_placed(self) -> bool:
-        """Whether it is known where on earth the map lies."""
+        """True if the geographic position of the map is known."""
         return self.frame is not SOMEWHERE
 
     def find_place(self) -> bool:
@@ -156,7 +156,7 @@ class AttachedSystem:
         return [i for i, told in known if told.device.device_type == ROBOT and not self.is_fake(i)]
 
     def is_fake(self, id_tag: str) -> bool:
-        """Whether a device was added by hand, here."""
+        """Return True if a device was added by hand, here."""
         return id_tag in self.fakes.devices
 
     def id_of(self, number: int) -> str | None:
@@ -164,7 +164,7 @@ class AttachedSystem:
         return next((i for i, known in self.numbers.items() if known == number), None)
 
     def label_of(self, id_tag: str) -> str:
-        """What a device calls itself."""
+        """Return the label of a device."""
         told = self.told.devices.get(id_tag)
         return id_tag if told is None else told.device.label
 
@@ -174,7 +174,7 @@ class AttachedSystem:
         return ", ".join(self.label_of(by_number.get(one, one)) for one in given.split(", "))
 
     def age_of(self, event: int | None) -> float | None:
-        """How long ago an event was first reported [s]."""
+        """Return how long ago an event was first reported [s]."""
         if event is None or (status := self.agent.events.get(event)) is None:
             return None
         return status.age + self.clock.now - self.agent.told_at[event]

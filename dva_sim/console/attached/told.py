@@ -1,4 +1,4 @@
-"""What the messages of a system tell who listens: devices, and what each published last."""
+"""State of a system as its messages tell it: devices, and what each published last."""
 
 from __future__ import annotations
 

@@ -99,7 +99,7 @@ class AuditKeeper:
         self.put(self.entry(BEGIN, details=about))
 
     def entry(self, action: str, author: str = SYSTEM, **more: Any) -> AuditEntry:
-        """What happens now."""
+        """Return an entry for an action that happens now."""
         now = round(self._now(), 6)
         return AuditEntry(time_s=now, at_utc=now_utc(), author=author, action=action, **more)
 
@@ -116,7 +116,7 @@ class AuditKeeper:
         self._asked.put((None, then))
 
     def line(self, now_ms: int) -> AuditLine:
-        """How the log stands, for pages."""
+        """Return the state of the log for pages."""
         return {
             "k": "audit",
             "t": now_ms,
@@ -178,7 +178,7 @@ class AuditKeeper:
                 self._tell(rows, [then for _, then in new], problem)
 
     def _next(self, is_behind: bool) -> tuple[list[_Asked], bool]:
-        """What was asked for meanwhile, and whether that was all; a while is waited for more."""
+        """Return what was asked for meanwhile, and whether that was all; wait a while for more."""
         found = list[_Asked]()
         with suppress(queue.Empty):
             asked = self._asked.get(timeout=AGAIN if is_behind else None)

@@ -1,4 +1,4 @@
-"""What an audit log says of how a control room works: times, and where people overruled the policy.
+"""Measures of a control room from its audit log: times, and overrides of the policy.
 
 Each figure is made of rows alone, so that an exported log gives the same.
 """
@@ -36,12 +36,12 @@ def measured(rows: Iterable[AuditRow]) -> AuditMeasures:
 
 
 def is_override(row: AuditRow) -> bool:
-    """Whether somebody else was sent than the policy would have sent."""
+    """Return True if somebody else was sent than the policy would have sent."""
     return "advised" in row.details and row.details["advised"] != row.subject
 
 
 def _times(rows: Iterable[AuditRow]) -> TimesTaken:
-    """How long it took, the first time for each event."""
+    """Return how long it took, the first time for each event."""
     first: dict[int, float] = {}
     for row in rows:
         waited = _number(row.details.get("waited_s"))

@@ -21,7 +21,7 @@ FAIR, POOR = 2.5 * HEARTBEAT_PERIOD, 4 * HEARTBEAT_PERIOD  # without a word [s]
 
 
 def link_of(heard_s: float, silent: bool) -> str:
-    """How good the connection to a device seems, by how long ago it was heard [s]."""
+    """Return the quality of a device's connection, by how long ago it was heard [s]."""
     if silent:
         return "lost"
     if heard_s > POOR:
@@ -104,7 +104,7 @@ class DeviceRows:
         return self._run.stage.labels.get(holder, "") if entry is None else entry.device.label
 
     def _end_of(self, grant: Grant, now: float) -> float:
-        """When a permission ends [s]; infinity: never."""
+        """Return when a permission ends [s]; infinity: never."""
         desk = self._run.dva.desk
         holder, robot = (desk.registry.entries.get(one) for one in (grant.holder, grant.robot))
         if holder is None or robot is None:

@@ -1,4 +1,4 @@
-"""What the pages Main and Devices show of the DVA, and what people may do there."""
+"""Pages Main and Devices: what they show of the DVA, and their actions."""
 
 from __future__ import annotations
 

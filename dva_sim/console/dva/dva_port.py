@@ -16,7 +16,7 @@ from dva_sim.simulation.full.stage import DVA
 
 
 class DvaPort:
-    """Where the DVA of a run listens, and whether.
+    """Port of a run's DVA, which can be opened and closed.
 
     On real links the port is closed and opened; on modelled ones no port ever opens: the DVA takes
     part in the modelled network, or does not.
@@ -39,7 +39,7 @@ class DvaPort:
         self.address, self.listens = address, True
 
     def line(self) -> ServerShown:
-        """What a page is told."""
+        """Return its state for a page."""
         return {
             "listens": self.listens,
             "address": self.address,

@@ -102,7 +102,7 @@ class FakeDevices:
         return here
 
     def _renewed(self, device: AgentDevice) -> None:
-        """What was under way when a device was removed must not bring it back."""
+        """Dismiss a device that was removed while its registration was pending."""
         if device.id_tag not in self.devices:
             self._dismiss(device.id_tag)
 

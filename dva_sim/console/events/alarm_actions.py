@@ -1,4 +1,4 @@
-"""What people ask for about alarms: to have seen them, or to have them out of the list a while."""
+"""Actions on alarms: acknowledging and shelving them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class AlarmActions:
 
     @does("alarm_acknowledge")
     def _acknowledge(self, client: str, line: Asked, said: Said) -> None:
-        """What an open event is behind is acknowledged at the DVA, all else here."""
+        """Acknowledge an alarm: at the DVA if an open event is behind it, else here."""
         keys = self._desk.members(line["alarm"])
         events = self._desk.by_event(keys)
         for key in keys:

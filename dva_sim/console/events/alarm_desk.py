@@ -1,4 +1,4 @@
-"""What wants somebody to act, as alarms, and what people at pages do about them.
+"""Alarms: conditions that need somebody to act, and what people at pages do about them.
 
 What is shown is a run, or a system elsewhere: both tell the same few facts (`AlarmFacts`).
 """
@@ -23,13 +23,13 @@ OUTDOORS: Final = "outdoors"
 
 
 class AlarmFacts(Protocol):
-    """What can become an alarm, beside the events that pages are told of."""
+    """Facts that can become alarms, besides the events that pages know."""
 
     def lost(self, robots: Sequence[RobotRow]) -> Iterable[tuple[str, str]]:
         """The labels of robots that are lost in drive, by the rows that pages get, and why."""
 
     def is_somebody_free(self) -> bool:
-        """Whether a guard or a robot could be sent somewhere."""
+        """Return True if a guard or a robot could be sent somewhere."""
 
     def broken(self) -> Iterable[Breach]:
         """The safety rules that are broken, as far as anybody can tell."""
@@ -59,7 +59,7 @@ class RunFacts:
         return self._run.recorder.broken.values()
 
     def is_somebody_free(self) -> bool:
-        """Whether somebody whom the DVA hears was sent nowhere."""
+        """Return True if some reachable device has no order."""
         desk = self._run.dva.desk
         return any(
             entry.device.device_type in (ROBOT, GUARD)
@@ -178,7 +178,7 @@ class AlarmDesk:
 
 
 def _of_events(events: Iterable[SiteEventShown], now_ms: int) -> Iterator[AlarmCondition]:
-    """What is open, and what has just been escalated."""
+    """Yield open events, and those that have just been escalated."""
     for event in events:
         number, kind = event["number"], event["kind"].replace("_", " ")
         place = event["room"] or OUTDOORS

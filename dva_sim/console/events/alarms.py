@@ -33,7 +33,7 @@ MOST_ALARMS: Final = 500  # that are known at once; of more the gravest
 
 
 class AlarmState(StrEnum):
-    """Where an alarm stands."""
+    """State of an alarm."""
 
     UNACKNOWLEDGED = "unacknowledged"
     ACKNOWLEDGED = "acknowledged"
@@ -41,7 +41,7 @@ class AlarmState(StrEnum):
 
 
 class AlarmCondition(NamedTuple):
-    """What is wrong now, and wants somebody to act.
+    """Condition that needs somebody to act.
 
     Attributes:
         key: By which it is known as long as it lasts.
@@ -104,7 +104,7 @@ class Alarms:
     # --- what happens -----------------------------------------------------------------------
 
     def update(self, conditions: Iterable[AlarmCondition], now: float) -> None:
-        """What is wrong now; what is not named is over."""
+        """Set the present conditions; those not named are over."""
         on = sorted(conditions, key=lambda c: PRIORITIES.index(c.priority))
         self.left_out = max(0, len(on) - MOST_ALARMS)
         present = {condition.key: condition for condition in on[:MOST_ALARMS]}
@@ -168,7 +168,7 @@ class Alarms:
         self.is_flood = rate >= (FLOOD_ENDS if self.is_flood else FLOOD_BEGINS)
 
     def rate(self, now: float) -> int:
-        """How many were raised within the last 10 minutes."""
+        """Return how many alarms were raised within the last 10 minutes."""
         while self._raised and now - self._raised[0] > FLOOD_WINDOW:
             self._raised.popleft()
         return len(self._raised)
@@ -212,7 +212,7 @@ class Alarms:
         return [_row(alarms, now) for alarms in sorted(self._folded(listed), key=_rank)]
 
     def shelved(self, now: float) -> list[AlarmRow]:
-        """What is shelved, with what is left of that; the first to come back first."""
+        """Return the shelved alarms with their remaining time; the first to return first."""
         found = [alarm for alarm in self.known.values() if alarm.shelved_until is not None]
         found.sort(key=lambda alarm: alarm.shelved_until or 0.0)
         return [_row([alarm], now) for alarm in found]

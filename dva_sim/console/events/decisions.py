@@ -1,4 +1,4 @@
-"""What people decide about events, as messages: pure, for any console and any control room."""
+"""Decisions on events as messages: pure, for any console and any control room."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def report_of(line: ReportAsked, place: m.Position) -> tuple[m.EventReport, str]
 
 
 def answer_of(reply: m.Reply, is_robot: Callable[[str], bool]) -> Answered:
-    """What a page is told of a reply beside that it is done: a proposal with its reasons."""
+    """Return what a page is told of a reply besides success: a proposal with its reasons."""
     proposal = reply.content
     if not isinstance(proposal, m.Proposal):
         return {}
@@ -117,7 +117,7 @@ def _candidate(who: m.Candidate, is_robot: Callable[[str], bool]) -> CandidateSh
 def about_event(
     events: Mapping[int, m.EventStatus], at: Mapping[int, float], number: int
 ) -> EventDecisions:
-    """What a page is told of an event beside what everybody sees.
+    """Return what a page is told of an event besides what everybody sees.
 
     Args:
         events: As the DVA has told of them.
@@ -144,7 +144,7 @@ def about_event(
 
 
 def dispatch_shown(status: m.DispatchStatus | None, at: float) -> DispatchShown | None:
-    """How orders are given, as the DVA has said at a time [s]."""
+    """Return the dispatch mode, as the DVA reported it at a time [s]."""
     if status is None:
         return None
     by = status.switched
@@ -161,5 +161,5 @@ def moment_ms(seconds: float) -> int:
 
 
 def by_whom(whom: m.ByWhom | None, at: float) -> LabelledMoment | None:
-    """Who did something, and when."""
+    """Return who did something, and when."""
     return None if whom is None else {"label": whom.label, "at_ms": moment_ms(at - whom.ago)}

@@ -17,7 +17,7 @@ UNDER_WAY: Final = ("under_way", "waiting", "replanning")
 
 
 def inspection_of(status: m.EventStatus) -> m.Inspect:
-    """What a robot is told that is to look at an event."""
+    """Return the mission that sends a robot to look at an event."""
     return m.Inspect(status.event_id, status.kind, status.position)
 
 

@@ -89,7 +89,7 @@ class ConsoleRoom:
 
 
 def why(reply: m.Reply) -> str:
-    """Why a reply refuses, in words."""
+    """Return why a reply refuses, in words."""
     return reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
 
 
@@ -188,22 +188,22 @@ class ConsoleRooms:
     # --- what pages are told ----------------------------------------------------------------
 
     def label(self, client: str) -> str:
-        """What the person of a page is called; nothing if it has no control room."""
+        """Return the name of a page's person; empty without a control room."""
         room = self.by_client.get(client)
         return "" if room is None else room.device.label
 
     def decisions(self, number: int) -> int | None:
-        """How many decisions on an event there have been, as far as one knows here."""
+        """Return how many decisions on an event there have been, as far as is known here."""
         status = self.listener.events.get(number)
         return None if status is None else status.decisions
 
     def event_of(self, robot: str) -> m.EventStatus | None:
-        """How that stands which a robot was sent to, and is not over."""
+        """Return the open event that a robot was sent to."""
         every = self.listener.events.values()
         return next((e for e in every if e.closed_for is None and e.responder == robot), None)
 
     def line(self, now_ms: int) -> ControlLine:
-        """How orders are given, and who decides."""
+        """Return the dispatch mode, and who decides."""
         rooms: list[RoomEntry] = [
             {"label": room.device.label, "role": room.role, "client": client}
             for client, room in self.by_client.items()

@@ -1,4 +1,4 @@
-"""What people ask for who play guards; all of it becomes messages of the guard's device."""
+"""Actions of people who play guards; each becomes messages of the guard's device."""
 
 from __future__ import annotations
 

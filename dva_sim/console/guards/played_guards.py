@@ -11,7 +11,7 @@ from dva_sim.simulation.full.run import Run
 
 
 class PlayedGuards:
-    """Who plays whom.
+    """Assignment of people to guards.
 
     Args:
         run: In which.

@@ -10,7 +10,7 @@ HERE = ("localhost", "127.0.0.1", "::1")
 
 
 def own_address(host: str) -> str:
-    """Where others find this machine, if it listens on all its addresses; else itself alone."""
+    """Return this machine's address for others, if it listens on all; else that one alone."""
     family, far, local = socket.AF_INET, "192.0.2.1", "127.0.0.1"  # RFC 5737: nobody has it
     if ":" in host:
         family, far, local = socket.AF_INET6, "2001:db8::1", "::1"  # RFC 3849: likewise

@@ -141,7 +141,7 @@ def hazard_marks() -> dict[str, dict[str, str]]:
 
 
 def contrast(one: str, other: str) -> float:
-    """How well one colour stands out from another, from 1 to 21 (WCAG 2.2, 1.4.3)."""
+    """Return the contrast of two colours, from 1 to 21 (WCAG 2.2, 1.4.3)."""
     dark, light = sorted((_luminance(one), _luminance(other)))
     return (light + 0.05) / (dark + 0.05)
 
@@ -153,7 +153,7 @@ def _luminance(colour: str) -> float:
 
 
 def css() -> str:
-    """As custom properties; the system's wish holds until somebody chooses."""
+    """Return the palette as custom properties; the system's theme holds until somebody chooses."""
     light, dark = (_properties(palette) for palette in palettes())
     return (
         "/* Written by dva_sim/console/pages/palette.py. */\n"
@@ -169,7 +169,7 @@ def _properties(palette: Palette) -> str:
 
 
 def javascript() -> str:
-    """The same for canvases."""
+    """Return the palette for canvases."""
     parts = dict(zip(("LIGHT", "DARK"), palettes(), strict=True)) | {"HAZARDS": hazard_marks()}
     head = "// Written by dva_sim/console/pages/palette.py.\n"
     return head + "".join(

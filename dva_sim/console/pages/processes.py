@@ -37,7 +37,7 @@ Say = Callable[[str], object]
 
 
 class ConsoleSubject(Protocol):
-    """What a console shows.
+    """Interface of what a console shows.
 
     Attributes:
         clock: Its time, at its pace.
@@ -207,7 +207,7 @@ class ConsoleProcesses:
             self._say(f"Each phone must trust this computer once: {trust}trust says how.")
 
     def _open_browser(self, address: str) -> None:
-        """Where there is one; never where nobody could see it."""
+        """Open the browser, where there is one that somebody could see."""
         hidden = any(os.environ.get(name) for name in BROWSERLESS)
         seen = sys.platform in ("darwin", "win32") or any(map(os.environ.get, NO_DISPLAY))
         if self._options.open and seen and not hidden:

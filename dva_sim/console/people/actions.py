@@ -111,7 +111,7 @@ class Actions:
         person.take(robots, answered)
 
     def _holders(self, robots: list[str], person: PersonAgent) -> str:
-        """Which other pages hold some of these robots, and how to get them; empty: none does."""
+        """Describe which other pages hold some of these robots, and how to get them; or empty."""
         by_page = {
             robot: self._world.client_of.get(number)
             for number, other in self._world.numbered_persons()
@@ -178,7 +178,7 @@ class Actions:
     # --- drives ----------------------------------------------------------------------------
 
     def _why_not(self) -> str:
-        """Why nobody may drive now; empty: one may."""
+        """Return why nobody may drive now; empty if one may."""
         if self._world.lag.held:
             return "held: this machine cannot keep up with real time"
         return "The simulation is paused. Resume it first." if self._world.clock.paused else ""
@@ -285,7 +285,7 @@ class Actions:
 
     @does("decline")
     def _decline(self, client: str, _: Asked, said: Said) -> None:
-        """Of the own seat, or of one in which nobody sits."""
+        """Decline the order of one's own seat, or of a seat in which nobody sits."""
         if client in self._seats.taken:
             self._person(client).decline(said)
             return

@@ -1,4 +1,4 @@
-"""What people with phones ask for: to be registered, a robot, a calibration, and where they tilt.
+"""Actions of people with phones: registration, a robot, calibration, and tilt samples.
 
 A phone is there from the first word of its page until that is gone for good. One phone holds one
 robot. What ends a drive ends it at once, and for good.
@@ -48,12 +48,12 @@ class PhoneActions:
         self._phones = world.phones
 
     def sits(self, client: str) -> bool:
-        """Whether a page has the seat of a phone, and none of the console."""
+        """Return True if a page has the seat of a phone, and none of the console."""
         phone = self._phones.by_client.get(client)
         return phone is not None and phone.person is not None
 
     def is_tilted(self, client: str) -> bool:
-        """Whether a page is that of a phone that is steered by tilt now."""
+        """Return True for the page of a phone that is steered by tilt now."""
         phone = self._phones.by_client.get(client)
         return phone is not None and phone.tilts
 

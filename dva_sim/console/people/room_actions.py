@@ -1,4 +1,4 @@
-"""What control rooms are asked for at pages: each becomes messages of the person's own device."""
+"""Actions of control rooms at pages: each becomes messages of the person's own device."""
 
 from __future__ import annotations
 

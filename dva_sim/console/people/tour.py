@@ -85,7 +85,7 @@ def _ahead(robot: RobotAgent, way: FreeWay) -> tuple[float, float]:
 
 
 def _free(site: Site, robot: RobotAgent, side: float, room: float) -> float:
-    """How far a robot gets on a straight line to a side [m]."""
+    """Return how far a robot gets on a straight line to a side [m]."""
     way = 0.0
     while way + STEP <= FAR + 1e-9:
         x, y = _ahead(robot, FreeWay(way + STEP, side))

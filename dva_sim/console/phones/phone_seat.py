@@ -93,7 +93,7 @@ class PhoneSeat:
 
     @property
     def tilts(self) -> bool:
-        """Whether it is steered by tilt, and not by a stick on its screen."""
+        """True if it is steered by tilt, and not by a stick on its screen."""
         return self.tilt.is_tilted
 
     # --- what it is told ---------------------------------------------------------------------
@@ -109,7 +109,7 @@ class PhoneSeat:
         self._show_anew()
 
     def new_tilt(self) -> TiltSources:
-        """What makes the commands of the next drive."""
+        """Return what makes the commands of the next drive."""
         settings = self.settings
         reference = to_tilt_axes(settings.reference, self.orientation, settings.ios)
         period = 1.0 / (self.rate_hz or USUAL_HZ)
@@ -223,7 +223,7 @@ class PhoneSeat:
         }
 
     def identity(self) -> PhoneIdentityShown:
-        """Who it is on the wire."""
+        """Return its identity on the wire."""
         device = None if self.person is None else self.person.device
         return {
             "id": "" if device is None else device.id_tag,

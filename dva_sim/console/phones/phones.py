@@ -72,7 +72,7 @@ class Phones:
         return self.by_client[client]
 
     def profile(self, settings: PhoneSettings) -> PhoneProfile:
-        """What a phone is that is calibrated so.
+        """Return the profile of a phone with this calibration.
 
         Raises:
             ConfigError: no phone could work so.
@@ -81,7 +81,7 @@ class Phones:
         return phone_profile(self._run.scenario.model_copy(update={"phone": phone}))
 
     def offer(self) -> PhoneOffer:
-        """What a phone's page may choose from."""
+        """Return the choices of a phone's page."""
         default = self.profile(PhoneSettings())
         return {
             "pipelines": {

@@ -21,7 +21,7 @@ Say = Callable[[str], object]
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayOptions(PageOptions):
-    """What to play, and where it is to be seen.
+    """What to play, and where to show it.
 
     Attributes:
         file: A recording, or the lines of a run that was killed; None: those of `results`.
@@ -32,7 +32,7 @@ class ReplayOptions(PageOptions):
     results: Path | None = None
 
     def player(self) -> Player:
-        """What plays it.
+        """Return the player.
 
         Raises:
             DvaSimError: there is no such recording, or none at all.

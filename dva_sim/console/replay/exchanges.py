@@ -59,7 +59,7 @@ class ExchangeLog:
             asked[sent.source, number[1]] = line
 
     def until(self, now: float) -> int:
-        """How many there were up to a moment [s]."""
+        """Return how many there were up to a moment [s]."""
         return bisect_right(self._times, now)
 
     def batches(self, name: str, told: int, end: int) -> list[ExchangesLine]:

@@ -24,7 +24,7 @@ _STEPS = (
 
 
 class RecordedTracks:
-    """Where everybody was.
+    """Tracks of everybody.
 
     Args:
         tracks: By label, in order of time.
@@ -72,7 +72,7 @@ def event_at(event: Event, now: float) -> Event | None:
 
 
 def decided_on(facts: Sequence[Fact], number: int, now: float) -> EventDecisions:
-    """What people and the policy had decided on an event by then, where that was recorded."""
+    """Return the decisions on an event by then, where they were recorded."""
     past = [f for f in facts if f.event == number and f.time <= now + ROUNDED and f.code == m.OK]
     seen = next((f for f in past if f.action == "acknowledge"), None)
     last = past[-1] if past else None
@@ -95,7 +95,7 @@ def decided_on(facts: Sequence[Fact], number: int, now: float) -> EventDecisions
 
 
 def _between(before: TrackPoint, after: TrackPoint, now: float) -> tuple[TrackPoint, float]:
-    """Where somebody was between two points of a track, and how fast [m/s]."""
+    """Interpolate between two points of a track: position, and speed [m/s]."""
     period = after.time - before.time
     share = 0.0 if period <= 0.0 else (now - before.time) / period
     x = before.x + share * (after.x - before.x)
@@ -122,6 +122,6 @@ def commands_hz(drive: DriveLog, now: float) -> float:
 
 
 def captured_at(drive: DriveLog, now: float) -> float | None:
-    """When the picture was taken that was on the operator's screen [s]; None before the first."""
+    """Return when the operator's picture was taken [s]; None before the first."""
     index = bisect_right(drive.frames, now, key=lambda frame: frame.time)
     return drive.frames[index - 1].captured if index else None

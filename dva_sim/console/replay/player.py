@@ -119,7 +119,7 @@ class Player:
             self._site = None
 
     def _site_files(self, run: RecordedRun) -> Path:
-        """Where the site of a recording lies as files, as long as it is played."""
+        """Return where the site of a recording lies as files, while it is played."""
         if self._site is not None:
             self._site.cleanup()
         self._site = TemporaryDirectory(prefix="dva-sim-")
@@ -199,7 +199,7 @@ class Player:
                 self.show(frame, frame["robot"])
 
     def _tell_logs(self) -> None:
-        """What was asked and answered since the last time; after a jump, all of it anew."""
+        """Tell the messages since the last time; after a jump, all of them again."""
         run, now = self.run, self.now
         for name, told in self._told.items() if run is not None else ():
             log, anew = self._log(name), told < 0

@@ -1,4 +1,4 @@
-"""What pages are told of a recorded run at any moment of it, in the lines of a world that runs.
+"""Recorded run at any moment, in the lines of a running world.
 
 What a recording does not hold, such as the charge of a battery, is not guessed: it is null.
 """
@@ -99,7 +99,7 @@ class RecordedRun:
                 self.things.add(id_tag, label, kind if kind in ("dva", "operator") else "device")
 
     def _limits(self) -> list[tuple[float, float]]:
-        """Of the robots, if their profiles are still to be found; no code is loaded for it."""
+        """Return the robots' limits, if their profiles can still be found; loads no code for it."""
         try:
             found = robot_profiles(self.playback.scenario)
         except DvaSimError:
@@ -108,7 +108,7 @@ class RecordedRun:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether cameras can be drawn: not if a hazard's class is the user's own."""
+        """True if cameras can be drawn: not if a hazard's class is the user's own."""
         own = (isinstance(i.hazard, RecordedHazard) for i in self.playback.incidents)
         return bool(self.playback.radii) and not any(own)
 
@@ -151,7 +151,7 @@ class RecordedRun:
     # --- a moment --------------------------------------------------------------------------
 
     def positions(self, now: float) -> PlacesLine:
-        """Where everybody is."""
+        """Return the positions of everybody."""
         rows = [
             [
                 self.numbers[label],
@@ -195,7 +195,7 @@ class RecordedRun:
         }
 
     def window(self, id_tag: str, now: float) -> RobotWindowLine:
-        """What the windows of a robot show."""
+        """Return the contents of a robot's windows."""
         if id_tag not in self._windows:
             playback = self.playback
             self._windows[id_tag] = RobotLines(
@@ -221,7 +221,7 @@ class RecordedRun:
         return None
 
     def people(self, now: float) -> list[DoingShown]:
-        """What those on foot are doing."""
+        """Return the activities of people on foot."""
         radii = {self.playback.labels[robot] for robot in self.playback.radii}
         return [
             {"i": self.numbers[label], "doing": at.mode}
@@ -240,11 +240,11 @@ class RecordedRun:
         return {"k": "devices", "t": _ms(now), "devices": rows}
 
     def hazards(self, now: float) -> HazardsLine:
-        """Where hazards are, and what they make of air and floor."""
+        """Return where hazards are, and their effect on air and floor."""
         return self._hazards.line(_ms(now))
 
     def events(self, now: float) -> EventsLine:
-        """How the events stand."""
+        """Return the states of the events."""
         playback = self.playback
         site, labels = playback.site, playback.labels
         known = (event_at(event, now) for event in self.playback.events)
@@ -259,7 +259,7 @@ class RecordedRun:
         return {"k": "events", "t": _ms(now), "events": lines}
 
     def story(self, now: float) -> ToldLine:
-        """What was told up to a moment."""
+        """Return the story up to a moment."""
         end = bisect_right(self._moments, now + ROUNDED)
         told = self.playback.recorder.timeline[max(0, end - STORY_KEPT) : end]
         return {"k": "told", "t": _ms(now), "lines": [moment_shown(moment) for moment in told]}
@@ -267,7 +267,7 @@ class RecordedRun:
     # --- pictures --------------------------------------------------------------------------
 
     def frame(self, robot: str, number: int, now: float) -> FrameLine | None:
-        """What a robot's operator saw at a moment, or if nobody drove it what its camera showed.
+        """Return what a robot's operator saw at a moment, or if nobody drove, what its camera saw.
 
         The picture is drawn from where everybody was when it was taken.
         """

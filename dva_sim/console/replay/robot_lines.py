@@ -1,4 +1,4 @@
-"""What the windows of a robot show of a recorded moment; what a recording does not hold is open."""
+"""Windows of a robot at a recorded moment; what a recording does not hold stays open."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _NO_FAULTS: FaultsShown = {
 
 
 def about(radius: float) -> ThingBody:
-    """What the pictures of a robot are drawn by, as far as a recording tells: its radius [m]."""
+    """Return what a robot's pictures are drawn by, as far as known: its radius [m]."""
     return {
         "radius_m": radius,
         "wheel_radius_m": round(WHEEL * radius, 3),
@@ -102,7 +102,7 @@ class RobotLines:
         return {"at_ms": round(1000 * past[-1][0]), "by": past[-1][1]} if past else None
 
     def _one_way(self, now: float) -> LatencyFigures | None:
-        """How long commands were under way, of the newest that had taken effect by then."""
+        """Return the one-way delays of the newest commands that had taken effect by then."""
         end = bisect_right(self._applied, now, key=lambda one: one.time)
         figures = Latencies()
         for one in self._applied[max(0, end - KEPT) : end]:

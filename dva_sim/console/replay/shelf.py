@@ -74,7 +74,7 @@ class Shelf:
         return self._kept[name].path
 
     def line(self) -> ShelfLine:
-        """What pages show of it."""
+        """Return what pages show of it."""
         measures = [measure_called(name) for name in self._measures]
         return {
             "k": "shelf",
@@ -128,7 +128,7 @@ def _worst_first(answer: str, row: Row | None) -> float:
 
 
 def _plain(value: Any) -> Any:
-    """As JSON has it: what never came is null."""
+    """Convert a value for JSON: missing becomes null."""
     if isinstance(value, float):
         return round(value, 3) if math.isfinite(value) else None
     return value if value is None or isinstance(value, bool | int | str) else str(value)

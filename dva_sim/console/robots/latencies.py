@@ -1,4 +1,4 @@
-"""How late messages are: the last one, the median, what 95 of 100 stay below, and the largest."""
+"""Latencies of messages: the last, the median, the 95th percentile, and the largest."""
 
 from __future__ import annotations
 

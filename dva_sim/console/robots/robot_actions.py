@@ -1,4 +1,4 @@
-"""What people at a robot's windows do: drive it by hand, and let things go wrong with it.
+"""Actions at a robot's windows: driving it by hand, and injecting faults.
 
 The page only says what it wants, again and again while something is held; the robot's controller
 decides. Whoever falls silent, hides the page or leaves it, asks for standstill by that.
@@ -136,7 +136,7 @@ class RobotActions:
             self._drive(client, hand, 0.0, 0.0)
 
     def look_for_the_silent(self) -> None:
-        """Who held on and says nothing any more wants to stand."""
+        """Stop the robot of a page that held it and has fallen silent."""
         now = time.monotonic()
         for client, hand in list(self._hands.items()):
             if hand.holds and now - hand.heard > SILENT_AFTER:

@@ -1,4 +1,4 @@
-"""What the windows of a robot show: how it moves, who has it in hand, how late messages reach it.
+"""Windows of a robot: its motion, its driver, and the latency of its messages.
 
 A robot's own clock tells how old the picture was behind a command (`SeenTick`): from the robot to
 its driver and back. How long a message took one way is known where whoever sent it is a device of
@@ -31,7 +31,7 @@ SENSING = 1.0  # from one look at the sensors to the next [s]
 
 
 class RobotStation(Protocol):
-    """How far a robot has come: off, registered, listening."""
+    """Station of a robot: off, registered, listening."""
 
     def line(self) -> StationShown:
         """State, the address at which it listens, and that of the DVA."""
@@ -56,7 +56,7 @@ class AlwaysListening:
 
 @dataclass
 class RobotWindow:
-    """What is known of one robot for its windows.
+    """Facts about one robot for its windows.
 
     Attributes:
         robot: The robot.
@@ -133,7 +133,7 @@ class RobotWindows:
         }
 
     def about(self, id_tag: str) -> ThingBody:
-        """What does not change of a robot, for the scene: what its pictures are drawn by."""
+        """Return what does not change of a robot, for the scene: what its pictures are drawn by."""
         spec, motors = self.by_id[id_tag].robot.body.spec, self.by_id[id_tag].robot.body.motors
         return {
             "wheel_radius_m": round(WHEEL * spec.radius, 3),
@@ -172,7 +172,7 @@ class RobotWindows:
                 window.loop.add(age / 1000)
 
     def look(self) -> None:
-        """What has ended by itself since the last look is told."""
+        """Look for what has ended by itself since the last look."""
         for window in self.by_id.values():
             controller = window.robot.controller
             if controller.mode is not Mode.IDLE or controller.by_hand is not None:
@@ -243,7 +243,7 @@ class RobotWindows:
 
     @staticmethod
     def _mode(window: RobotWindow) -> str:
-        """What it does, as its page names it: an emergency until somebody orders it again."""
+        """Return its mode, as its page names it: an emergency until somebody orders it again."""
         controller = window.robot.controller
         if controller.by_hand is not None:
             return "Manual"

@@ -1,4 +1,4 @@
-"""Why a robot stands, in words for whoever wonders at the page."""
+"""Reasons why a robot stands, in words for the page."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ LAG = "held: this machine cannot keep up with real time"
 
 
 def why_stands(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
-    """Why a robot stands; nothing if it moves.
+    """Return why a robot stands; empty if it moves.
 
     Args:
         robot: Which.

@@ -1,4 +1,4 @@
-"""When robots are held because the machine cannot keep up: pure, told what was measured."""
+"""Lag rule: robots are held while the machine cannot keep up. Pure, fed with measurements."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ GOOD_FOR = 1.0  # below the limit for so long, driving may begin again [s]
 
 
 class LagRule:
-    """Whether a world is too far behind for anybody to drive in it.
+    """Decide whether a world is too far behind for anybody to drive in it.
 
     Attributes:
         held: Whether it is now.

@@ -1,4 +1,4 @@
-"""What a console needs of whatever runs: a whole run, or one robot alone."""
+"""Interface of whatever a console runs: a whole run, or one robot alone."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from dva_sim.simulation.scenario import Scenario
 
 
 class PlayedRun(Protocol):
-    """What runs before people's eyes."""
+    """Run that is shown to people."""
 
     @property
     def scenario(self) -> Scenario:
-        """What it consists of."""
+        """Scenario of the run."""
 
     @property
     def clock(self) -> Clock:
@@ -31,11 +31,11 @@ class PlayedRun(Protocol):
 
     @property
     def network(self) -> Transport:
-        """What carries its messages."""
+        """Transport of its messages."""
 
     @property
     def stage(self) -> Stage:
-        """Where it takes place."""
+        """Stage on which it takes place."""
 
     @property
     def field(self) -> Field:

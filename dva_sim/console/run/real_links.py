@@ -40,7 +40,7 @@ MakeSockets = Callable[[Scenario, PacedClock, ConsoleRecorder], "ConsoleSockets"
 
 
 def start_of_day(clock: Clock) -> tuple[float, bool]:
-    """When a clock was at zero, by the clock on the wall [s since midnight]; exactly."""
+    """Return when a clock was at zero, by the wall clock [s since midnight]; if exactly."""
     started = time.time() - clock.now
     local = time.localtime(started)
     return local.tm_hour * 3600 + local.tm_min * 60 + local.tm_sec + started % 1.0, True
@@ -138,7 +138,7 @@ class ConsoleSockets:
 
     @property
     def has_lost_link(self) -> bool:
-        """Whether the emulated link has ended by itself."""
+        """True if the emulated link has ended by itself."""
         return self.crossing is not None and self.crossing.link.has_ended
 
     def _look_at_link(self) -> bool:

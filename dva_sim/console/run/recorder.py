@@ -1,4 +1,4 @@
-"""What a console remembers of its run: little, and all of it in a file where one is wanted."""
+"""Memory of a console's run: little, and all of it in a file where one is wanted."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class ConsoleRecorder(Recorder):
             self.kept.message(source, payload, sent=True)
 
     def sent_at(self, payload: bytes) -> float | None:
-        """When a message to a robot was sent [s]; asked once. None: by nobody of this process."""
+        """Return when a message to a robot was sent [s], once; None if not by this process."""
         return self._sent.pop(payload, None)
 
     def message_taken(self, node: str, payload: bytes) -> None:

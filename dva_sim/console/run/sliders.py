@@ -17,7 +17,7 @@ from dva_sim.simulation.scenario import Scenario, mean_processing_s
 
 
 class LinkSliders:
-    """What the link of all robots is like, and how it is changed while it carries.
+    """Link of all robots, which can be changed while it carries messages.
 
     Args:
         run: Whose.
@@ -36,7 +36,7 @@ class LinkSliders:
         self._wanted: dict[str, float] = {}
 
     def line(self) -> LinkShown:
-        """What it is like, for pages."""
+        """Return its settings for pages."""
         link, run = self.link, self._run
         processing = self._wanted.get("processing_s", mean_processing_s(run.scenario))
         if run.is_real:

@@ -1,4 +1,4 @@
-"""What pages of a robot that runs alone ask for: each action is done once, and answered once."""
+"""Actions at the page of a robot that runs alone: each is done once, and answered once."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ Say = Callable[[str], object]
 
 @dataclass(frozen=True, kw_only=True)
 class RobotOptions(PageOptions):
-    """Which robot, where it listens, and where it is registered.
+    """Options of a single robot: its profile, its port, and its DVA.
 
     Attributes:
         profile: By name or path.
@@ -57,7 +57,7 @@ class RobotOptions(PageOptions):
     changes: tuple[str, ...] = ()
 
     def read(self) -> Scenario:
-        """What the robot stands in: a site in which nothing else happens.
+        """Return the robot's world: a site in which nothing else happens.
 
         Raises:
             ConfigError: there is no such profile or site, or the address of the DVA is none.

@@ -105,7 +105,7 @@ class RobotWorld:
 
     @property
     def network(self) -> RealNetwork:
-        """What carries its messages."""
+        """Transport of its messages."""
         return self.sockets.network
 
     @property
@@ -213,7 +213,7 @@ class RobotWorld:
     # --- what is told ----------------------------------------------------------------------
 
     def tell_now(self) -> None:
-        """How the robot is."""
+        """Tell the state of the robot."""
         self.lag.measured(time.monotonic(), self.clock.worst_lag())
         self.tell(
             {

@@ -1,1 +1,1 @@
-"""What pages are shown of whatever runs: places, hazards, robots, logs."""
+"""Views of whatever runs, for pages: positions, hazards, robots, logs."""

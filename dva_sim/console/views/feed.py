@@ -1,4 +1,4 @@
-"""What a page is told of a running world: who is where, how robots and events stand."""
+"""Feed of a running world for pages: positions, and states of robots and events."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Feed:
     # --- where everybody is ----------------------------------------------------------------
 
     def positions(self) -> PlacesLine:
-        """Who has a place; who has left the site has none."""
+        """Return the positions of everybody on the site."""
         field = self._run.field
         field.world.advance_to(self._run.clock.now)
         rows = []
@@ -137,7 +137,7 @@ class Feed:
         return self._run.stage.pattern_names.get(robot, self._run.scenario.pattern)
 
     def people(self) -> list[DoingShown]:
-        """What those on foot are doing."""
+        """Return the activities of people on foot."""
         return [
             {"i": self.numbers[name], "doing": who.activity}
             for name, who in self._run.field.people()
@@ -155,12 +155,12 @@ class Feed:
         ]
 
     def story(self) -> Iterator[StoryLine]:
-        """What was told since the last time; it is forgotten then."""
+        """Yield the story since the last call; it is forgotten then."""
         return story_of(self._run.recorder)
 
 
 def story_of(recorder: Recorder) -> Iterator[StoryLine]:
-    """What a recorder was told since the last time; it is forgotten then."""
+    """Yield what a recorder was told since the last call; it is forgotten then."""
     moments, recorder.timeline = recorder.timeline, list[Moment]()
     for moment in moments:
         yield {"k": "story", **moment_shown(moment)}
@@ -173,7 +173,7 @@ def moment_shown(moment: Moment) -> Happened:
 
 
 def event_facts(event: Event, site: Site, labels: Mapping[str, str]) -> EventFacts:
-    """How an event stands; labels by id."""
+    """Return the state of an event; labels by id."""
     where = event.position
     x, y = site.frame.to_xy(where.latitude, where.longitude)
     return {
@@ -195,6 +195,6 @@ def event_facts(event: Event, site: Site, labels: Mapping[str, str]) -> EventFac
 
 
 def _sent(event: Event) -> Iterator[str]:
-    """Who is at an event now."""
+    """Yield the devices at an event now."""
     if event.state not in FINAL:
         yield from (n for n in (event.responder, event.operator, event.actor) if n is not None)

@@ -21,7 +21,7 @@ FULL = {"smoke": 3.0, "gas": 0.1, "water": 0.2, "heat": 10.0}  # what 255 means;
 
 
 class HazardFeed:
-    """Where hazards are and how far they reach.
+    """Positions and extents of hazards.
 
     Args:
         site: Where.
@@ -48,7 +48,7 @@ class HazardFeed:
         self._next = 0.0
 
     def line(self, now_ms: int) -> HazardsLine:
-        """Where they are now."""
+        """Return the hazards as they are now."""
         now, hazards = now_ms / 1000.0, list[HazardShown]()
         for number, incident in enumerate(self._incidents):
             if not incident.is_there(now):

@@ -30,7 +30,7 @@ CUT: Final = MAX_BYTES + 1  # enough of a message to show that it is too long [B
 
 
 class MessageLog:
-    """What one device was asked and answered since the web was told last.
+    """Exchanges of one device since the web process was told last.
 
     Args:
         name: Label of the device.
@@ -52,7 +52,7 @@ class MessageLog:
         self._told = self._total = 0
 
     def look(self, looks: bool, publications: bool) -> None:
-        """Whether somebody looks, and wants publications, too."""
+        """Set whether somebody looks, and wants publications as well."""
         taps = self._transport.taps
         self._tap.publications = publications or self.wants_all
         if looks or self.kept or self.listeners:
@@ -62,7 +62,7 @@ class MessageLog:
             self._waiting.clear()
 
     def batch(self) -> ExchangesLine | None:
-        """What is new, the newest where that is too much; None if there is nothing."""
+        """Return what is new, the newest where that is too much; None if there is nothing."""
         if not self._waiting:
             return None
         lines: list[list[Any]] = []
@@ -134,7 +134,7 @@ class Logs:
             self._apply(log)
 
     def batches(self) -> list[ExchangesLine]:
-        """What there is to be told now."""
+        """Return what is to be told now."""
         found = (log.batch() for log in self._logs.values())
         return [line for line in found if line is not None]
 

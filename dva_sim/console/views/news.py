@@ -1,4 +1,4 @@
-"""What is told of whatever runs, only when something in it has changed."""
+"""Updates of whatever runs, sent only when something in them has changed."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class News:
 
 
 def clock_shown(clock: PacedClock, lag: LagRule) -> ClockShown:
-    """How time goes by."""
+    """Return the state of the clock."""
     return {
         "factor": clock.factor,
         "paused": clock.paused,

@@ -1,4 +1,4 @@
-"""What does not change while a console runs: the site, who there is, what the colours mean."""
+"""Scene of a console, which does not change: the site, its agents, and the colours' meaning."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def site_of(site: Site) -> SiteShown:
 
 
 def raster_of(site: Site) -> RasterShown:
-    """Which cells of a bare map are taken, one bit each, row 0 to the south."""
+    """Return which cells of a bare map are occupied, one bit each, row 0 to the south."""
     grid = site.grid
     taken = grid.cells == OCCUPIED
     west, south = grid.to_xy(0, 0).tolist()
@@ -165,7 +165,7 @@ def _to_degrees(site: Site, shape: Any) -> dict[str, Any]:
 
 
 def legend(incidents: Sequence[RunHazard]) -> list[LegendEntry]:
-    """What the colours and marks of a map mean."""
+    """Return the meaning of the colours and marks of a map."""
     kinds: list[LegendEntry] = [
         {"kind": kind, "mode": mode, "colour": colour}
         for kind, modes in (

@@ -54,7 +54,7 @@ class Strangers:
         self._known: dict[str, str] = {}  # kinds, by id
 
     def come(self) -> bool:
-        """Whether somebody has come since the last time; each has a number from then on."""
+        """Return True if a device is new since the last call; each has a number from then on."""
         registry = self._run.dva.desk.registry
         if registry.version == self._version:
             return False
@@ -76,7 +76,7 @@ class Strangers:
         self._feed.things.add_stranger(device.id_tag, label, self._known[device.id_tag], body)
 
     def positions(self) -> list[list[int]]:
-        """Of those who have said where they are."""
+        """Return the positions of devices that have reported one."""
         frame, rows = self._run.stage.site.frame, []
         for id_tag, entry in self._here():
             if entry.position is not None:

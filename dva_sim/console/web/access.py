@@ -1,4 +1,4 @@
-"""Who may do what: names under which the console answers, pages that may ask, tokens and roles.
+"""Access control: host names, origins, tokens and roles.
 
 Three questions for each request, before anything else looks at it. Does it ask for this console
 by one of its own names (else another site's name leads here: DNS rebinding)? Does it come from a
@@ -49,7 +49,7 @@ class Tokens:
 
     @property
     def are_asked(self) -> bool:
-        """Whether anybody has to show one."""
+        """True if a token is required."""
         return bool(self.drive)
 
     def role_of(self, shown: str) -> Role:
@@ -71,7 +71,7 @@ class Tokens:
 
 @dataclass(frozen=True)
 class Asked:
-    """What of a request says who asks, and for what.
+    """Facts of a request that identify its sender and purpose.
 
     Attributes:
         host: The `Host` header.
@@ -125,14 +125,14 @@ class Entrance:
         return None
 
     def is_own(self, host: str) -> bool:
-        """Whether a `Host` header names this console."""
+        """Return True if a `Host` header names this console."""
         name = name_in(host)
         if name is None:
             return False
         return name in self.names or (self.any_address and is_address(name))
 
     def _is_own_page(self, asked: Asked) -> bool:
-        """Whether the page that asks has the same scheme, name and port as what it asks for."""
+        """Return True if the requesting page has the same scheme, name and port as its target."""
         return (asked.origin or "").lower() == f"{asked.scheme}://{asked.host}".lower()
 
     def role(self, headers: Mapping[str, str], query: Mapping[str, str]) -> Role:
@@ -194,7 +194,7 @@ def name_in(host: str) -> str | None:
 
 
 def is_address(name: str) -> bool:
-    """Whether a name is an IP address."""
+    """Return True if a name is an IP address."""
     try:
         ipaddress.ip_address(name.strip("[]"))
     except ValueError:

@@ -1,4 +1,4 @@
-"""What clients may ask for, read with suspicion: known actions, and who may ask for them."""
+"""Validation of clients' requests: known actions, and the roles that may request them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _no_number(word: str) -> float:
 
 
 def check_role(role: Role, name: Any) -> None:
-    """Whether somebody may ask for an action at all.
+    """Check that a role may request an action at all.
 
     Raises:
         NotAllowed: not by this address.
@@ -59,7 +59,7 @@ def plain(name: str) -> str:
 
 
 def asked_of(name: Any, given: Any, labels: Labels, silent: bool = False) -> dict[str, Any]:
-    """What the simulation is asked for.
+    """Return the validated request for the simulation.
 
     Args:
         name: Of the action.
@@ -97,7 +97,7 @@ def is_id(value: Any) -> TypeGuard[str]:
 
 
 class Bucket:
-    """How often a client may say something.
+    """Rate limit of a client's messages.
 
     Args:
         rate: On average [1/s].
@@ -109,7 +109,7 @@ class Bucket:
         self._room, self._then = float(burst), 0.0
 
     def takes(self, now: float) -> bool:
-        """Whether another message at `now` [s] is within bounds."""
+        """Return True if another message at `now` [s] is within the limit."""
         self._room = min(self._burst, self._room + (now - self._then) * self._rate)
         self._then = now
         self._room -= 1.0

@@ -1,4 +1,4 @@
-"""What is answered under which address, and what stands before all of it: access, and headers."""
+"""Routes of the console, and what guards all of them: access control and headers."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ MOST_ROWS = 1000  # in one answer
 
 
 class AuditPages:
-    """What is answered of the audit log.
+    """Requests about the audit log.
 
     Args:
         path: Of its file; None: there is none.

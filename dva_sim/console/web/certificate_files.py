@@ -1,4 +1,4 @@
-"""Where the certificates are kept: in the user's data folder, for nobody else's eyes."""
+"""Certificate files: in the user's data folder, unreadable for others."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ AUTHORITY, LEAF = "authority.pem", "console.pem"
 
 
 class KeptCertificates(NamedTuple):
-    """What is served with.
+    """Certificates in use.
 
     Attributes:
         authority: What a phone is asked to trust.
@@ -88,7 +88,7 @@ def _private(folder: Path) -> None:
 
 
 def _read(path: Path, told: list[str]) -> Signed | None:
-    """What a file holds; None if there is none, or nothing of sense in it."""
+    """Read a file; None if there is none, or no valid contents."""
     try:
         data = path.read_bytes()
         path.chmod(0o600)

@@ -59,7 +59,7 @@ class Hosts:
         return cls(frozenset(names), frozenset(addresses))
 
     def alternatives(self) -> x509.SubjectAlternativeName:
-        """As a certificate lists them."""
+        """Return the names as a certificate lists them."""
         names = [x509.DNSName(name) for name in sorted(self.names)]
         return x509.SubjectAlternativeName(
             [*names, *(x509.IPAddress(one) for one in sorted(self.addresses, key=str))]
@@ -99,7 +99,7 @@ class Signed:
         return self.certificate.public_bytes(Encoding.DER)
 
     def ends_before(self, moment: datetime) -> bool:
-        """Whether it is not valid up to a moment."""
+        """Return True if it is not valid until a moment."""
         return self.certificate.not_valid_after_utc < moment
 
 
@@ -154,7 +154,7 @@ def new_leaf(authority: Signed, hosts: Hosts, now: datetime) -> Signed:
 
 
 def authority_fault(authority: Signed, hosts: Hosts, now: datetime) -> str:
-    """Why an authority cannot sign for these hosts any more; empty if it can."""
+    """Return why an authority can no longer sign for these hosts; empty if it can."""
     if authority.ends_before(now + timedelta(days=LEAF_DAYS)):
         return "it ends soon"
     try:
@@ -168,7 +168,7 @@ def authority_fault(authority: Signed, hosts: Hosts, now: datetime) -> str:
 
 
 def leaf_fault(leaf: Signed, authority: Signed, hosts: Hosts, now: datetime) -> str:
-    """Why a leaf does not serve any more; empty if it does."""
+    """Return why a leaf can no longer be used; empty if it can."""
     certificate = leaf.certificate
     if leaf.ends_before(now):
         return "it has expired"

@@ -1,4 +1,4 @@
-"""What one page gets next: never a queue, always the newest of what it does not have yet.
+"""Feed of one page: never a queue, always the newest of what it does not have yet.
 
 Positions merge (a page that slept gets all who moved meanwhile, once), other kinds are replaced by
 their newest line, the story is a bounded list: who is too far behind gets a snapshot instead. What
@@ -20,7 +20,7 @@ SOURCES: Sources = ("seat", "guard", "windows", "d", *LATEST, "story", "others",
 
 
 class PageFeed:
-    """What a page has, and so what it lacks.
+    """State of a page, and so what it lacks.
 
     Args:
         state: Of the run.
@@ -109,7 +109,7 @@ class PageFeed:
         return self._newer(source, self._state.latest.get(source))
 
     def _window(self) -> str | None:
-        """What is new of a robot that the page looks at; of another one it knows nothing."""
+        """Return news of the robot that the page looks at; it knows no other."""
         have = self._have_windows = {
             i: v for i, v in self._have_windows.items() if i in self.watches
         }

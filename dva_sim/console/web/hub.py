@@ -226,7 +226,7 @@ class Hub:
     # --- both ----------------------------------------------------------------------------
 
     async def _is_over(self, ws: WebSocket) -> bool:
-        """Whether the world has ended: who comes back then does not find it open once more."""
+        """Return True if the world has ended, so that a client that returns is not let in again."""
         if self.simulation.ended.is_set():
             await ws.send_denial_response(PlainTextResponse(self.simulation.why, 503))
             return True

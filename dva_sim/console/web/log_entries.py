@@ -56,7 +56,7 @@ class Entry:
 
     @classmethod
     def of(cls, line: list[Any]) -> Entry:
-        """What the simulation says of an exchange; see `dva_sim.console.views.logs`."""
+        """Build an entry from an exchange; see `dva_sim.console.views.logs`."""
         number, time, data, reply, took, published = line
         answer = None if reply is None else str(reply).encode("latin-1")
         entry = cls(number, time, str(data).encode("latin-1"), answer, took, bool(published))
@@ -85,7 +85,7 @@ class Entry:
                 self.code, self.text = answer.code, answer.text
 
     def brief(self, names: Names) -> LogEntry:
-        """What a table shows of it."""
+        """Return what a table shows of it."""
         header = self.header
         source, to = header.get("SourceID", ""), header.get("DestinationID", "")
         return {
@@ -112,7 +112,7 @@ _GROUPS: Final = frozenset({"Access", "Dispatch", "Event", "Mission", "Sensor", 
 
 
 def kind_of(data: bytes) -> str:
-    """What a message is, by its elements alone, so that a broken one has a kind, too.
+    """Return the kind of a message by its elements, so that a broken one has a kind as well.
 
     A message is named by the first element after its header, or by the one in that if it groups
     several kinds; without a payload it is called by its own element.
@@ -137,7 +137,7 @@ def header_of(data: bytes) -> dict[str, str]:
 
 
 def payload_of(body: Any) -> str:
-    """What a message says, in a few characters: the values of its fields."""
+    """Summarise a message in a few characters: the values of its fields."""
     names = getattr(body, "_fields", None) or [one.name for one in fields(body)]
     said = ", ".join(
         f"{name} {_value(getattr(body, name))}"

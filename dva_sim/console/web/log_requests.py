@@ -31,7 +31,7 @@ COLUMNS: Final = (
 
 
 class LogRequests:
-    """What is answered about logs.
+    """Requests about logs.
 
     Args:
         hub: Of the pages; knows the simulation.

@@ -39,7 +39,7 @@ MOST_NAMES: Final = 4096
 
 @dataclass(frozen=True)
 class LogFilter:
-    """What a page wants to see of a log.
+    """Filter of a page for a log.
 
     Attributes:
         device: Part of the id or the label of who asks or is asked.
@@ -59,7 +59,7 @@ class LogFilter:
 
     @classmethod
     def of(cls, given: Any) -> LogFilter:
-        """What a page says.
+        """Parse the filter of a page.
 
         Raises:
             BadMessage: it makes no sense.
@@ -76,7 +76,7 @@ class LogFilter:
         return cls(**words, publications=all_kinds, since=since)
 
     def takes(self, entry: Entry, names: Names) -> bool:
-        """Whether an entry is wanted."""
+        """Return True if an entry passes."""
         if entry.number <= self.since or (entry.published and not self.publications):
             return False
         if self.kind and entry.kind != self.kind:
@@ -123,7 +123,7 @@ class KeptLog:
         self._changes: deque[int] = deque(maxlen=KEPT)  # numbers
 
     def take(self, entries: Iterable[Entry]) -> None:
-        """What the simulation tells."""
+        """Take in entries from the simulation."""
         for entry in entries:
             known = self.entries.get(entry.number)
             if entry.number > self.newest:
@@ -150,7 +150,7 @@ class KeptLog:
             self.bytes -= self.entries.pop(oldest).size
 
     def since(self, change: int) -> Iterator[Entry]:
-        """What has changed since, the newest change first."""
+        """Yield what has changed since, the newest change first."""
         numbers = islice(reversed(self._changes), self.changed - change)
         return (entry for n in numbers if (entry := self.entries.get(n)) is not None)
 
@@ -203,7 +203,7 @@ class KeptLogs:
 
 
 class Looks:
-    """Which logs and tables a page looks at, and what it has seen of each log.
+    """Logs and tables that a page looks at, and what it has seen of each log.
 
     Args:
         logs: All there are.
@@ -236,7 +236,7 @@ class Looks:
         self.wanted, self.tables = wanted, frozenset(tables)
 
     def filter(self, given: Any) -> LogFilter:
-        """What a page says it wants to see; who may not act does not search whole messages.
+        """Set the page's filter; clients that may not act cannot search whole messages.
 
         Raises:
             BadMessage: it makes no sense.
@@ -245,7 +245,7 @@ class Looks:
         return wanted if self.acts else replace(wanted, text="")
 
     def next(self) -> LogLine | None:
-        """What the page gets next of the logs that it looks at; None if it has everything."""
+        """Return the next line of the logs that the page looks at; None if it has everything."""
         for name, wanted in self.wanted.items():
             log = self._logs.of(name)
             goes_on = name in self._seen and self._seen[name][2] == log.begun
@@ -256,7 +256,7 @@ class Looks:
         return None
 
     def brief(self, entry: Entry) -> LogEntry:
-        """What a page may see of an entry in a table."""
+        """Return what a page may see of an entry in a table."""
         brief = entry.brief(self._logs.names)
         return brief if self.acts else {**brief, "session": "", "payload": ""}
 

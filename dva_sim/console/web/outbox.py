@@ -1,4 +1,4 @@
-"""What clients ask of the simulation, on its way there: bounded, and the urgent first."""
+"""Outbox of requests to the simulation: bounded, and urgent ones first."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class OutgoingLines:
         return json.dumps(asked, separators=(",", ":")).encode() + b"\n"
 
     def _next_samples(self) -> Asked:
-        """Of each phone in turn."""
+        """Return the next samples, of each phone in turn."""
         client = next(iter(self._samples))
         waiting = self._samples.pop(client)
         asked = waiting.popleft()

@@ -26,7 +26,7 @@ UNGUARDED = (
 
 @dataclass(frozen=True)
 class PhoneDoor:
-    """Where phones come in.
+    """Entrance for phones.
 
     Attributes:
         address: With its token; for people who may drive alone.
@@ -47,7 +47,7 @@ class NoCertificate(DvaSimError):
 
 
 class PhonePages:
-    """What the console says of phones.
+    """Pages about phones.
 
     Args:
         door: Where they come in; None where there is no such way.

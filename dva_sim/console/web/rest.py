@@ -58,7 +58,7 @@ def state_of(state: RunState, clients: int) -> dict[str, Any]:
 
 
 def _place(state: RunState, index: int) -> dict[str, float]:
-    """Where somebody is; empty if off the site."""
+    """Return a position; empty if off the site."""
     row = state.places.get(index)
     if row is None:
         return {}
@@ -72,7 +72,7 @@ def _place(state: RunState, index: int) -> dict[str, float]:
 
 
 def frame_of(state: RunState) -> GeoFrame | None:
-    """Where on earth the site lies."""
+    """Return the geographic position of the site."""
     origin = (state.scene or {}).get("site", {}).get("origin")
     return GeoFrame(origin["latitude_deg"], origin["longitude_deg"]) if origin else None
 

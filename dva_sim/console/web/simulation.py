@@ -1,4 +1,4 @@
-"""What the web process knows of the simulation, and asks of it: state, and answers to come.
+"""Connection of the web process to the simulation: state, and pending answers.
 
 An answer belongs to the id of its question. A repeated question waits for the same answer; the
 simulation does once what is asked.
@@ -61,7 +61,7 @@ class Simulation:
 
     @property
     def runs(self) -> bool:
-        """Whether the simulation is there and, once it has begun, still speaks."""
+        """True if the simulation is there and, once it has begun, still sends."""
         speaks = self.state.scene is None or self._clock() - self._heard < SILENCE
         is_open = self._pipe is not None and self._pipe.is_open
         return is_open and speaks and not self.ended.is_set()

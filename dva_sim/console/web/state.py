@@ -46,7 +46,7 @@ def body_of(line: Mapping[str, Any]) -> str:
 
 
 class RunState:
-    """What is known of a run.
+    """State of a run.
 
     Attributes:
         version: Counts changes.
@@ -149,19 +149,19 @@ class RunState:
         self.guards[seat] = Versioned(self.version, body_of(line))
 
     def forget_seat(self, seat: str) -> None:
-        """Whoever had it is gone for good."""
+        """Forget a seat whose client is gone for good."""
         self.guards.pop(seat, None)
         self.seats.pop(seat, None)
         self.seats_short.pop(seat, None)
 
     def seats_known(self) -> list[Line]:
-        """What everybody may know of all seats."""
+        """Return the public part of all seats."""
         return [json.loads("{" + seat.body) for seat in self.seats_short.values()]
 
     # --- what a page gets ----------------------------------------------------------------
 
     def moved_since(self, version: int) -> str:
-        """Who moved or left after a version, as JSON without its first brace.
+        """Return who moved or left after a version, as JSON without its first brace.
 
         The same text serves all pages that are equally far.
         """
@@ -189,7 +189,7 @@ class RunState:
 
 
 def short_seat(line: Line) -> OtherSeatLine:
-    """What everybody may know of a seat: that it is held, of which robots, and in which phase."""
+    """Return the public part of a seat: that it is held, its robots, and its phase."""
     return {
         "k": "seat",
         "short": True,

@@ -89,7 +89,7 @@ class OfDevice(TypedDict):
 
 
 class LinkChange(TypedDict, total=False):
-    """What is changed of the link."""
+    """Change of the link."""
 
     delay_s: Annotated[float, Number(*LINK_LIMITS["delay_s"])]
     jitter_s: Annotated[float, Number(*LINK_LIMITS["jitter_s"])]
@@ -105,14 +105,14 @@ class PatternChoice(OfRobot):
 
 
 class PaceChange(TypedDict, total=False):
-    """How fast time goes by."""
+    """Change of the simulation speed."""
 
     factor: Annotated[float, Number(SLOWEST, FASTEST)]
     paused: bool
 
 
 class TourTime(OfRobot):
-    """How long a person took for a leg of the tour."""
+    """Time of a person for a leg of the tour."""
 
     took_s: Annotated[float, Number(0, LONGEST_LEG)]
 
@@ -151,7 +151,7 @@ class FaultSwitch(OfRobot):
 
 
 class PhoneIdentity(TypedDict):
-    """What a phone registers as, and where."""
+    """Identity and server of a phone's registration."""
 
     server: Annotated[str, Text(1, 64)]
     port: Annotated[int, Whole(1, MOST_PORT + 1)]
@@ -166,7 +166,7 @@ class PhoneWish(OfDevice):
 
 
 class CalibrationAsked(TypedDict):
-    """How a phone is calibrated."""
+    """Calibration of a phone."""
 
     reference_mps2: Axes | None
     speed_step_mps2: Annotated[float, Number(*STEPS)]
@@ -180,7 +180,7 @@ class CalibrationAsked(TypedDict):
 
 
 class PortAsked(TypedDict):
-    """Where the DVA's server listens."""
+    """Port of the DVA's server."""
 
     port: Annotated[int, Whole(1, MOST_PORT)]
 
@@ -208,7 +208,7 @@ class GuardAnswer(TypedDict):
 
 
 class GuardWord(TypedDict):
-    """What a guard says."""
+    """Statement of a guard."""
 
     what: Literal["departed", "arrived", "confirmed", "refuted", "contained", "help"]
 
@@ -228,7 +228,7 @@ class ReportAsked(PlaceAsked):
 
 
 class RoomName(TypedDict):
-    """What a person in a control room is called."""
+    """Name of a person in a control room."""
 
     name: Annotated[str, Text(0, 64)]
 
@@ -272,7 +272,7 @@ class NoteAsked(OfEvent):
 
 
 class ModeAsked(TypedDict):
-    """Who decides."""
+    """Dispatch mode."""
 
     mode: Literal["automatic", "ask_first"]
     reason: NotRequired[Reason]
@@ -301,7 +301,7 @@ class ShelveAsked(OfAlarm):
 
 
 class Wish(TypedDict):
-    """What a hand at a stick wants, as shares of the limits."""
+    """Position of a stick, as shares of the limits."""
 
     n: Count
     speed: Share

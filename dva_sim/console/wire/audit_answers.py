@@ -11,7 +11,7 @@ class WrongRow(TypedDict):
 
 
 class AuditCheck(TypedDict):
-    """What a look at the whole chain has shown."""
+    """Result of a check of the whole chain."""
 
     rows: int
     hash: str
@@ -20,7 +20,7 @@ class AuditCheck(TypedDict):
 
 
 class TimesTaken(TypedDict):
-    """How long something took, the first time for each event."""
+    """Duration of something, the first time for each event."""
 
     events: int
     median_s: float | None

@@ -27,14 +27,14 @@ class FieldScale(TypedDict):
 
 
 class FieldShown(RasterShown):
-    """What hazards make of the air or the floor."""
+    """Effect of hazards on the air or the floor."""
 
     kind: str
     full: FieldScale
 
 
 class HazardsLine(TypedDict):
-    """Where hazards are, and how far they reach."""
+    """Positions and extents of hazards."""
 
     k: Literal["hazards"]
     t: int
@@ -50,7 +50,7 @@ class DecidedShown(LabelledMoment):
 
 
 class EventDecisions(TypedDict):
-    """What people and the policy have decided on an event."""
+    """Decisions of people and the policy on an event."""
 
     decisions: int | None
     acknowledged: LabelledMoment | None
@@ -59,7 +59,7 @@ class EventDecisions(TypedDict):
 
 
 class EventFacts(TypedDict):
-    """How an event stands."""
+    """State of an event."""
 
     number: int
     kind: str
@@ -90,7 +90,7 @@ class EventsLine(TypedDict):
 
 
 class DispatchShown(TypedDict):
-    """How orders are given."""
+    """Dispatch mode."""
 
     mode: str
     decide_within_s: float
@@ -106,7 +106,7 @@ class RoomEntry(TypedDict):
 
 
 class ControlLine(TypedDict):
-    """How orders are given, and who decides."""
+    """Dispatch mode, and who decides."""
 
     k: Literal["control"]
     t: int
@@ -144,7 +144,7 @@ class AlarmsLine(TypedDict):
 
 
 class AuditLine(TypedDict):
-    """How the audit log stands."""
+    """State of the audit log."""
 
     k: Literal["audit"]
     t: int

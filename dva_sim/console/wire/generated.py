@@ -64,7 +64,7 @@ def line_types() -> str:
 
 
 def name_of(declared: type) -> str:
-    """What pages call a declared type."""
+    """Return the pages' name for a declared type."""
     return declared.__name__.removesuffix("Line").removesuffix("Shown")
 
 

@@ -26,7 +26,7 @@ Labels: TypeAlias = Mapping[str, int]
 
 
 class BadMessage(ValueError):
-    """What was asked for makes no sense; the message is one line for whoever asked."""
+    """A request makes no sense; the message is one line for its sender."""
 
 
 class Kind:
@@ -121,7 +121,7 @@ RobotsOrAll = Annotated[
 
 
 def words_of(hint: Any) -> str:
-    """What a value of an annotation should be."""
+    """Describe what a value of an annotation should be."""
     if get_origin(hint) is Annotated:
         kinds = [one for one in hint.__metadata__ if isinstance(one, Kind)]
         return kinds[0].words if kinds else words_of(get_args(hint)[0])
@@ -151,7 +151,7 @@ def hints_of(arguments: type) -> dict[str, Any]:
 
 @cache
 def adapter_of(arguments: type) -> Any:
-    """What checks a class of arguments; pydantic is loaded with the first."""
+    """Return the validator of a class of arguments; pydantic is loaded with the first."""
     from pydantic import TypeAdapter, with_config  # late: start-up
 
     return TypeAdapter(with_config(strict=True, extra="forbid")(arguments))

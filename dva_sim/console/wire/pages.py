@@ -1,4 +1,4 @@
-"""What the web process makes of lines for one page."""
+"""Lines of the web process to one page."""
 
 from typing import Any, Literal, NotRequired
 
@@ -19,7 +19,7 @@ from dva_sim.console.wire.scenes import OrderShown, Place, SceneShown
 
 
 class YouLine(TypedDict):
-    """Who a page is."""
+    """Identity of a page."""
 
     k: Literal["you"]
     client: str
@@ -36,7 +36,7 @@ class PongLine(TypedDict):
 
 
 class MovedLine(TypedDict):
-    """Who has moved, and who has left the site."""
+    """Agents that have moved, and that have left the site."""
 
     k: Literal["d"]
     t: int
@@ -45,7 +45,7 @@ class MovedLine(TypedDict):
 
 
 class OtherSeatLine(TypedDict):
-    """What everybody may know of a seat."""
+    """Public part of a seat."""
 
     k: Literal["seat"]
     short: bool
@@ -79,7 +79,7 @@ LogEntry = TypedDict(
 
 
 class LogLine(TypedDict):
-    """What is new of a log that a page looks at; `first`: what it has shown before is over."""
+    """News of a log that a page looks at; `first`: replaces what was shown before."""
 
     k: Literal["log"]
     log: str

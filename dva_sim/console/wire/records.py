@@ -6,7 +6,7 @@ from typing_extensions import TypedDict
 
 
 class ExchangesLine(TypedDict):
-    """What a device was asked: see `shown/logs.py`; `anew`: forget what was told before."""
+    """Exchanges of a device: see `shown/logs.py`; `anew`: forget what was told before."""
 
     k: Literal["log"]
     log: str
@@ -47,7 +47,7 @@ class ShelfLine(TypedDict):
 
 
 class PicturesLine(TypedDict):
-    """Whether there are pictures, and why not."""
+    """Availability of pictures, and why there are none."""
 
     k: Literal["pictures"]
     ok: bool

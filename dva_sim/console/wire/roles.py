@@ -21,5 +21,5 @@ class Role(IntEnum):
 
     @property
     def acts(self) -> bool:
-        """Whether it may do anything but look."""
+        """True if it may do more than look."""
         return self >= Role.PHONE

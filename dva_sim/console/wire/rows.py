@@ -1,4 +1,4 @@
-"""Where everybody is, and how time, link, robots and devices are."""
+"""Positions of everybody, and states of clock, link, robots and devices."""
 
 from typing import Literal, NotRequired
 
@@ -8,7 +8,7 @@ from dva_sim.console.wire.scenes import LinkShown, OrderShown, Place
 
 
 class PlacesLine(TypedDict):
-    """Where everybody is."""
+    """Positions of everybody."""
 
     k: Literal["pos"]
     t: int
@@ -16,7 +16,7 @@ class PlacesLine(TypedDict):
 
 
 class ClockShown(TypedDict):
-    """How time goes by."""
+    """State of the clock."""
 
     factor: float
     paused: bool
@@ -27,7 +27,7 @@ class ClockShown(TypedDict):
 
 
 class ServerShown(TypedDict):
-    """Where the DVA listens, and whether; `role`: what it lets this console do."""
+    """Address of the DVA, and whether it listens; `role`: what it lets this console do."""
 
     listens: bool
     address: str
@@ -38,7 +38,7 @@ class ServerShown(TypedDict):
 
 
 class RobotRow(TypedDict):
-    """How a robot stands."""
+    """State of a robot."""
 
     i: int
     mode: str
@@ -62,14 +62,14 @@ class RobotRow(TypedDict):
 
 
 class DoingShown(TypedDict):
-    """What somebody on foot is doing."""
+    """Activity of somebody on foot."""
 
     i: int
     doing: str
 
 
 class RowsLine(TypedDict):
-    """How time, link, robots and people are."""
+    """States of clock, link, robots and people."""
 
     k: Literal["rows"]
     t: int
@@ -83,7 +83,7 @@ class RowsLine(TypedDict):
 
 
 class LatencyFigures(TypedDict):
-    """How late messages of a kind are."""
+    """Latency of a kind of messages."""
 
     last_ms: float
     median_ms: float
@@ -103,7 +103,7 @@ class SensorShown(TypedDict):
 
 
 class StationShown(TypedDict):
-    """How far a robot has come: off, registered, listening."""
+    """Station of a robot: off, registered, listening."""
 
     state: str
     address: str | None
@@ -114,7 +114,7 @@ class StationShown(TypedDict):
 
 
 class FaultsShown(TypedDict):
-    """What is wrong with a robot."""
+    """Faults of a robot."""
 
     processing_s: float | None
     replies: bool
@@ -130,7 +130,7 @@ class EmergencyShown(TypedDict):
 
 
 class RobotWindowLine(TypedDict):
-    """What the windows of a robot show."""
+    """Contents of a robot's windows."""
 
     k: Literal["robot"]
     t: int

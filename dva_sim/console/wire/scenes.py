@@ -1,4 +1,4 @@
-"""What does not change while something is shown, and parts of several lines."""
+"""Parts that do not change while something is shown, and parts of several lines."""
 
 from typing import Any, Literal, NotRequired, TypeAlias
 
@@ -17,7 +17,7 @@ class LabelledMoment(TypedDict):
 
 
 class LinkShown(TypedDict):
-    """How messages travel; more of a link that is modelled."""
+    """Settings of the link; more of a modelled one."""
 
     kind: Literal["modelled", "real", "attached"]
     processing_s: float | None
@@ -64,7 +64,7 @@ class RasterShown(TypedDict):
 
 
 class OriginShown(TypedDict):
-    """Where on earth a site lies."""
+    """Geographic origin of a site."""
 
     latitude_deg: float
     longitude_deg: float
@@ -146,7 +146,7 @@ class PhoneLimits(TypedDict):
 
 
 class PhoneOffer(TypedDict):
-    """What a phone may choose from."""
+    """Choices of a phone."""
 
     pipelines: dict[str, dict[str, Any]]
     filters: list[str]
@@ -177,7 +177,7 @@ class ReplayAbout(TypedDict):
 
 
 class SceneShown(TypedDict):
-    """What does not change while something is shown."""
+    """Scene, which does not change while something is shown."""
 
     scenario: str
     title: str

@@ -1,4 +1,4 @@
-"""What people in seats know of their drives, phones and guards, and answers to actions."""
+"""Lines for people in seats: their drives, phones and guards; and answers to actions."""
 
 from typing import Literal
 
@@ -66,7 +66,7 @@ class PhoneShown(PhoneIdentityShown):
 
 
 class SeatLine(TypedDict):
-    """What a page in a seat knows of its own drives."""
+    """State of a seat's own drives."""
 
     k: Literal["seat"]
     t: int
@@ -80,7 +80,7 @@ class SeatLine(TypedDict):
 
 
 class WayThere(TypedDict):
-    """Where a guard has to go; too far away: nobody can walk there."""
+    """Path of a guard; too far away: nobody can walk there."""
 
     x_m: float
     y_m: float
@@ -99,7 +99,7 @@ class GuardOrder(WayThere):
 
 
 class GuardLine(TypedDict):
-    """What a page knows of the guard whom its person plays."""
+    """State of the guard that a page's person plays."""
 
     k: Literal["guard"]
     t: int
@@ -142,7 +142,7 @@ class CandidateShown(TypedDict):
 
 
 class ProposalShown(TypedDict):
-    """What the policy would do about an event, and why."""
+    """Proposal of the policy about an event, with its reasons."""
 
     event: int
     policy: str
@@ -155,7 +155,7 @@ class ProposalShown(TypedDict):
 
 
 class Answered(TypedDict, total=False):
-    """What an answer may say beside whether it was done; `late`: nobody has said so in time."""
+    """Answer besides success; `late`: no answer came in time."""
 
     t: int
     late: bool
@@ -170,7 +170,7 @@ class Answered(TypedDict, total=False):
 
 
 class DoneLine(Answered):
-    """What became of an action."""
+    """Outcome of an action."""
 
     k: Literal["done"]
     id: str | None

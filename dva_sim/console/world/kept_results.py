@@ -1,4 +1,4 @@
-"""What people did at a console as a results folder, with the tables of any run: a study of one run.
+"""Drives of people as a results folder, with the tables of any run: a study of one run.
 
 The study asks nothing; its scenario and seed are those of the console. Who drove has a number and
 no name: what a phone calls itself stays out of the tables.

@@ -1,4 +1,4 @@
-"""What a person in a seat is told of the own drives, 20 times a second."""
+"""Lines for a person in a seat about its own drives, 20 times a second."""
 
 from __future__ import annotations
 

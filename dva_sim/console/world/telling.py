@@ -1,4 +1,4 @@
-"""What pages are told of a console's world: each thing as it changes, and no more often."""
+"""Updates of a console's world for pages: each on change, and no more often."""
 
 from __future__ import annotations
 

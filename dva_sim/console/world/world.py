@@ -48,7 +48,7 @@ SCREEN = 0xFFFF  # number of the console's own screen among consoles
 
 
 class ConsoleWorld(ToldWorld):
-    """What runs, and what of it is told.
+    """Running world, and what is told of it.
 
     Args:
         scenario: What the run consists of.
@@ -201,7 +201,7 @@ class ConsoleWorld(ToldWorld):
                 self.recorder.kept.put("audited", plain_row(row))
 
     def author(self, client: str) -> str:
-        """What the person of a page is called."""
+        """Return the name of a page's person."""
         if room := self.rooms.label(client):
             return room
         if (guard := self.guards.by_client.get(client)) is not None:
@@ -241,7 +241,7 @@ class ConsoleWorld(ToldWorld):
         return self._persons[number]
 
     def seat_of_order(self, robots: Sequence[str]) -> int | None:
-        """Where nobody sits and an order waits for one of these robots: it is kept for there."""
+        """Return an empty seat in which an order waits for one of these robots."""
         for number, person in self._persons.items():
             waits = person.order is not None and person.order.device in robots
             if waits and not person.attended and number < FIRST_SEAT:

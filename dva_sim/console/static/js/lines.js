@@ -1,6 +1,6 @@
 // Written by dva_sim/console/wire/generated.py.
 /**
- * Where on earth a site lies.
+ * Geographic origin of a site.
  * @typedef {{latitude_deg: number, longitude_deg: number}} Origin
  */
 /**
@@ -42,7 +42,7 @@
  *   field?: boolean}} LegendEntry
  */
 /**
- * How messages travel; more of a link that is modelled.
+ * Settings of the link; more of a modelled one.
  * @typedef {{kind: 'modelled' | 'real' | 'attached', processing_s: number | null,
  *   delay_s?: number, jitter_s?: number, jitter_wanted_s?: number, loss?: number,
  *   rate_bps?: number | null, trace?: string | null, rate_trace?: string | null}} Link
@@ -52,7 +52,7 @@
  * @typedef {{step_mps2: number[], max_delay_s: number[]}} PhoneLimits
  */
 /**
- * What a phone may choose from.
+ * Choices of a phone.
  * @typedef {{pipelines: Record<string, Record<string, any>>, filters: string[],
  *   mappings: string[], speed_step_mps2: number, turn_step_mps2: number, max_delay_s: number,
  *   limits: PhoneLimits}} PhoneOffer
@@ -67,7 +67,7 @@
  *   audit: boolean}} ReplayAbout
  */
 /**
- * What does not change while something is shown.
+ * Scene, which does not change while something is shown.
  * @typedef {{scenario: string, title: string, seed: number | null, site: Site, things: Thing[],
  *   patterns: Pattern[], link_limits: Record<string, number[]>, pace_limits: number[],
  *   watchdog_s: number | null, stale_s: number | null, lag_limit_s: number, rules: Record<string,
@@ -84,17 +84,17 @@
  *   room: string | null}} Order
  */
 /**
- * What everybody may know of a seat.
+ * Public part of a seat.
  * @typedef {{k: 'seat', short: boolean, seat: string, label: string, phase: string, order: Order |
  *   null, robots: (number | null)[]}} OtherSeat
  */
 /**
- * How time goes by.
+ * State of the clock.
  * @typedef {{factor: number, paused: boolean, lag_s: number, given_up_s: number,
  *   held_by_lag: boolean, jumps?: number}} Clock
  */
 /**
- * How a robot stands.
+ * State of a robot.
  * @typedef {{i: number, mode: string, stands: string, pattern: string | null, battery: number |
  *   null, holder: string | null, holder_label: string | null, session_age_s: number | null,
  *   watchdog_left_s: number | null, set_speed_mps: number | null, set_turn_rate_radps: number |
@@ -103,16 +103,16 @@
  *   RobotRow
  */
 /**
- * What somebody on foot is doing.
+ * Activity of somebody on foot.
  * @typedef {{i: number, doing: string}} Doing
  */
 /**
- * Where the DVA listens, and whether; `role`: what it lets this console do.
+ * Address of the DVA, and whether it listens; `role`: what it lets this console do.
  * @typedef {{listens: boolean, address: string, port: number | null, modelled: boolean,
  *   own?: boolean, role?: string}} Server
  */
 /**
- * How time, link, robots and people are.
+ * States of clock, link, robots and people.
  * @typedef {{k: 'rows', t: number, clock: Clock, link: Link | null, dropped: number,
  *   robots: RobotRow[], people: Doing[], order: Order | null, server?: Server}} Rows
  */
@@ -126,12 +126,12 @@
  * @typedef {{value: number, unit: string}} FieldScale
  */
 /**
- * What hazards make of the air or the floor.
+ * Effect of hazards on the air or the floor.
  * @typedef {{cell_m: number, x0_m: number, y0_m: number, columns: number, rows: number,
  *   cells: string, heading_rad?: number, kind: string, full: FieldScale}} Field
  */
 /**
- * Where hazards are, and how far they reach.
+ * Positions and extents of hazards.
  * @typedef {{k: 'hazards', t: number, hazards: Hazard[], fields: Field[]}} Hazards
  */
 /**
@@ -155,7 +155,7 @@
  * @typedef {{k: 'events', t: number, events: SiteEvent[]}} Events
  */
 /**
- * How orders are given.
+ * Dispatch mode.
  * @typedef {{mode: string, decide_within_s: number, switched: LabelledMoment | null}} Dispatch
  */
 /**
@@ -163,7 +163,7 @@
  * @typedef {{label: string, role: string, client: string}} RoomEntry
  */
 /**
- * How orders are given, and who decides.
+ * Dispatch mode, and who decides.
  * @typedef {{k: 'control', t: number, dispatch: Dispatch | null, rooms: RoomEntry[]}} Control
  */
 /**
@@ -178,12 +178,12 @@
  *   rate: number, left_out: number}} Alarms
  */
 /**
- * How the audit log stands.
+ * State of the audit log.
  * @typedef {{k: 'audit', t: number, rows: number, hash: string, problem: string, lasting: boolean,
  *   file: string}} Audit
  */
 /**
- * Whether there are pictures, and why not.
+ * Availability of pictures, and why there are none.
  * @typedef {{k: 'pictures', ok: boolean, text: string, t?: number}} Pictures
  */
 /**
@@ -215,11 +215,11 @@
  * @typedef {{k: 'snap', t: number, scene: Scene | null, state: SnapState}} Snap
  */
 /**
- * Who has moved, and who has left the site.
+ * Agents that have moved, and that have left the site.
  * @typedef {{k: 'd', t: number, p: number[][], gone?: number[]}} Moved
  */
 /**
- * How far a robot has come: off, registered, listening.
+ * Station of a robot: off, registered, listening.
  * @typedef {{state: string, address: string | null, dva: string | null, problem: string,
  *   asking?: boolean, by_hand?: boolean}} Station
  */
@@ -228,12 +228,12 @@
  * @typedef {{at_ms: number, by: string}} Emergency
  */
 /**
- * How late messages of a kind are.
+ * Latency of a kind of messages.
  * @typedef {{last_ms: number, median_ms: number, p95_ms: number, largest_ms: number,
  *   count: number}} LatencyFigures
  */
 /**
- * What is wrong with a robot.
+ * Faults of a robot.
  * @typedef {{processing_s: number | null, replies: boolean, freeze: boolean, camera: boolean}}
  *   Faults
  */
@@ -243,7 +243,7 @@
  *   Sensor
  */
 /**
- * What the windows of a robot show.
+ * Contents of a robot's windows.
  * @typedef {{k: 'robot', t: number, i: number, station: Station, mode: string, hand: number |
  *   null, holder: string | null, stands: string, link_lost: boolean, notice: string,
  *   emergency: Emergency | null, speed_mps: number | null, turn_rate_radps: number | null,
@@ -284,7 +284,7 @@
  *   sensor_hz: number | null, samples: number, samples_lost: number, attempts: number}} Phone
  */
 /**
- * What a page in a seat knows of its own drives.
+ * State of a seat's own drives.
  * @typedef {{k: 'seat', t: number, seat: string, label: string, phase: string, order: Order |
  *   null, alert: string, drives: Drive[], phone: Phone | null}} Seat
  */
@@ -294,7 +294,7 @@
  *   way_m: number[][], event: number, kind: string, task: string, answered: boolean}} GuardOrder
  */
 /**
- * What a page knows of the guard whom its person plays.
+ * State of the guard that a page's person plays.
  * @typedef {{k: 'guard', t: number, seat: string, guard: number | null, label: string,
  *   doing: string, order: GuardOrder | null, alert: string}} Guard
  */
@@ -304,7 +304,7 @@
  *   word: string, text: string, service_us: number | null, published: boolean}} LogEntry
  */
 /**
- * What is new of a log that a page looks at; `first`: what it has shown before is over.
+ * News of a log that a page looks at; `first`: replaces what was shown before.
  * @typedef {{k: 'log', log: string, total: number, first: boolean, missed: number,
  *   lines: LogEntry[]}} Log
  */
@@ -322,7 +322,7 @@
  *   arrival_s: number | null}} Candidate
  */
 /**
- * What the policy would do about an event, and why.
+ * Proposal of the policy about an event, with its reasons.
  * @typedef {{event: number, policy: string, reason: string, task: string | null, label: string,
  *   arrival_s: number | null, decide_within_s: number | null, candidates: Candidate[]}} Proposal
  */
@@ -332,7 +332,7 @@
  *   side_rad: number}} TourPlan
  */
 /**
- * What became of an action.
+ * Outcome of an action.
  * @typedef {{t?: number, late?: boolean, device?: string, devices?: Device[], event?: number,
  *   hand?: number | null, outcome?: string, phone?: PhoneIdentity, proposal?: Proposal,
  *   tour?: TourPlan, k: 'done', id: string | null, ok: boolean, text: string}} Done
@@ -342,7 +342,7 @@
  * @typedef {{k: 'bye', why: string, t?: number}} Bye
  */
 /**
- * Who a page is.
+ * Identity of a page.
  * @typedef {{k: 'you', client: string, key: string, role: string}} You
  */
 /**
@@ -361,11 +361,11 @@
  * @typedef {{row: number, text: string}} WrongRow
  */
 /**
- * What a look at the whole chain has shown.
+ * Result of a check of the whole chain.
  * @typedef {{rows: number, hash: string, problem: WrongRow | null, doubts: string[]}} AuditCheck
  */
 /**
- * How long something took, the first time for each event.
+ * Duration of something, the first time for each event.
  * @typedef {{events: number, median_s: number | null, largest_s: number | null}} TimesTaken
  */
 /**
