@@ -245,13 +245,14 @@ class RobotAgent:
             self.mode_changed("")
 
     def restart(self, clock_offset: float) -> None:
-        """Restart the program: it forgets its driver, registers again, and asks who holds it.
+        """Restart the program: it forgets driver and readers, registers, and asks who holds it.
 
         Args:
             clock_offset: See `RobotController.restart`.
         """
         self.hang()
         self.controller.restart(clock_offset, self.device.clock.now)
+        self._sensing.end_all()
         self.device.restart()
         self.device.register()
         self.device.connect(self.device.dva)

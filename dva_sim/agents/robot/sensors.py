@@ -112,6 +112,10 @@ class SensorSubscriptions:
         for key in [key for key in self._subscribed if key[1] == subscriber]:
             del self._subscribed[key]
 
+    def end_all(self) -> None:
+        """End all subscriptions, as whoever starts anew knows of none."""
+        self._subscribed.clear()
+
     def _forget_who_vanished(self, now: float) -> None:
         for key in [key for key, held in self._subscribed.items() if held.until < now]:
             del self._subscribed[key]

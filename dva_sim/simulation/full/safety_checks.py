@@ -42,7 +42,7 @@ STARTED_ANEW = 10.0  # a robot whose clock has jumped that much [s]
 LEASE = 30.0  # a driver of whom nothing valid was heard for so long has the robot no longer [s]
 LEASE_SLACK = 2.0  # a robot looks at that once a second, the audit twice [s]
 ENDLESS = 3600.0  # a set point that holds for so long has no end [s]
-MOST_COPIES = 8  # of one command that are told apart
+MOST_COPIES = 8  # of one command, and registrations of a robot, that are told apart
 MOST_KEPT = 1000  # of the newest messages to a robot, of its sessions, and of events
 
 CHECKED: Final = {
@@ -54,8 +54,9 @@ CHECKED: Final = {
     f"({MOVING:g} m/s, {TURNING:g} rad/s), none is driven by hand that somebody holds, nor by "
     "messages that is driven by hand; nobody keeps a robot of whom it hears nothing valid for "
     f"{LEASE:g} s, or the DVA nothing for {SILENT_AFTER:g} s; slack: until it has confirmed the "
-    f"end, {OBEYS_WITHIN:g} s and ten messages, {LEASE_SLACK:g} s of silence; of each session that "
-    "is over the robot is told; one that a supervisor takes stands and knows it before it is given",
+    f"end, or its program restarts, {OBEYS_WITHIN:g} s and ten messages, {LEASE_SLACK:g} s of "
+    "silence; of each session that is over the robot is told; one that a supervisor takes stands "
+    "and knows it before it is given",
     "S3": "nothing that came before an emergency moves a robot after it; slack: as for S1 and S2",
     "S4": "speed and turn rate, and what the motors are asked for, stay within their limits; "
     f"slack: {SLACK - 1:.0%}, and "
@@ -139,6 +140,7 @@ class Witness:
         question: Number of its newest question to the DVA: only the answer to that counts.
         asked: When it sent that first.
         hand: Who has taken it by hand, and has not let it go since.
+        registrations: Its newest ones, by number and time stamp.
     """
 
     obeys_within: float
@@ -163,6 +165,7 @@ class Witness:
     question: int = 0
     asked: float = 0.0
     hand: str | None = None
+    registrations: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=MOST_COPIES))
 
     def given(self, session: int, held: Held) -> None:
         """The DVA gives a permission, or says that one holds."""
@@ -191,6 +194,19 @@ class Witness:
     def in_hand(self, now: float) -> bool:
         """Return True while somebody drives it by hand who was heard within the lease."""
         return self.hand is not None and now - self.heard <= LEASE
+
+    def registers(self, registration: tuple[int, str], now: float) -> None:
+        """Note a registration; one whose number goes back shows that its program has restarted.
+
+        It knows no session any longer, unless the DVA confirms one when it asks from now on.
+        """
+        if registration in self.registrations:
+            return  # sent again
+        if self.registrations and registration[0] <= self.registrations[-1][0]:
+            self.question = 0
+            for session in self.confirmed:
+                _end(self, session, now)
+        self.registrations.append(registration)
 
     def stands(self, when: float) -> None:
         """Note that an emergency has stopped it, or should have; no hand drives it any longer."""
@@ -333,6 +349,8 @@ class SafetyAudit:
         if not isinstance(payload, bytes):
             witness.offset = offset_of(payload) or witness.offset
             return
+        if b"<RegMsg>" in payload and (message := _read(payload)) is not None:
+            witness.registers((message.message_id, message.timestamp), now)
         if b"<GetGrant" in payload:
             _note_question(witness, _read(payload), now)
         if b"<RobotStatus>" in payload:

@@ -3,13 +3,20 @@
 import pytest
 from helpers.dva.permissions import enter
 
-from dva_sim.agents.robot.controller import STAND, Decision, RobotController, TimedSetPoint
+from dva_sim.agents.robot.controller import (
+    PATIENCE,
+    STAND,
+    Decision,
+    RobotController,
+    TimedSetPoint,
+)
 from dva_sim.agents.robot.faults import RobotFaults
 from dva_sim.agents.robot.manual_control import ManualControl
 from dva_sim.protocol import messages as m
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import id_of
+from dva_sim.storms.mutants import planted
 
 ROBOT, OPERATOR = id_of("robot", 1), id_of("operator", 9)
 HAND = "hand"
@@ -48,6 +55,12 @@ class InHand:
         self.run.dva.device.ask(ROBOT, grant)
         self.let(1.0)
 
+    def restarts_alone(self) -> None:
+        """The robot restarts while the DVA is down, and waits as long as it waits for that."""
+        self.run.dva.device.silent = True
+        self.robot.restart(0.0)
+        self.let(PATIENCE)
+
     @property
     def broken(self) -> set[str]:
         return set(self.run.recorder.violations)
@@ -66,6 +79,24 @@ def test_a_hand_drives_a_robot_and_breaks_no_rule(bench):
     bench.let(2.0)
     assert bench.robot.body.speed == pytest.approx(0.0, abs=1e-3)
     assert bench.broken == set()
+
+
+@pytest.mark.invariant("S2")
+def test_a_hand_takes_a_robot_that_has_restarted_though_no_dva_has_told_it_that_it_is_free(bench):
+    bench.is_held()
+    assert bench.hand.take(HAND).code == m.BUSY
+    bench.restarts_alone()
+    assert bench.hand.take(HAND).code == m.OK
+    assert bench.broken == set()
+
+
+@pytest.mark.invariant("S2")
+def test_a_robot_that_keeps_its_holder_over_a_restart_breaks_s2(bench):
+    with planted("grant-kept-over-restart"):
+        bench.is_held()
+        bench.restarts_alone()
+        bench.asks(m.StartTeleOp(), session=1 << 33)
+    assert bench.broken == {"S2"}
 
 
 @pytest.mark.invariant("S1")

@@ -21,6 +21,7 @@ from dva_sim.agents.robot.controller import (
     TimedSetPoint,
 )
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.core.dispatcher import Dispatcher
 from dva_sim.core.events import EventBook, State
 from dva_sim.core.orders import Orders
@@ -459,6 +460,23 @@ def test_a_sensor_that_is_shown_to_somebody_who_may_not_read_it_breaks_s5():
     data = encode(m.Message(DVA, 1, ROBOT, "12:00:00", 0, value))
     run.sent(5.0, ROBOT, STRANGER, data)
     assert broken(run) == {"S5"}
+
+
+@pytest.mark.invariant("S5")
+def test_a_robot_that_has_restarted_shows_its_sensors_to_nobody_until_it_is_asked_anew():
+    thermometer = {"robot.sensors": [{"name": "temperature"}]}
+    run, shown = staged(**thermometer), list[float]()
+    topic = sensor_topic("temperature", DVA)
+    run.network.subscribe(DVA, ROBOT, topic, lambda _: shown.append(run.clock.now))
+    ask(run, 10.0, MAY_READ)
+    ask(run, 11.0, READS)
+    run.clock.run(15.0)
+    assert len(shown) > 1
+    run.dva.device.silent = True
+    run.field.robots[ROBOT].restart(0.0)
+    run.clock.run(30.0)
+    assert max(shown) < 16.0  # one may have been on its way
+    assert broken(run) == set()
 
 
 @pytest.mark.parametrize(
