@@ -151,7 +151,7 @@ class _Trial:
         path = Route(np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 0.5)]))
         for number in range(LOOKS):
             now += self._one_of(WAITS)
-            seen = Sighting._make([number, *(self._anything() for _ in range(8)), 0.01])
+            seen = Sighting._make([number, *(self._anything() for _ in range(8)), 0.01, math.inf])
             delay = self._one_of(GUESSES)
             point, view = PointView(now, seen, delay), PathView(now, seen, delay, path)
             for got in (strategy.point(point), strategy.follow(view)):

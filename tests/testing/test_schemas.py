@@ -136,7 +136,7 @@ def test_every_kind_of_agent_is_named():
     schema = json.loads(schema_text("agent"))
     named = {inner["$ref"].rpartition("/")[2] for inner in schema["anyOf"]}
     people = {"GuardProfile", "BystanderProfile", "Population", "Bands"}
-    assert named == {"RobotProfile", "PhoneProfile", "AccelerometerPart"} | people
+    assert named == {"RobotProfile", "PhoneProfile", "AccelerometerPart", "RosProfile"} | people
     assert all(schema["$defs"][name]["title"] == name for name in named)
 
 

@@ -180,9 +180,9 @@ def _row(
     names = NAMES[trial.scenario.task.kind]
     return {
         "number": kept,
-        "since_start": kept + 1 + trial.scenario.practice,
         "condition": cell,
         **dict(zip(names, condition, strict=True)),
+        "since_start": kept + 1 + trial.scenario.practice,
         **goal,
         "trial_time_s": trial.now,
         "path_m": trial.path,

@@ -36,7 +36,7 @@ def logged(own_world, visit) -> Page:
 def test_what_was_decided_stands_in_the_log_is_measured_filtered_and_exported(logged):
     table = logged.get_by_role("table", name="Audit log")
     expect(table).to_contain_text("acknowledge")
-    expect(logged.get_by_role("status", name="Verification")).to_contain_text("holds: 3 rows")
+    expect(logged.get_by_role("status", name="Verification")).to_contain_text("Verified: 3 rows")
     measures = logged.get_by_role("region", name="Measures")
     expect(measures).to_contain_text("1 event")
     expect(measures).to_contain_text("Overrides of the policy1, expected 33 s later (median)")

@@ -375,7 +375,7 @@ def test_people_at_an_attached_console_decide_see_alarms_and_read_what_they_did(
     page.get_by_label("Your name").fill("ana")
     expect(page.get_by_role("button", name="Use this name")).to_be_visible(timeout=SLOW)
     page.get_by_role("button", name="Use this name").click()
-    expect(page.get_by_text("The log calls you ana")).to_be_visible(timeout=SLOW)
+    expect(page.get_by_text("The log shows you as ana")).to_be_visible(timeout=SLOW)
     alarms = page.get_by_role("region", name="Alarms")
     expect(alarms).to_contain_text("Fire", timeout=SLOW)
     assert faults(page) == []

@@ -86,9 +86,9 @@ def test_samples_are_raw_numbered_and_bear_the_phones_own_times(hand):
 INTERRUPTIONS = (
     (HIDE, "hidden"),
     ("window.dispatchEvent(new Event('pagehide'))", "left"),
-    ("screen.orientation.dispatchEvent(new Event('change'))", "turned"),
+    ("screen.orientation.dispatchEvent(new Event('change'))", "rotated"),
     ("document.dispatchEvent(new Event('freeze'))", "left"),
-    ("window.dispatchEvent(new Event('orientationchange'))", "turned"),
+    ("window.dispatchEvent(new Event('orientationchange'))", "rotated"),
     ("window.dispatchEvent(new Event('blur'))", "focus"),
 )
 

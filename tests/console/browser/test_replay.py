@@ -223,5 +223,5 @@ def test_the_audit_log_of_a_recording_is_shown_with_its_chain(address, audited, 
     expect(table).to_contain_text("acknowledge")
     state = page.get_by_role("status", name="Verification")
     expect(state).to_contain_text("Verified")
-    expect(page.get_by_text("It is kept in audited.mcap.")).to_be_visible()
+    expect(page.get_by_text("Saved in audited.mcap.")).to_be_visible()
     assert faults(page) == []

@@ -85,7 +85,7 @@ def test_the_age_in_force_is_the_part_of_the_budget_from_the_phone_to_the_motors
     """But for the first second, in which commands do not rest on a picture yet."""
     row = delay_budget(drives(cell), MOTOR) | command_ages(drives(cell))
     after = sum(row[f"delay_{s}_s"] for s in ("sampling", "pattern", "uplink", "processing"))
-    assert after == pytest.approx(row["age_in_force_mean_s"], rel=0.01)
+    assert after == pytest.approx(row["age_in_force_mean_s"], rel=0.02)
 
 
 def log(*applied: Applied, started: float = 0.0) -> DriveLog:

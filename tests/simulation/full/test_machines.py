@@ -62,7 +62,7 @@ def test_a_robot_without_power_neither_hears_nor_speaks_until_it_has_some_again(
 @pytest.mark.parametrize(("robots", "ended"), [(1, "lost link"), (2, "confirmed")])
 def test_who_stands_without_power_is_missed_and_another_one_is_sent(robots, ended):
     # Enough to get so far that who stands there blocks no door to the other.
-    run = simulate(scenario({"robot.charge": 0.0012, "robot.count": robots}), 1)
+    run = simulate(scenario({"robot.charge": 0.0013, "robot.count": robots}), 1)
     row = episode_measures.run_row(run)
     assert row["outcome"] == ended
     assert row["cause"] == ("battery" if robots == 1 else "")
