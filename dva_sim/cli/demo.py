@@ -23,7 +23,7 @@ from dva_sim.recordings.pictures import Wanted
 
 STUDY: Final = "req-rep-vs-pub-sub"
 SCENARIO: Final = "drive-to-event"
-SEED: Final = 2
+SEED: Final = 11
 DELAY: Final = "link.delay_s=1"
 PATTERNS: Final = "req-rep,latest-wins"
 PICTURE: Final = "one-drive.png"

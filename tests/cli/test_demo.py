@@ -31,7 +31,7 @@ def test_the_picture_and_the_story_come_before_the_study(tmp_path, played, monke
     assert demo(tmp_path / "demo", jobs=1) is ExitCode.INTERRUPTED
     assert played == [(STUDY, True)]
     told = capsys.readouterr().out
-    assert unnamed(told, "127.3 s", "107 s ahead") == []
+    assert unnamed(told, "131.4 s", "22 s ahead") == []
     assert told.index("about a minute") < told.index("side by side") < told.index("Film")
 
 

@@ -66,6 +66,7 @@ def test_all_that_is_shipped_is_valid(check, most, monkeypatch):
     assert lines[-1] == f"{len(files)} files: {len(files)} valid"
     kinds = {line.split(": ")[1] for line in lines[:-1] if ": warning: " not in line}
     agents = {"robot", "phone", "accelerometer", "guard", "bystanders", "operators"}
+    agents |= {"robot of ROS"}
     agents |= {"bands of operators", "tuned values"}
     runs = {"study", "scenario", "timed scenario", "validation cases", "targets", "split", "task"}
     runs |= {"transports", "middleware", "measurements", "own scenario"}

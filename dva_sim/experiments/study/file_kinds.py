@@ -43,12 +43,14 @@ class FileKind(NamedTuple):
         model: Its keys.
         folder: Where files of this kind lie.
         command: What does something with it, if a command does.
+        borrowed: Keys that are those of another kind, so that they alone tell nothing.
     """
 
     name: str
     model: type[Config]
     folder: str
     command: str = ""
+    borrowed: frozenset[str] = frozenset()
 
 
 _RUN, _PLAY, _DRAW = "dva-sim run", "dva-sim episode", "dva-sim site show"
@@ -66,7 +68,7 @@ KINDS: Final = (
     FileKind("site", SiteFile, "worlds", _DRAW),
     FileKind("ROS map", RosMap, "worlds", _DRAW),
     FileKind("robot", RobotProfile, "agents/robots"),
-    FileKind("robot of ROS", RosProfile, "agents/ros"),
+    FileKind("robot of ROS", RosProfile, "agents/ros", borrowed=frozenset({"site"})),
     FileKind("phone", PhoneProfile, "agents/phones"),
     FileKind("accelerometer", AccelerometerPart, "agents/accelerometers"),
     FileKind("guard", GuardProfile, "agents/people"),
@@ -91,7 +93,9 @@ def recognise(document: Document, kinds: Sequence[FileKind] = KINDS) -> FileKind
     named = {each.scenario: name for name, each in MODELS.items() if name != "full"}
     named[OwnScenario] = "of a user's model"
     fit = [kind for kind in kinds if named.get(kind.model, model) == model]
-    shared = {kind.name: len(keys & kind.model.model_fields.keys()) for kind in fit}
+    shared = {
+        kind.name: len(keys & (kind.model.model_fields.keys() - kind.borrowed)) for kind in fit
+    }
     likely = [kind for kind in fit if shared[kind.name] == max(shared.values())]
     if len(likely) == 1:
         return likely[0]

@@ -63,6 +63,7 @@ TRIAL_COLUMNS = (
     _FAILURES,
     Measure("number", "of the trial in its block, from 0"),
     Measure("condition", "of the task, from 0"),
+    Measure("since_start", "number of the trial since the block began, practice included"),
     Measure("amplitude_m", "way to the target"),
     Measure("width_m", "of the target, tunnel or way"),
     Measure("length_m", "of the tunnel or way"),

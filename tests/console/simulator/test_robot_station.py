@@ -114,7 +114,7 @@ def test_nobody_reaches_a_robot_before_it_has_registered_and_opened_its_port(ben
     assert bench.state == "registered"
     assert bench.heard[0].address == bench.world.robot.device.address
     assert bench.say(m.GetSensorInfo()) is None
-    assert bench.do("manual_take")[1].startswith("it is registered")
+    assert bench.do("manual_take")[1].startswith("The robot is registered")
     assert bench.do("robot_listen")[0]
     assert bench.state == "listening"
     assert isinstance(bench.say(m.GetSensorInfo()).content, m.SensorInfo)

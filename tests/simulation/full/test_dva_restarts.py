@@ -49,6 +49,7 @@ class Killed:
     def _kill(self) -> None:
         """From now on nobody hears of it, and it hears nobody."""
         self.run.network.leave(DVA)
+        self.dva.device.silent = True  # the audit sees that it is down
         self.dva.device.ask = lambda *_, **__: None  # type: ignore[method-assign]
         self.dva._memory = None
 
