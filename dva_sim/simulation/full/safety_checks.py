@@ -135,6 +135,8 @@ class Witness:
         offset: What is to be added to its own clock to have the time.
         last_mission: When it was last on a mission that it may be on.
         looked: When it was last looked at.
+        stood: When it was last seen to be commanded nothing.
+        stood_before: The same before the newest order was accepted.
         heard: When something of its driver, or of a hand, was last obeyed.
         confirmed: Sessions that the DVA has confirmed to it, when it asked.
         question: Number of its newest question to the DVA: only the answer to that counts.
@@ -160,6 +162,8 @@ class Witness:
     offset: float | None = None
     last_mission: float = 0.0
     looked: float = 0.0
+    stood: float = -1.0
+    stood_before: float = -1.0
     heard: float = 0.0
     confirmed: set[int] = field(default_factory=set)
     question: int = 0
@@ -211,6 +215,13 @@ class Witness:
     def stands(self, when: float) -> None:
         """Note that an emergency has stopped it, or should have; no hand drives it any longer."""
         self.stopped, self.hand = max(self.stopped, when), None
+
+    def has_stood_since(self, when: float) -> bool:
+        """Return True if an emergency that came then has been obeyed, though no answer was seen.
+
+        A later one, or a copy, has stopped it; or it stood, and a later order was accepted.
+        """
+        return self.stopped >= when or (self.stood_before >= when and self.ordered > when)
 
     def may_be_on_a_mission(self, now: float) -> bool:
         """Return True if it was sent on a mission, not called back, and the session holds."""
@@ -452,6 +463,7 @@ class SafetyAudit:
         if another and _goes(motion) and not _pushed(motion, limits, now):
             yield "S2", f"changed its driver to {message.source} while moving at {_pace(motion)}"
         witness.owner, witness.ordered, witness.heard = message.source, asked.at, now
+        witness.stood_before = witness.stood
         does = Doing(message.source, message.session, level)
         if does != witness.does:  # who drives, and starts once more, goes on
             witness.ends("teleoperation", now)
@@ -527,6 +539,8 @@ class SafetyAudit:
             found += self._overstays(witness, motion, now)
             self._report(found, now, robot)
             witness.looked = now
+            if motion.asked_until <= now:
+                witness.stood = now
 
     def shows(self, now: float, page: Page) -> None:
         """Implement `Observer`."""
@@ -569,7 +583,7 @@ class SafetyAudit:
             message, at, source = witness.unanswered.pop(key)
             body, by = message.body, at + witness.obeys_within
             if isinstance(body, m.Emergency):
-                if witness.stopped < at:  # else one that came later, or a copy, has stopped it
+                if not witness.has_stood_since(at):
                     witness.stands(by)
             elif source != self._dva:
                 pass

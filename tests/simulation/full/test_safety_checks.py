@@ -20,6 +20,7 @@ from dva_sim.agents.robot.controller import (
     RobotController,
     TimedSetPoint,
 )
+from dva_sim.agents.robot.faults import RobotFaults
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.core.dispatcher import Dispatcher
@@ -373,6 +374,26 @@ def test_a_robot_that_moves_by_itself_after_an_emergency_breaks_s3(monkeypatch):
     run.clock.run(30.0)
     assert run.field.robots[ROBOT].controller.mode is Mode.MISSION
     assert broken(run) == {"S3"}
+
+
+@pytest.mark.invariant("S3")
+@pytest.mark.parametrize(("is_deaf", "rules"), [(False, set()), (True, {"S3"})])
+def test_an_emergency_whose_answer_is_lost_stops_a_robot_once(monkeypatch, is_deaf, rules):
+    """An honest robot stands, and is driven again by a new order; a deaf one just goes on."""
+    before = (10.0, m.PermissionGrant(DVA, "both", 5)), (11.0, m.StartTeleOp())
+    run = staged()
+    if is_deaf:
+        monkeypatch.setattr(RobotController, "_emergency", deaf)
+    again = () if is_deaf else ((22.0, m.StartTeleOp()), *every_second(23, 39, TURN))
+    commands = every_second(12, 39 if is_deaf else 19, TURN)
+    for time, body in (*before, *commands, *again):
+        ask(run, time, body)
+    ask(run, 20.0, m.Emergency(), session=0)
+    faults = RobotFaults(run.field.robots[ROBOT])
+    run.clock.call_at(19.9, faults.drop_replies, True)
+    run.clock.call_at(20.9, faults.drop_replies, False)
+    run.clock.run(39.0)
+    assert broken(run) == rules
 
 
 @pytest.mark.invariant("S4")
