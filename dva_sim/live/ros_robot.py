@@ -7,12 +7,11 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from dva_sim.agents.observation import Cameras
 from dva_sim.cameras.screens import topic_of
 from dva_sim.cameras.service import PictureService
-from dva_sim.kernel.config_overrides import parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.live.process import ending_when_asked
@@ -24,7 +23,8 @@ from dva_sim.ros.profile import DEFAULT, RosProfile, load_ros_profile
 from dva_sim.ros.robot import RosRobot
 from dva_sim.ros.websocket import WebSocketUrl
 from dva_sim.simulation.full.stage import DVA, Stage, id_of
-from dva_sim.simulation.scenario import Scenario, build
+from dva_sim.simulation.scenario import Scenario
+from dva_sim.simulation.scenario.lone_robot import lone_robot
 
 LAST_WORDS: Final = 0.3  # for the last command to stand [s]
 TELL_PERIOD: Final = 0.1  # between two looks at what there is to be told [s]
@@ -69,20 +69,8 @@ class RosRobotOptions:
         Raises:
             ConfigError: there is no such site, or a change makes no sense.
         """
-        source: dict[str, Any] = {
-            "description": "One robot of ROS, driven by whoever is let by a DVA elsewhere.",
-            "site": profile.site.model_dump(exclude_defaults=True),
-            "robot": {"count": self.number},
-            "guard": {"count": 0},
-            "operator": {"count": 1},  # elsewhere
-            "bystander": {"count": 0},
-            # A scenario has to have an event: there is nothing to be seen of this one.
-            "events": [{"kind": "fire", "false_alarm": True}],
-        }
-        try:
-            return build(source, parse_changes(self.changes))
-        except ConfigError as error:
-            raise set_by(self.changes, error) from None
+        site = profile.site.model_dump(exclude_defaults=True)
+        return lone_robot({"site": site, "robot": {"count": self.number}}, self.changes)
 
 
 def run_ros_robot(options: RosRobotOptions, say: Say) -> None:

@@ -20,7 +20,7 @@ from dva_sim.kernel.suggestions import unknown
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.storms.blind_mutants import WRITTEN_BLIND
+from dva_sim.storms.later_mutants import LATER_MUTANTS
 from dva_sim.storms.planting import (
     RIGHT,
     Bug,
@@ -29,6 +29,7 @@ from dva_sim.storms.planting import (
     Original,
     afterwards,
     instead,
+    quiet_about,
     skipped,
     with_arguments,
 )
@@ -524,22 +525,6 @@ def _keeps_all_waiting(original: Original, bug: Bug) -> Original:
     return wrong
 
 
-def _silent_when_busy(original: Original, bug: Bug) -> Original:
-    """Who asks for something that is not free gets no answer, and nobody counts that."""
-
-    def wrong(self: Any, request: Any, message: m.Message, handler: Any, **named: Any) -> Any:
-        def quiet(asked: m.Message) -> Any:
-            reply = handler(asked)
-            if reply is not None and reply.code == m.BUSY:
-                bug.act(f"{self.label} says nothing to {message.source}")
-                return None
-            return reply
-
-        return original(self, request, message, quiet, **named)
-
-    return wrong
-
-
 MUTANTS: Final[dict[str, Mutant]] = {
     "watchdog-too-long": Mutant(
         "S1", "a command is in force two seconds too long", f"{_ROBOT}._set", afterwards(_longer)
@@ -842,9 +827,9 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S11",
         "a refusal as busy is not said",
         "dva_sim.agents.device:AgentDevice.conclude",
-        _silent_when_busy,
+        quiet_about(m.BUSY),
     ),
-} | WRITTEN_BLIND
+} | LATER_MUTANTS
 
 
 def _taken(controller: Any, who: str, now: float) -> Decision:

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
+from dva_sim.protocol import messages as m
+
 Original = Callable[..., Any]
 Make = Callable[[Original, "Bug"], Original]
 
@@ -114,6 +116,27 @@ def with_arguments(**changed: Any) -> Make:
             if other != right:
                 bug.act(f"{getattr(self, 'id_tag', '')}: {other} instead of {right}")
             return other
+
+        return wrong
+
+    return make
+
+
+def quiet_about(code: int) -> Make:
+    """A handler of requests that sends no reply with a code, and counts none."""
+
+    def make(original: Original, bug: Bug) -> Original:
+        def wrong(
+            self: Any, request: Any, message: m.Message, handler: Any, **named_args: Any
+        ) -> Any:
+            def quiet(asked: m.Message) -> Any:
+                reply = handler(asked)
+                if reply is not None and reply.code == code:
+                    bug.act(f"{self.label} says nothing to {message.source}")
+                    return None
+                return reply
+
+            return original(self, request, message, quiet, **named_args)
 
         return wrong
 

@@ -87,14 +87,14 @@ class Attention:
         clock: The run's clock.
         switch: What it takes to find into another screen [s].
         habits: Of the person.
-        luck: Standard normal numbers, one for each look.
+        noise: Standard normal numbers, one for each look.
     """
 
     def __init__(
-        self, clock: Clock, switch: float, habits: AttentionHabits, luck: Iterator[float]
+        self, clock: Clock, switch: float, habits: AttentionHabits, noise: Iterator[float]
     ) -> None:
         self._clock, self._switch, self._habits = clock, switch, habits
-        self._luck, self._glance = luck, habits.glance_s
+        self._noise, self._glance = noise, habits.glance_s
         self._screens: list[Screen] = []
         self._seen: list[float] = []
         self._current: Screen | None = None
@@ -147,7 +147,7 @@ class Attention:
     def _look(self, screen: Screen, since: float) -> None:
         self._current, self._since = screen, since
         habits = self._habits
-        self._glance = habits.glance_s * math.exp(habits.glance_spread * next(self._luck))
+        self._glance = habits.glance_s * math.exp(habits.glance_spread * next(self._noise))
         screen.log.looks_since = since
 
     def _turn_away(self) -> None:
@@ -240,7 +240,7 @@ class DriverSeat:
         """From an order on the screen to acting on it, this time [s]."""
         return self.person.reading * math.exp(OCCASIONS * next(self._readings))
 
-    def luck(self, event: int) -> Iterator[float]:
+    def noise(self, event: int) -> Iterator[float]:
         """Standard normal numbers for one more time at an event, whatever the pattern."""
         self._times[event] += 1
         return _normals(self._looks(f"{event}/{self._times[event]}"), block=64)

@@ -68,7 +68,7 @@ class Work:
             self._goal,
             planner=seat.planner,
             person=seat.person,
-            luck=seat.luck(order.event_id),
+            luck=seat.noise(order.event_id),
             arrived=self._arrive,
         )
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from dva_sim.cameras.children import ChildFailed
 from dva_sim.console.asking.refusal import Refused
@@ -15,8 +14,6 @@ from dva_sim.console.pages.page_options import PageOptions
 from dva_sim.console.pages.processes import ConsoleProcesses
 from dva_sim.console.simulator.robot_desk import RobotDesk
 from dva_sim.console.simulator.robot_world import RobotWorld
-from dva_sim.kernel.config_overrides import parse_changes, set_by
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.live.process import ending_when_asked
 from dva_sim.network.addresses import check_address
 from dva_sim.network.keys import KeyRing
@@ -26,7 +23,8 @@ from dva_sim.simulation.full.verdicts import (
     refuse_broken,
     verdicts,
 )
-from dva_sim.simulation.scenario import Scenario, build
+from dva_sim.simulation.scenario import Scenario
+from dva_sim.simulation.scenario.lone_robot import lone_robot
 
 LAST_WORDS = 0.2  # for what was said last [s]
 EVERYWHERE = "0.0.0.0", "::"
@@ -64,19 +62,7 @@ class RobotOptions(PageOptions):
         """
         if self.dva is not None:
             check_address(self.dva, "--dva ")
-        source: dict[str, Any] = {
-            "description": "One robot, driven by whoever is let by a DVA elsewhere.",
-            "robot": {"profile": self.profile, "count": self.number},
-            "guard": {"count": 0},
-            "operator": {"count": 1},  # elsewhere
-            "bystander": {"count": 0},
-            # A scenario has to have an event: there is nothing to be seen of this one.
-            "events": [{"kind": "fire", "false_alarm": True}],
-        }
-        try:
-            return build(source, parse_changes(self.changes))
-        except ConfigError as error:
-            raise set_by(self.changes, error) from None
+        return lone_robot({"robot": {"profile": self.profile, "count": self.number}}, self.changes)
 
 
 class RobotSimulator:

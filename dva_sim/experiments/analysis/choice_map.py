@@ -1,4 +1,4 @@
-"""Which level of a factor to choose at each level of another, whoever the persons are.
+"""Choice of a level of one factor at each level of another, over all models of persons.
 
 The answer's factor is what one can choose (a messaging pattern), the factor it runs over is what
 one is given (a link), and the levels of a third are models of the persons that the data leave open.
@@ -74,7 +74,7 @@ class ChoiceMap:
 
     @property
     def is_worse(self) -> NDArray[np.bool_]:
-        """Whether a choice is clearly worse than the best under some model, `(g, c)`."""
+        """True for a choice that is clearly worse than the best under some model, `(g, c)`."""
         return np.asarray(self.is_clear.any(axis=2))
 
     @property
@@ -91,6 +91,16 @@ class ChoiceMap:
     def advised(self) -> Level:
         """The choice whose greatest regret is least."""
         return self.choice.levels[int(np.argmin(self.overall))]
+
+    @property
+    def is_beyond(self) -> bool:
+        """Return True if every situation is beyond what people were watched at."""
+        return bool(self.outside.any(axis=(1, 2)).all())
+
+    @cached_property
+    def never(self) -> NDArray[np.bool_]:
+        """True for a choice that ends no run in a situation, under any model, `(g, c)`."""
+        return np.asarray((self.mean >= self.most).all(axis=2))
 
     def best_of(self, situation: int) -> list[Level]:
         """The choices that are not clearly worse than the best; all where nothing differs."""

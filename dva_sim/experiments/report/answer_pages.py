@@ -39,8 +39,8 @@ def _table(answers: Sequence[KeptAnswer]) -> str:
 
 
 def _headline(answer: KeptAnswer) -> str:
-    """The contrast at its last level, or the first sentence of the answer."""
-    if answer.contrast is None or not answer.rows:
+    """The contrast at its last level if levels are quantities; else the first sentence."""
+    if answer.contrast is None or not answer.rows or isinstance(answer.rows[-1].level, str):
         return answer.answer.partition(". ")[0].removesuffix(".")
     row, unit = answer.rows[-1], unit_of(answer.measure)
     first, second = answer.contrast

@@ -10,7 +10,7 @@ from dva_sim.experiments.report.prose import note
 from dva_sim.kernel.wording import listing, quantity
 from dva_sim.simulation.labels import factor_name, level_name
 
-_NEVER = "never done"
+NEVER = "never done"
 
 
 def choice_table(found: ChoiceMap, part: str) -> CellTable:
@@ -28,7 +28,7 @@ def choice_table(found: ChoiceMap, part: str) -> CellTable:
         cells = [regret_text(found, g, c) for c in range(len(choices))]
         notes = [found.notes.get(str(situation), "")] if found.notes else []
         rows.append([name, _best(found, g), *cells, *notes])
-    told = note("map", unit=found.unit, has_outside=bool(found.outside.any()), models=found.models)
+    told = note("map", found=found)
     return CellTable(part, heads, 2, rows, note=told)
 
 
@@ -36,17 +36,18 @@ def regret_text(found: ChoiceMap, situation: int, choice: int) -> str:
     """`3 to 69`, over the models of persons; `=` where it is as good as the best."""
     if not found.is_worse[situation, choice]:
         return "="
-    if (found.mean[situation, choice] >= found.most).all():
-        return _NEVER
+    if found.never[situation, choice]:
+        return NEVER
     low, high = found.least[situation, choice], found.worst[situation, choice]
-    ends = dict.fromkeys((_short(float(low)), _short(float(high))))
+    ends = dict.fromkeys((regret_number(float(low)), regret_number(float(high))))
     return " to ".join(ends)
 
 
 def situation_name(found: ChoiceMap, situation: int) -> str:
-    """A situation, marked where it is beyond what people were watched at."""
+    """A situation, marked if it, unlike others, is beyond what people were watched at."""
     name = level_name(found.given.name, found.given.levels[situation])
-    return f"{name} †" if found.outside[situation].any() else name
+    is_marked = found.outside[situation].any() and not found.is_beyond
+    return f"{name} †" if is_marked else name
 
 
 def lead_of(found: ChoiceMap) -> str:
@@ -55,24 +56,23 @@ def lead_of(found: ChoiceMap) -> str:
     best = [name for name, worse in zip(names, found.is_worse.T, strict=True) if not worse.any()]
     given = factor_name(found.given.name)
     if len(best) == len(names):
-        return f"No choice differs from another by more than matters, on any {given} tried."
+        return f"Nothing differs by more than matters, on any {given} tried."
     if best:
         return f"On every {given} tried, none is better than {listing(best)}."
     order = np.argsort(found.overall, kind="stable").tolist()
-    costs = [f"{names[c]} up to {_cost(found, c)}" for c in order]
+    costs = [f"{names[c]} {_cost(found, c)}" for c in order]
     return (
-        f"No choice is best on every {given} tried. Beyond the best one for the same {given} and "
-        f"persons they cost: {listing(costs)}."
+        f"Nothing is best on every {given} tried. The most that each costs beyond the best one, "
+        f"for the same {given} and persons: {'; '.join(costs)}."
     )
 
 
 def _cost(found: ChoiceMap, choice: int) -> str:
-    worst = float(found.overall[choice])
+    """`14.6 s, slow robot`."""
     where = int(np.argmax(found.clear_worst[:, choice]))
-    place = level_name(found.given.name, found.given.levels[where])
-    if (found.mean[where, choice] >= found.most).any():
-        return f"not arriving at all ({place})"
-    return f"{quantity(worst, found.unit)} ({place})"
+    is_never = found.never[where, choice]
+    cost = NEVER if is_never else quantity(float(found.overall[choice]), found.unit)
+    return f"{cost}, {level_name(found.given.name, found.given.levels[where])}"
 
 
 def _best(found: ChoiceMap, situation: int) -> str:
@@ -82,5 +82,6 @@ def _best(found: ChoiceMap, situation: int) -> str:
     return listing([level_name(found.choice.name, level, short=True) for level in best])
 
 
-def _short(value: float) -> str:
+def regret_number(value: float) -> str:
+    """Format a regret, which has room for no more."""
     return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"

@@ -306,7 +306,7 @@ def of_robustness(study: Study) -> Iterator[Problem]:
 
 
 def of_map(study: Study) -> Iterator[Problem]:
-    """Why the map cannot be drawn."""
+    """Yield why the map cannot be drawn."""
     if study.map is None:
         return
     answer, models = study.answer, study.map.models

@@ -156,7 +156,7 @@ class CursorTrial(Trial[Sighting]):
         scenario: Device, links, frames.
         seat: Who does it.
         goal: What is to be done.
-        streams: The luck of this trial.
+        streams: The noise of this trial.
         reaction: See `Trial`.
 
     Attributes:
@@ -187,7 +187,7 @@ class CursorTrial(Trial[Sighting]):
         self._motion, self._summed = Motion(), summed_over(scenario.frames.rate_hz)
         self.moved_at: float | None = None
         self._eye = Strategy(seat.person, reach)
-        self._luck = normals(streams.fresh("aims"))
+        self._noise = normals(streams.fresh("aims"))
 
     def sight(self) -> Sighting:
         """Velocities are those of the last frames; see `Motion`."""
@@ -218,7 +218,7 @@ class CursorTrial(Trial[Sighting]):
         judged = self.seat.judged_delay(now)
         vx, vy = self._ask(driver, seen, now, judged)
         if self.goal.awaits_press and self._presses(
-            driver, PointView(now, seen, judged, self._luck)
+            driver, PointView(now, seen, judged, self._noise)
         ):
             self.goal.press(self.now)
         if self.goal.flat:
@@ -239,7 +239,7 @@ class CursorTrial(Trial[Sighting]):
             truth = Truth(seen)
             return driver.point(truth) if path is None else driver.follow(path, truth)
         if path is None:
-            return driver.point(PointView(now, seen, delay, self._luck))
+            return driver.point(PointView(now, seen, delay, self._noise))
         return driver.follow(PathView(now, seen, delay, path))
 
     @override

@@ -94,10 +94,10 @@ def vehicles(person: Person, cell: str, seed: int) -> list[Row]:
 
 def choices(person: Person, cell: str, seed: int) -> list[Row]:
     """Choices between two things: what more evidence speaks for first, is said."""
-    luck = _normals(seed)
+    noise = _normals(seed)
     rows = []
     for _ in range(TRIALS):
-        right, wrong = (_evidence(person, cell, luck, SHORTER) for _ in range(2))
+        right, wrong = (_evidence(person, cell, noise, SHORTER) for _ in range(2))
         looked = 0.0
         while not (right.sure or wrong.sure):
             right.weigh(PICTURE_S, 0.5 + HALF_CLEAR, 1.0)
@@ -111,10 +111,10 @@ def choices(person: Person, cell: str, seed: int) -> list[Row]:
 
 def items(person: Person, cell: str, seed: int) -> list[Row]:
     """Items beside the way of a searcher: found or not."""
-    luck, rows = _normals(seed), []
+    noise, rows = _normals(seed), []
     clear = clearness(ANGLE, person.habits.looking.half_seen_rad)
     for _ in range(ITEMS):
-        evidence = _evidence(person, "accuracy", luck)
+        evidence = _evidence(person, "accuracy", noise)
         for _ in range(round(PASSED_S / PICTURE_S)):
             if not evidence.sure:
                 evidence.weigh(PICTURE_S, clear, 1.0)
@@ -137,10 +137,10 @@ def _attention(clock: Clock, person: Person, seed: int) -> Attention:
     return Attention(clock, person.switch, person.habits.attention, _normals(seed))
 
 
-def _evidence(person: Person, cell: str, luck: Iterator[float], share: float = 1.0) -> Evidence:
+def _evidence(person: Person, cell: str, noise: Iterator[float], share: float = 1.0) -> Evidence:
     looking = person.habits.looking
     share *= looking.hurried if cell == "speed" else 1.0
-    return Evidence(person.sensitivity, share * person.confirm_look, luck, looking)
+    return Evidence(person.sensitivity, share * person.confirm_look, noise, looking)
 
 
 def _normals(seed: int) -> Iterator[float]:

@@ -79,8 +79,8 @@ def test_two_robots_share_the_eyes_and_each_turn_costs_the_switch():
 def test_looks_differ_as_the_spread_of_their_logarithm_says():
     clock, robots = Clock(), (Robot(), Robot())
     habits = AttentionHabits(reconsiders_s=0.01)
-    luck = iter(np.random.default_rng(1).normal(size=2000).tolist())
-    attention = Attention(clock, 1.0, habits, luck)
+    noise = iter(np.random.default_rng(1).normal(size=2000).tolist())
+    attention = Attention(clock, 1.0, habits, noise)
     for robot in robots:
         attention.begin(robot)
     clock.run(6000.0)

@@ -29,13 +29,13 @@ def seen(x, target=0.1, tolerance=0.005):
     )
 
 
-def moved(person, dead, seconds, luck=0.0):
+def moved(person, dead, seconds, noise=0.0):
     """Where the hand is, if the picture shows it so much later [m]."""
     aims, place, speed = Submovements(person, most=2.0), 0.0, 0.0
     shown, late = [0.0] * (round(dead / FRAME) + 1), round(dead / FRAME)
     keep, delay = math.exp(-FRAME / person.hand_lag), dead + person.hand_lag
     for n in range(round(seconds / FRAME)):
-        wanted, _ = aims.point(n * FRAME, seen(shown[-1 - late]), delay, repeat(luck))
+        wanted, _ = aims.point(n * FRAME, seen(shown[-1 - late]), delay, repeat(noise))
         speed = wanted + (speed - wanted) * keep
         place += FRAME * speed
         shown.append(place)

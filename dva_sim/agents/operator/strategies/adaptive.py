@@ -140,7 +140,7 @@ class Adaptive(Strategy):
             return self._closed.point(view)
         if view.seen.tolerance <= 0.0:  # no place to come to: it follows all the time
             return towards(view.seen, view.delay, self.person, self._most, self.person.tracks)
-        return self._aims.point(view.now, view.seen, view.delay, view.luck)
+        return self._aims.point(view.now, view.seen, view.delay, view.noise)
 
     @override
     def presses(self, view: PointView, hurried: bool) -> bool:

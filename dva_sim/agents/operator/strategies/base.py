@@ -23,13 +23,13 @@ class PointView(NamedTuple):
     """Knowledge of a person who moves a cursor to a target; as in `View`.
 
     Attributes:
-        luck: Standard normal numbers, by which its movements miss and it makes up its mind.
+        noise: Standard normal numbers, by which its movements miss and it makes up its mind.
     """
 
     now: float
     seen: Sighting
     delay: float
-    luck: Iterator[float] = repeat(0.0)
+    noise: Iterator[float] = repeat(0.0)
 
 
 class PathView(NamedTuple):
@@ -49,7 +49,7 @@ class Strategy:
     """Base class of steering strategies; derive your own from it.
 
     One is made for each drive or trial: it may remember what it saw in that, and nothing else.
-    It has no luck: errors and noise are the person's, outside.
+    It has no noise: errors and noise are the person's, outside.
 
     Args:
         person: Whose gains, caution and pace it steers with.

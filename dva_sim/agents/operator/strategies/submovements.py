@@ -96,14 +96,14 @@ class Submovements:
         self.off, self._unseen = math.inf, 0.0
         self.waited = self.total = 0.0
 
-    def point(self, now: float, seen: Sighting, delay: float, luck: Iterator[float]) -> Velocity:
+    def point(self, now: float, seen: Sighting, delay: float, noise: Iterator[float]) -> Velocity:
         """Velocity to ask for [m/s]; a target that moves is followed all the time.
 
         Args:
             now: [s]
             seen: The newest frame.
             delay: What the whole delay is taken to be [s].
-            luck: Standard normal numbers, three for each movement.
+            noise: Standard normal numbers, three for each movement.
         """
         if self._last is not None:
             passed = now - self._last
@@ -122,7 +122,7 @@ class Submovements:
             now >= self._rests_until(delay) - 1e-6
             and self.off > self._habits.close_enough * seen.tolerance
         ):
-            self._plan(now, dx, dy, seen.tolerance, luck)
+            self._plan(now, dx, dy, seen.tolerance, noise)
         vx, vy = self._moving(now)
         wanted = slowed(vx + target_vx, vy + target_vy, self._most)
         self._asked.append((now, *wanted))
@@ -164,12 +164,12 @@ class Submovements:
         return ended + delay + self._person.habits.waiting.settled_s
 
     def _plan(
-        self, now: float, dx: float, dy: float, tolerance: float, luck: Iterator[float]
+        self, now: float, dx: float, dy: float, tolerance: float, noise: Iterator[float]
     ) -> None:
         """A movement by so much, which misses by a share of it; the target's own is added."""
         habits, off = self._habits, math.hypot(dx, dy)
-        along, across = habits.misses * next(luck), habits.misses * next(luck)
-        self._boldness = 0.5 * math.erfc(next(luck) / math.sqrt(2.0))  # even, from 0 to 1
+        along, across = habits.misses * next(noise), habits.misses * next(noise)
+        self._boldness = 0.5 * math.erfc(next(noise) / math.sqrt(2.0))  # even, from 0 to 1
         if off > FAILS * math.hypot(*self._way) > 0.0:
             self._failures += 1
         bits = math.log2(1.0 + off / (2.0 * max(tolerance, habits.finest_m)))

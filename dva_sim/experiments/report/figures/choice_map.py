@@ -7,7 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dva_sim.experiments.analysis.study_view import StudyView
-from dva_sim.experiments.report.choice_table import regret_text, situation_name
+from dva_sim.experiments.report.choice_table import (
+    NEVER,
+    regret_number,
+    regret_text,
+    situation_name,
+)
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.csv_numbers import Numbers, in_units
 from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, SOFT
@@ -53,13 +58,7 @@ class ChoiceMapFigure(style.ReportFigure):
         ax.grid(False)
         ax.tick_params(length=0)
         unit = f" [{found.unit}]" if found.unit else ""
-        words = caption(
-            "map",
-            models=found.models,
-            unit=found.unit,
-            smallest=found.smallest,
-            has_outside=bool(found.outside.any()),
-        )
+        words = caption("map", found=found)
         title = (
             f"{capital(measure_name(found.measure))} beyond the best choice{unit}, by "
             f"{factor_name(found.given.name)}"
@@ -74,7 +73,7 @@ def _paint(ax: Axes, found: ChoiceMap) -> None:
         _cell(ax, c, g, _shade(found, float(worst), is_best), regret_text(found, g, c), is_best)
     ax.axhline(rows - 0.5, color=SOFT, linewidth=0.8)
     for c, worst in enumerate(found.overall):
-        text = _overall_text(found, float(worst))
+        text = _overall_text(found, c)
         is_best = found.choice.levels[c] == found.advised
         _cell(ax, c, rows, _shade(found, float(worst), is_best=False), text, is_best)
 
@@ -106,11 +105,11 @@ def _shade(found: ChoiceMap, worst: float, is_best: bool) -> float:
     return float(_FAINT + (_STRONG - _FAINT) * share)
 
 
-def _overall_text(found: ChoiceMap, worst: float) -> str:
-    at_most = found.mean.max(axis=(0, 2))
-    if np.isclose(worst, found.regret.max()) and at_most.max() >= found.most:
-        return "never done"
-    return f"{worst:.0f}" if worst >= 10.0 else f"{worst:.1f}"
+def _overall_text(found: ChoiceMap, choice: int) -> str:
+    worst = float(found.overall[choice])
+    if found.never[int(np.argmax(found.clear_worst[:, choice])), choice]:
+        return NEVER
+    return regret_number(worst)
 
 
 def _numbers(found: ChoiceMap) -> Numbers:

@@ -1,4 +1,4 @@
-"""Planted bugs that were written blind: before anybody knew whether a checker sees them."""
+"""Planted bugs of the last round, written before it was known whether a checker finds them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,16 @@ from dva_sim.agents.robot.controller import Decision, Mode
 from dva_sim.core.events import State
 from dva_sim.core.handovers import Step
 from dva_sim.protocol import messages as m
-from dva_sim.storms.planting import RIGHT, Bug, Mutant, Original, afterwards, instead, skipped
+from dva_sim.storms.planting import (
+    RIGHT,
+    Bug,
+    Mutant,
+    Original,
+    afterwards,
+    instead,
+    quiet_about,
+    skipped,
+)
 from dva_sim.worlds.bodies import TickTarget
 
 _CONTROLLER = "dva_sim.agents.robot.controller:RobotController"
@@ -121,22 +130,6 @@ def _remembers_requests(original: Original, bug: Bug) -> Original:
     return wrong
 
 
-def _quiet_to_the_unknown(original: Original, bug: Bug) -> Original:
-    """Who is not registered gets no answer, and nobody counts that."""
-
-    def wrong(self: Any, request: Any, message: m.Message, handler: Any, **named: Any) -> Any:
-        def quiet(asked: m.Message) -> Any:
-            reply = handler(asked)
-            if reply is not None and reply.code == m.NOT_REGISTERED:
-                bug.act(f"{self.label} says nothing to {message.source}")
-                return None
-            return reply
-
-        return original(self, request, message, quiet, **named)
-
-    return wrong
-
-
 def _never_over(original: Original, bug: Bug) -> Original:
     """An operator goes on, whatever the robot says."""
 
@@ -161,7 +154,7 @@ def _confirms_more(original: Original, bug: Bug) -> Original:
     return wrong
 
 
-WRITTEN_BLIND: Final[dict[str, Mutant]] = {
+LATER_MUTANTS: Final[dict[str, Mutant]] = {
     "future-tick-obeyed": Mutant(
         "S1",
         "a command behind a picture that was not taken yet is obeyed",
@@ -247,7 +240,7 @@ WRITTEN_BLIND: Final[dict[str, Mutant]] = {
         "S11",
         "who is not registered gets no answer",
         "dva_sim.agents.device:AgentDevice.conclude",
-        _quiet_to_the_unknown,
+        quiet_about(m.NOT_REGISTERED),
     ),
 }
 """Those of the second time, hunted in two to four storms each before any checker was changed."""
