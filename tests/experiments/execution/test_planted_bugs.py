@@ -41,7 +41,7 @@ def found(folder, plant, monkeypatch, kills=KILLS):
     quiet = folder / "quiet"
     interrupted.run(quiet, study)
     whole = kit.files(quiet)
-    calls = interrupted.calls_of(lambda: interrupted.run(folder / "counted", study))
+    calls = interrupted.calls_of(folder / "counted", study)
     plant(monkeypatch)
     for kill in range(1, kills + 1):
         out = folder / f"killed-{kill}"

@@ -89,11 +89,28 @@ class Dies:
             os.kill(os.getpid(), signal.SIGKILL)
 
 
+def profiled(name: str, profile: Callable[..., None]) -> None:
+    """Profile from the first call of a function of the runner on; what precedes it is not counted.
+
+    Before the journal is opened a study is read, compiled and described: many times as many calls
+    as its cheap runs take, and none that a kill could hurt.
+    """
+    call = getattr(runner, name)
+
+    def watched(*arguments: Any) -> Any:
+        sys.setprofile(profile)
+        return call(*arguments)
+
+    setattr(runner, name, watched)
+
+
 def killed_at_a_call(
     out: Path, study: Any, calls: int, runs: Callable[[Path, Any], None] = run
 ) -> int:
+    """Counts from the moment when the journal is opened."""
+
     def work() -> None:
-        sys.setprofile(Dies(calls))
+        profiled("_opened", Dies(calls))
         runs(out, study)
 
     return forked(work)
@@ -101,14 +118,9 @@ def killed_at_a_call(
 
 def killed_while_writing(out: Path, study: Any, calls: int) -> int:
     """Counts from the moment when the tables begin to be written."""
-    write_tables = runner.write_tables
-
-    def watched(*arguments: Any) -> None:
-        sys.setprofile(Dies(calls))
-        write_tables(*arguments)
 
     def work() -> None:
-        runner.write_tables = watched
+        profiled("write_tables", Dies(calls))
         run(out, study)
 
     return forked(work)
@@ -125,11 +137,15 @@ def killed_by_the_clock(out: Path, study: Any, cpu_s: float) -> int:
     return forked(work)
 
 
-def calls_of(work: Callable[[], object]) -> int:
-    count = Dies(0)
-    sys.setprofile(count)
-    work()
-    sys.setprofile(None)
+def calls_of(out: Path, study: Any) -> int:
+    """The number of calls from the moment when the journal is opened until the study has ended."""
+    opened, count = runner._opened, Dies(0)
+    profiled("_opened", count)
+    try:
+        run(out, study)
+    finally:
+        sys.setprofile(None)
+        runner._opened = opened
     return -count.left
 
 
@@ -149,22 +165,22 @@ def kills(folder: Path) -> dict[str, Any]:
 
     A study that was killed some times may end in quiet and is compared; then another begins.
     """
-    study, luck, seen = kit.study_in(folder), random.Random(SEED), Counter[str]()
+    study, rng, seen = kit.study_in(folder), random.Random(SEED), Counter[str]()
     plain = folder / "plain"
     run(plain, study)
-    whole, calls = kit.files(plain), calls_of(lambda: run(folder / "counted", study))
+    whole, calls = kit.files(plain), calls_of(folder / "counted", study)
     begun = time.process_time()
     run(folder / "timed", study)
     took = time.process_time() - begun
     ways: dict[str, Callable[[Path], int]] = {
-        "call": lambda out: killed_at_a_call(out, study, luck.randrange(1, calls)),
-        "writing": lambda out: killed_while_writing(out, study, luck.randrange(1, calls // 10)),
-        "clock": lambda out: killed_by_the_clock(out, study, luck.uniform(0.001, took)),
+        "call": lambda out: killed_at_a_call(out, study, rng.randrange(1, calls)),
+        "writing": lambda out: killed_while_writing(out, study, rng.randrange(1, calls // 2)),
+        "clock": lambda out: killed_by_the_clock(out, study, rng.uniform(0.001, took)),
     }
     while wanted := [way for way in ways if seen[way] < KILLS_EACH]:
         out = folder / f"killed-{seen['ended']}"
         for _ in range(KILLS_A_STUDY):
-            way = luck.choice(wanted)
+            way = rng.choice(wanted)
             if ended(ways[way](out)):
                 break
             seen[way] += 1
@@ -174,10 +190,10 @@ def kills(folder: Path) -> dict[str, Any]:
         seen["equal"] += kit.files(out) == whole
         seen["doubled"] += doubled(out)
         seen["left behind"] += len([p for p in out.iterdir() if p.name.startswith(".")])
-    return dict(seen) | pairs(folder, study, whole, calls, luck)
+    return dict(seen) | pairs(folder, study, whole, calls, rng)
 
 
-def pairs(folder: Path, study: Any, whole: Any, calls: int, luck: random.Random) -> dict[str, int]:
+def pairs(folder: Path, study: Any, whole: Any, calls: int, rng: random.Random) -> dict[str, int]:
     """Two runners on one folder, one after the other, until the first was killed often enough.
 
     Where the other left it too little to do, it ends before it dies.
@@ -185,7 +201,7 @@ def pairs(folder: Path, study: Any, whole: Any, calls: int, luck: random.Random)
     seen = Counter[str]()
     while seen["pairs killed"] < PAIRS:
         out = folder / f"pair-{seen['pairs']}"
-        killed = killed_at_a_call(out, study, luck.randrange(1, calls), run_after)
+        killed = killed_at_a_call(out, study, rng.randrange(1, calls), run_after)
         other = forked(lambda out=out: run_after(out, study))
         assert ended(other)
         seen["pairs"] += 1
