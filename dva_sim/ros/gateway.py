@@ -30,6 +30,7 @@ from dva_sim.simulation.full.stage import Stage
 LOOK_AROUND: Final = 2.0  # design: between two looks at who is there [s]
 MOST_ROBOTS: Final = 64
 MOST_DRIVERS: Final = 8  # clients that may be in control at a time
+TAKE_TRIES: Final = 3  # design: a long link takes a permission's time to be connected over
 SCAN_HZ: Final = 5.0
 RENEW: Final = 30.0  # design: of a subscription to a sensor [s]
 LIDAR: Final = "lidar"
@@ -120,6 +121,7 @@ class RosDriver:
         phone = console().phone
         self._person = PersonAgent(device, console(), lambda: GivenVelocity(phone))
         self._console, self._number = console, 0
+        self._wanted: set[str] = set()
         device.register()
 
     @property
@@ -129,7 +131,10 @@ class RosDriver:
 
     def take(self, robot: str, said: Said) -> None:
         """Ask the DVA for a robot, and the robot to be driven."""
+        self._wanted.add(robot)
+        self._take(robot, said, TAKE_TRIES)
 
+    def _take(self, robot: str, said: Said, tries: int) -> None:
         def taken(done: bool, text: str) -> None:
             held = self._person.robots.get(robot)
             if not done or held is None:
@@ -137,18 +142,31 @@ class RosDriver:
             elif held.is_driven:
                 said(True, text)
             else:
-                held.start(partial(self._begun, robot, said))
+                held.start(begun)
+
+        def begun(done: bool, text: str) -> None:
+            if done:
+                said(True, text)
+            else:  # what has ended the start has the last word on who holds the robot
+                self.device.clock.call_after(0.0, not_begun, text)
+
+        def not_begun(text: str) -> None:
+            held = self._person.robots.get(robot)
+            if held is not None:
+                held.give_back()
+                said(False, text)
+            elif tries > 1 and robot in self._wanted:
+                # The permission ran out while connections were made over a long link.
+                self._take(robot, said, tries - 1)
+            else:
+                said(False, f"{text}; call take_control again")
 
         self._person.attended, self._person.console = True, self._console()
         self._person.take([robot], taken)
 
-    def _begun(self, robot: str, said: Said, done: bool, text: str) -> None:
-        if not done and (held := self._person.robots.get(robot)) is not None:
-            held.give_back()
-        said(done, text)
-
     def release(self, robot: str, said: Said) -> None:
         """Stop a robot, and give it back."""
+        self._wanted.discard(robot)
         held = self._person.robots.get(robot)
         if held is None:
             said(False, "it is not yours")
@@ -163,6 +181,7 @@ class RosDriver:
 
     def release_all(self) -> None:
         """Stop and give back everything: the client is gone."""
+        self._wanted.clear()
         self._person.release(lambda *_: None)
 
     def drive(self, robot: str, speed: float, turn_rate: float) -> str:
