@@ -84,12 +84,12 @@ class Finding:
 
     @property
     def differs(self) -> NDArray[np.bool_]:
-        """Where the band does not hold zero `(k,)`."""
+        """Stops where the band excludes zero `(k,)`."""
         return np.asarray((self.low > 0) | (self.high < 0))
 
     @property
     def holds_zero(self) -> NDArray[np.bool_]:
-        """Where the band holds zero `(k,)`."""
+        """Stops where the band includes zero `(k,)`."""
         return np.asarray((self.low <= 0) & (self.high >= 0))
 
     @property
@@ -99,7 +99,7 @@ class Finding:
 
     @property
     def is_open(self) -> NDArray[np.bool_]:
-        """Where the band holds zero and differences that matter, too `(k,)`.
+        """Stops where the band includes both zero and a difference that matters `(k,)`.
 
         Those that matter were declared to; else they are as large as the measure usually is.
         """
@@ -119,7 +119,7 @@ def too_few(persons: int, cluster: str = "person") -> str:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a reader should take home.
+    """A study's answer: its main sentence, conditions and notes.
 
     Attributes:
         lead: The answer in two sentences.

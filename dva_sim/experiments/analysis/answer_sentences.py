@@ -65,7 +65,7 @@ def _reach(f: Finding) -> str:
 
 
 def _differs(f: Finding) -> list[str]:
-    """Where, in the direction told first and in the other one."""
+    """Say at which stops the contrast differs from zero, main direction first."""
     found = [np.flatnonzero(chosen) for chosen in (f.low > 0, f.high < 0) if chosen.any()]
     if not found:
         return []
@@ -87,7 +87,7 @@ def _remark_on_size(f: Finding, where: NDArray[np.intp]) -> str:
 
 
 def _elsewhere(f: Finding) -> Iterator[str]:
-    """Where the band holds zero: both are equal, an effect of some size is ruled out, or none."""
+    """Describe the stops where the band includes zero: equal, effect ruled out, or open."""
     is_equal = f.holds_zero & (f.bounds == 0)
     is_settled = f.holds_zero & ~is_equal & ~f.is_open
     kinds: list[tuple[NDArray[np.bool_], Callable[[float], str]]] = [
@@ -108,7 +108,7 @@ def _ruled_out(f: Finding, bound: float) -> str:
 
 
 def _left_open(f: Finding, bound: float) -> str:
-    """How large an effect may be, unless as large as it ever can."""
+    """Say how large an effect could still be, or that the data rule out nothing."""
     if bound >= f.widest:
         why = f"{f.persons} {f.cluster}s rule out nothing at all, more are needed"
     else:
@@ -189,7 +189,7 @@ def _telling_level(f: Finding, where: NDArray[np.intp]) -> int:
 
 
 def telling_stop(finding: Finding) -> int | None:
-    """The stop of which the answer speaks first; the last with a band where nothing is told."""
+    """Return the stop the answer leads with, else the last one that has a band."""
     for chosen in (finding.low > 0, finding.high < 0):
         if len(where := np.flatnonzero(chosen)):
             return _telling_level(finding, where)

@@ -14,7 +14,7 @@ from dva_sim.simulation.scenario import build, phone_profile
 
 @dataclass(frozen=True)
 class Cadence:
-    """How often the phone wants to send, and how long a robot needs for one command.
+    """Send period of the phone, and the time a robot needs per command.
 
     Attributes:
         period_s: Wanted time between two commands; the shortest, where it is not constant.

@@ -66,7 +66,7 @@ class Comparison(MatchedResults):
 
     @cached_property
     def paired(self) -> tuple[int, int]:
-        """Runs of the first folder that the second has with the same luck, and all of its runs."""
+        """Number of runs in the first folder paired by seed with the second, and their total."""
         groups = list(self.groups(None))
         runs = sum(len(self.own_rows(0, "runs", "seed", group).runs) for group in groups)
         return sum(len(self.shared(group)) for group in groups), runs
@@ -80,7 +80,7 @@ class Comparison(MatchedResults):
         return self.frame()._repr_html_()
 
     def frame(self, measure: str | None = None, by: Sequence[str] | None = ()) -> Frame:
-        """The same as `differences`, as columns."""
+        """Return `differences` as columns."""
         table, column = self.find(measure)
         rows = self.differences(f"{table}.{column}", by)
         names = dict.fromkeys(name for row in rows for name, _ in row.levels)

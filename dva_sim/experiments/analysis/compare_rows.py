@@ -87,17 +87,17 @@ class Difference:
 
     @property
     def is_identical(self) -> bool:
-        """Whether nothing at all has changed."""
+        """True if all runs are paired and unchanged."""
         return self.is_paired and self.same == self.runs[0] == self.runs[1]
 
     @property
     def is_told_from_zero(self) -> bool:
-        """Whether the interval, taken for itself, leaves out zero."""
+        """True if the unadjusted interval excludes zero."""
         return self.interval.low > 0 or self.interval.high < 0
 
 
 def as_numbers(rows: Rows, name: str) -> Rows:
-    """The same rows with floats for values: nan for missing ones, 1 and 0 for yes and no.
+    """Convert values to floats: nan for missing ones, 1 and 0 for yes and no.
 
     Raises:
         ConfigError: they are words.

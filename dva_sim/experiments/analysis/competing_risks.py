@@ -1,4 +1,4 @@
-"""How it ended by a fixed time: confirmed, or in one of the ways that rule a confirmation out.
+"""Competing outcomes of events by a fixed time: confirmed, or something that precludes it.
 
 Only what comes first counts, so the ways compete and their shares add up to one. What was still
 open when nobody looked any more is cut off; it is not taken for an ending.
@@ -36,7 +36,7 @@ _OF_DRIVES = {"lost link": "link lost", "gave up": "given up", "refused": "given
 
 @dataclass(frozen=True)
 class Ended:
-    """What had become of the events of one line at one stop.
+    """Outcomes of the events of one line at one stop.
 
     Attributes:
         line: Level of the factor that is compared.
@@ -75,7 +75,7 @@ class Endings:
 
     @cached_property
     def is_right(self) -> NDArray[np.bool_]:
-        """Whether each was confirmed in time, or cleared if it was a false alarm `(n,)`."""
+        """Mark events confirmed in time, and false alarms cleared in time `(n,)`."""
         return np.isin(self.way, RIGHT) & (self.time <= self.horizon)
 
     @cached_property
@@ -85,7 +85,7 @@ class Endings:
         return tuple(w for w in WAYS if w == NOTHING or np.any((self.way == w) & ~late))
 
     def under(self, line: Level, stop: Level, panel: Setting | None = None) -> NDArray[np.bool_]:
-        """Which events happened under these levels, and else as the answer has it `(n,)`."""
+        """Select the events under these levels; other factors as in the answer `(n,)`."""
         view = self._view
         wanted: Setting = dict(view.panels[0] if panel is None else panel)
         wanted |= {f.name: v for f, v in ((view.line, line), (view.over, stop)) if f}
@@ -122,7 +122,7 @@ class Endings:
 
 
 def with_endings(runs: Table, events: Table) -> Table:
-    """Runs with `confirmed` as the share of their true events that were, whoever was sent.
+    """Add to each run the share of its true events that any responder confirmed.
 
     The table itself tells of drives alone. `outcome` says of a run without any how its event
     ended, if it had but one.
@@ -149,7 +149,7 @@ _OF_RUNS = {"contained": CONFIRMED, "open": "timeout"}
 
 
 def _keys(table: Table) -> list[tuple[Any, ...]]:
-    """Which run each row is of."""
+    """Return the run of each row."""
     names = ("part", "cell", "person", "trial", "is_reference")
     return list(zip(*(np.asarray(table[name]).tolist() for name in names), strict=True))
 
@@ -162,7 +162,7 @@ def horizon_of(view: StudyView, scenario: Mapping[str, Any]) -> float:
 
 
 def _first(rows: Table, drives: NDArray[np.str_]) -> tuple[NDArray[np.str_], Floats]:
-    """What each event met first, and when since its report [s]."""
+    """First outcome of each event, and its time since the report [s]."""
     outcome = rows["outcome"].astype(str)
     way = np.array([_OF_EVENTS.get(word, word) for word in outcome], dtype="U24")
     way = np.where((way == "escalated") & (drives != ""), drives, way)
@@ -179,7 +179,7 @@ def _first(rows: Table, drives: NDArray[np.str_]) -> tuple[NDArray[np.str_], Flo
 
 
 def _how_drives_ended(rows: Table, runs: Table, part: str) -> NDArray[np.str_]:
-    """Why an event was escalated, by the last drive to it; empty where a run has several events.
+    """Return how the last drive to an event ended; empty where a run has several events.
 
     A run tells of the drives to its first driven event only.
     """

@@ -56,7 +56,7 @@ def get(scenario: Mapping[str, Any], key: str) -> Any:
 
 
 def timeout_remark(scenarios: Mapping[str, Mapping[str, Any]], study: Mapping[str, Any]) -> str:
-    """Whether a request that is sent again has time for its reply, condition by condition.
+    """Say whether a repeated request leaves time for its reply, condition by condition.
 
     Args:
         scenarios: Those of the parts.
@@ -84,7 +84,7 @@ def timeout_remark(scenarios: Mapping[str, Mapping[str, Any]], study: Mapping[st
 
 
 class _Waiting(NamedTuple):
-    """How long a request waits, and how long it would have to [s]."""
+    """Time-out of a request, and the time a reply needs [s]."""
 
     timeout: float
     round_trip: float
@@ -92,7 +92,7 @@ class _Waiting(NamedTuple):
 
 
 def _waiting(scenario: Mapping[str, Any], changes: Mapping[str, Any]) -> _Waiting | None:
-    """Of one condition; None where there are no requests."""
+    """Return time-out and needed time of one condition; None without requests."""
 
     def base(key: str) -> Any:
         return get(scenario, key)
@@ -127,7 +127,7 @@ def _needed(of: Callable[[str], Any]) -> tuple[float, float]:
 
 
 def _changes(study: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """What each combination of levels, and of the ends of ranges, changes in a scenario."""
+    """Yield the scenario changes of each combination of levels and of range ends."""
     named = study.get("treatments", {})
     factors = [
         [named[name][str(level)] if name in named else {name: level} for level in levels]

@@ -51,7 +51,7 @@ _STATISTICS = ("mean", "median", "min", "max", *_SHARES)
 
 
 class Test(NamedTuple):
-    """What a share counts: values that stand so to a number or word."""
+    """Condition on a value that a share counts, such as `> 3` or `== 'timeout'`."""
 
     sign: str
     than: float | str
@@ -59,7 +59,7 @@ class Test(NamedTuple):
 
 @dataclass(frozen=True)
 class Bound:
-    """What a statistic is held against.
+    """Limit that a statistic is compared with.
 
     Attributes:
         value: A factor, a difference or a value, in the measure's unit.
@@ -154,7 +154,7 @@ def parse(text: str) -> Gate:
 
 
 def percent_of(statistic: str) -> float | None:
-    """Which percentile a statistic is: 95 for `p95`; None if it is none."""
+    """Parse a percentile's name: 95 for `p95`; None for other statistics."""
     found = re.fullmatch(r"p(\d\d?(?:\.\d+)?)", statistic)
     return float(found[1]) if found and float(found[1]) else None
 

@@ -1,4 +1,4 @@
-"""How many robots one person can serve: what theory makes of what one robot alone needs.
+"""Number of robots per operator, predicted by theory from what a single robot needs.
 
 A robot is neglected while it works by itself, and needs interaction before it can go on. With
 one robot, neglect and interaction follow each other; with several, one person serves them in
@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 
 
 class Need(NamedTuple):
-    """What one robot alone needs for an event, on average.
+    """Mean times that a single robot needs per event.
 
     Attributes:
         neglect: By itself [s].
@@ -44,7 +44,7 @@ class Need(NamedTuple):
 
     @property
     def fan_out(self) -> float:
-        """How many robots keep the operator busy, if they come as they are needed."""
+        """Number of robots that keep the operator busy."""
         return (self.neglect + self.interaction) / self.interaction
 
     def rate_without_waiting(self, robots: int) -> float:
@@ -80,7 +80,7 @@ def settled_per_person(results: Results, part: str, where: Levels, since: float)
 
 
 def need_of(results: Results, part: str, where: Levels, since: float) -> Need:
-    """What one robot alone needs, from the runs with certain levels, one robot among them.
+    """Estimate the needs of a single robot from the runs with certain levels.
 
     Interaction is from the first sight of the place to the judgement. All else is neglect: also
     that the operator reads the order and the robot is started.

@@ -47,7 +47,7 @@ class GateVerdict:
 
     @property
     def holds(self) -> bool:
-        """Whether the condition holds, so that the comparison fails."""
+        """True if the condition holds, so that the comparison fails."""
         return bool(SIGNS[self.gate.sign](self.second, self.bound))
 
 
@@ -98,7 +98,7 @@ def _verdicts(
 
 
 def _refuse_crashed(group: GateGroup, runs: int) -> None:
-    """What would have come of runs that failed is not known."""
+    """Raise if runs failed in the second folder only: their values are unknown."""
     if runs:
         raise ConfigError(
             f"in part {group.part} {runs} runs of the second folder failed that did not in the "
@@ -113,7 +113,7 @@ def _missing(rows: Rows, crashed: int) -> float:
 
 
 def _both(gate: Gate, first: Rows, second: Rows) -> tuple[Rows, Rows]:
-    """Of pairs of runs those with a value on both sides: who has none is not among the best."""
+    """Keep the pairs with a value on both sides, so that missing ones do not rank as best."""
     alone = gate.statistic == "share" or gate.bound.kind == "absolute"
     if alone or first.runs != second.runs:
         return first, second

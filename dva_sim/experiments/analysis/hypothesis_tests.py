@@ -141,7 +141,7 @@ def _test_all(study: Mapping[str, Any], runs: Table) -> list[Tested]:
 
 
 def verdict_of(tested: Tested) -> Verdict:
-    """Whether a hypothesis held, by its own test and by that of the opposite, both adjusted."""
+    """Return the verdict, from the adjusted p of the hypothesis and of its opposite."""
     if tested.difference is None:
         return "not run"
     if tested.adjusted <= _ALPHA:
@@ -224,7 +224,7 @@ def _tested(
 
 
 def _p(claim: Hypothesis, pairs: PairedRuns) -> float:
-    """Of the claim's own test."""
+    """Return the p-value of the claim."""
     if claim.direction == "same":
         return equivalence(*pairs, claim.margin)
     margin = claim.margin if claim.direction == "above" else -claim.margin
@@ -232,7 +232,7 @@ def _p(claim: Hypothesis, pairs: PairedRuns) -> float:
 
 
 def _p_against(claim: Hypothesis, pairs: PairedRuns) -> float:
-    """Of the opposite: on the other side of the margin, or beyond either end of it."""
+    """Return the p-value of the opposite: beyond the margin, or beyond either end of it."""
     if claim.direction == "above":
         return one_sided_test(*pairs, claim.margin, "below")
     if claim.direction == "below":

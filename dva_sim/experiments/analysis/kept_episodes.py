@@ -1,4 +1,4 @@
-"""Which runs can be watched again, and which of them are the typical and the worst."""
+"""Runs that can be watched again, and the typical and the worst of them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dva_sim.simulation.labels import measure_called
 
 
 class Tables(NamedTuple):
-    """What is known of the runs.
+    """Tables of the runs, events and tracks.
 
     Attributes:
         runs: All of them.
@@ -33,7 +33,7 @@ class Tables(NamedTuple):
 
 
 class SeenIncident(NamedTuple):
-    """What happened, when [s] and where [m], or where only that is known in which room."""
+    """Incident with its time [s], and its position [m] or else its room."""
 
     kind: str
     start: float
@@ -43,7 +43,7 @@ class SeenIncident(NamedTuple):
 
 
 class Span(NamedTuple):
-    """What of a run a measure is the length of: from when, until when [s], what ends it."""
+    """Part of a run that a measure spans: start [s], end [s], and the event that ends it."""
 
     begins: float
     ends: float
@@ -80,7 +80,7 @@ class KeptEpisode:
 def typical_and_worst(
     folder: Path, part: str, measure: str, tables: Tables
 ) -> tuple[KeptEpisode, KeptEpisode] | None:
-    """Of the runs kept, the one nearest to the median of all and the one with the largest value.
+    """Find the kept run nearest to the median of all, and the kept run with the largest value.
 
     A recording is preferred where the study kept some; else the tracks of the table are taken.
     None where nothing was kept.
@@ -153,7 +153,7 @@ def _tracked(tracks: Table, part: str, runs: Table) -> NDArray[np.intp]:
 def _seen(
     files: Mapping[int, Path], tracks: Table, part: str, runs: Table, row: int
 ) -> tuple[Table, tuple[SeenIncident, ...]]:
-    """Who was where and what happened, from the recording or else from the table."""
+    """Return tracks and incidents of a run, from its recording or else from the tables."""
     if row in files:
         from dva_sim.recordings.reading import read_lapse  # late: start-up
 
@@ -175,7 +175,7 @@ def _of_run(table: Table | None, part: str, runs: Table, row: int) -> Table:
 
 
 def _told(events: Table) -> tuple[SeenIncident, ...]:
-    """What happened, by the table of events: of each the room is known."""
+    """Incidents listed in the table of events, with their rooms."""
     if "t_occurred_s" not in events:
         return ()
     columns = (events["kind"], as_floats(events["t_occurred_s"]), events["room"], events["is_true"])
@@ -188,7 +188,7 @@ _ENDS = {"confirmation": "t_confirmed_s", "response": "t_arrived_s"}
 
 
 def _span(events: Table, measure: str, value: float) -> Span | None:
-    """Of a run with one event, what a measure that waits for something of it is the length of."""
+    """Return the span that a waiting measure covers in a run with one event."""
     by = measure_called(measure).awaits
     ends = as_floats(events[_ENDS[by]]) if _ENDS.get(by) in events else np.array([])
     if len(ends) != 1 or not np.isfinite(ends[0]) or ends[0] < value:

@@ -14,7 +14,7 @@ from dva_sim.simulation.labels import absent_at_zero, factor_name, level_name, n
 
 
 def place_of(finding: Finding, stop: int) -> str:
-    """Where one stop of a finding lies: `with profile default, at a one-way delay of 1 s`."""
+    """Describe one stop of a finding: `with profile default, at a one-way delay of 1 s`."""
     return f"{condition(finding, inside=True)}{at(finding, [stop])}".removesuffix(", ")
 
 
@@ -55,7 +55,7 @@ def places(f: Finding, where: NDArray[np.intp]) -> str:
 
 
 def _spoken(f: Finding, where: Iterable[int]) -> str:
-    """`without delay`, `on the poor link`, `with filter none`: where a bare level is no English."""
+    """Phrase levels that are not plain numbers: `without delay`, `on the poor link`."""
     levels = [f.levels[int(i)] for i in where]
     if levels == [0] and (absent := absent_at_zero(f.over)):
         return f"without {absent}"
@@ -72,6 +72,6 @@ def _spoken(f: Finding, where: Iterable[int]) -> str:
 
 
 def is_ordered(f: Finding) -> bool:
-    """Whether the levels are quantities that ascend."""
+    """True if the levels are ascending quantities."""
     values = [v for v in f.levels if isinstance(v, int | float)]
     return len(values) == len(f.levels) and values == sorted(values)

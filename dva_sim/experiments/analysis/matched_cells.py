@@ -41,7 +41,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class Matched:
-    """How the cells of two folders fit together.
+    """Correspondence between the cells of two folders.
 
     Attributes:
         pairs: Cells that were found in both.

@@ -56,12 +56,12 @@ class MatchedResults:
 
     @cached_property
     def matched(self) -> Matched:
-        """Which cells are compared."""
+        """Cells present in both folders."""
         return match(*self.sides)
 
     @cached_property
     def columns(self) -> dict[str, list[str]]:
-        """What can be measured: the columns that both folders have, by table, the runs first."""
+        """Measurable columns that both folders have, by table, the runs first."""
         first, second = self.sides
         tables = [name for name in first.tables if second.has(name)]
         known = {*DESIGN, *first.factors, *second.factors}

@@ -1,4 +1,4 @@
-"""What was predicted, beside what was found: whether it held is said by rule, not by taste.
+"""Predictions beside findings; fixed rules decide whether each held.
 
 A direction holds when the 95 % interval lies on that side of zero, and fails when it lies on the
 other side or rules out every effect that matters. `same` holds when the interval lies within the
@@ -59,7 +59,7 @@ def judge_all(study: Mapping[str, Any], view: StudyView | None) -> list[Judged]:
 def verdict_of(
     direction: str | None, expected: Range | None, smallest: float | None, found: Interval
 ) -> Verdict:
-    """Whether a prediction held, by the interval of what was found."""
+    """Judge a prediction by the interval of the finding."""
     verdicts = [_of_direction(direction, smallest, found)]
     if expected is not None:
         verdicts.append(_of_range(expected, found))
@@ -135,7 +135,7 @@ def _asked(
 
 
 def _chose_what_was(view: StudyView, contrast: tuple[Level, Level], where: Setting) -> bool:
-    """Whether tuned and untuned runs are the same in all that was measured of them."""
+    """True if tuned and untuned runs agree in everything measured."""
     columns = [view.part.grid(name) for name in view.part.treated if name not in _NAMES]
     pairs = [[view.part.where(c, where | {TUNING: level}) for level in contrast] for c in columns]
     return all(np.array_equal(first, second, equal_nan=True) for first, second in pairs)

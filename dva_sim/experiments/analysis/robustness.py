@@ -1,4 +1,4 @@
-"""How far a conclusion reaches beyond the models of persons and the delays it rests on.
+"""Robustness of a conclusion to other models of persons and other delays.
 
 The contrast of every repeat under other models of the persons; and which cells lie beyond the
 delays at which people were watched: extrapolations, marked so. What counts there is the delay of
@@ -177,11 +177,11 @@ class _Reading:
         self._outside = None if support is None else support.outside.astype(float)
 
     def is_own(self, where: dict[str, Level]) -> bool:
-        """Whether that is the model of the study itself."""
+        """True if these are the strategy and parameters of the study itself."""
         return where[PARAMETERS] == 0 and where.get(STRATEGY, self._own) == self._own
 
     def is_beyond(self, where: dict[str, Level]) -> bool:
-        """Whether either side of the contrast is an extrapolation."""
+        """True if either side of the contrast is an extrapolation."""
         if self._outside is None:
             return False
         sides = (self.finding.first, self.finding.second)
@@ -264,7 +264,7 @@ def _told(r: RepeatedAnswer, stop: RepeatedStop) -> str:
 
 
 def _beyond(stop: RepeatedStop) -> str:
-    """How many of them are extrapolations."""
+    """Say how many of the repeats are extrapolations."""
     beyond = sum(r.is_beyond for r in stop.others)
     if not beyond:
         return ""

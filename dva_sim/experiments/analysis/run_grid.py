@@ -26,14 +26,14 @@ _Entry = TypeVar("_Entry", np.float64, np.bool_)
 
 @dataclass(frozen=True)
 class Factor:
-    """What a study varies, and the levels it takes, in the order declared."""
+    """Factor of a study and its levels, in the order declared."""
 
     name: str
     levels: tuple[Level, ...]
 
     @property
     def is_numeric(self) -> bool:
-        """Whether its levels are quantities, so that "from ... on" makes sense."""
+        """True if all levels are quantities, so that "from ... on" makes sense."""
         return all(isinstance(v, int | float) and not isinstance(v, bool) for v in self.levels)
 
 
@@ -81,13 +81,13 @@ class RunGrid:
 
     @cached_property
     def ran(self) -> NDArray[np.bool_]:
-        """Whether each cell `(levels of factor 1, ...)` has a run at all."""
+        """Mark the cells `(levels of factor 1, ...)` that have at least one run."""
         ran = np.zeros([len(f.levels) for f in self.factors], dtype=bool)
         ran[tuple(i[self._known] for i in self._index[: len(self.factors)])] = True
         return ran
 
     def has(self, column: str) -> bool:
-        """Whether at least one run gives a number for this column."""
+        """True if at least one run gives a number for this column."""
         values = self.treated.get(column)
         return values is not None and bool(np.isfinite(as_floats(values)).any())
 
@@ -120,7 +120,7 @@ class RunGrid:
         return np.asarray(self.grid(column) - self.reference(column))
 
     def has_reference(self, column: str) -> bool:
-        """Whether an excess can be taken at all."""
+        """True if reference runs exist, so that an excess can be computed."""
         return bool(np.isfinite(self.reference(column)).any())
 
     def where(self, grid: NDArray[_Entry], setting: Mapping[str, Level]) -> NDArray[_Entry]:
@@ -165,7 +165,7 @@ def as_floats(values: NDArray[Any]) -> Floats:
 
 
 def codes_of(table: Table, factor: Factor) -> NDArray[np.intp]:
-    """Which level of a factor each row has; -1 for none of them.
+    """Index of each row's level of a factor; -1 if it matches none.
 
     The level None is where nothing stands, which in a column of numbers is read as nan.
     """

@@ -1,4 +1,4 @@
-"""How many persons a study needs to show what it claims, counted from a pilot or an earlier one.
+"""Number of persons a study needs, estimated from a pilot or an earlier study.
 
 Every number follows one law: the interval or band that the report shows, narrowed as persons are
 added.
@@ -48,7 +48,7 @@ MOST_PERSONS = 10_000
 
 @dataclass(frozen=True)
 class IntervalLaw:
-    """How far an interval reaches from its mean, by the number of persons.
+    """Half-width of an interval as a function of the number of persons.
 
     Attributes:
         spread: Standard deviation of persons' means.
@@ -106,7 +106,7 @@ def law_of(
 
 
 class Count(NamedTuple):
-    """How many persons are needed, and what else would fit the spread as known: its 95 % interval.
+    """Number of persons needed, with its 95 % interval given the uncertain spread.
 
     Infinite beyond `MOST_PERSONS`.
     """
@@ -118,7 +118,7 @@ class Count(NamedTuple):
 
 @dataclass(frozen=True)
 class SizePlan:
-    """What a study would need to show one thing.
+    """Study size needed to show one thing.
 
     Attributes:
         name: Of the hypothesis or comparison.
@@ -150,7 +150,7 @@ class _Test(NamedTuple):
 def plans(
     study: Mapping[str, Any], runs: Table, decided: Collection[str] | None = None
 ) -> list[SizePlan]:
-    """What each hypothesis and each other comparison would need, and the answer where it is open.
+    """Plan sizes for each hypothesis and other comparison, and for an open answer.
 
     Args:
         study: As the manifest has it.
@@ -175,7 +175,7 @@ def plans(
 def _families(
     study: Mapping[str, Any], claims: Mapping[str, Hypothesis], named: Mapping[str, Contrast]
 ) -> Counter[str]:
-    """How many tests share a chance of 5 %: all hypotheses and comparisons of a family."""
+    """Count the tests that share a 5 % error rate: hypotheses and comparisons by family."""
     tests = Counter(named[claim.comparison].family for claim in claims.values())
     for name, contrast in named.items():
         if name != ANSWER:
@@ -184,7 +184,7 @@ def _families(
 
 
 def _of_answer(view: StudyView | None, in_any_case: bool) -> list[_Test]:
-    """What would settle the answer's question where it is open, at the level that needs most."""
+    """Return the test that would settle an open answer, at the level that needs most persons."""
     if view is None or view.contrast is None or view.line is None:
         return []
     differences = view.difference(view.panels[0], *view.contrast)
@@ -278,7 +278,7 @@ def _of_comparisons(
 
 
 def _interval(pairs: PairedRuns, level: float) -> Interval:
-    """Of the mean difference, as a report shows it but for its level."""
+    """Interval of the mean difference at a given level."""
     return mean_interval(pairs.first - pairs.second, pairs.person, level)
 
 

@@ -26,7 +26,7 @@ TABLE = "screening.csv"
 
 @dataclass(frozen=True)
 class Screening:
-    """What a screening found.
+    """Result of a screening.
 
     Attributes:
         numbers: Each assumed number with its effects on the answer over its whole band, in the

@@ -23,7 +23,7 @@ FLOOR, BEST, CALIBRATED = "random", "oracle", "nearest_idle"
 
 
 def is_dispatch(view: StudyView | None) -> bool:
-    """Whether a study compares policies on timed shifts, one line each."""
+    """True if a study compares policies on timed shifts, one line each."""
     if view is None or view.line is None or view.line.name != POLICY:
         return False
     return view.part.has("response_mean_s") and view.part.has("bound_mean_s")
@@ -45,7 +45,7 @@ class Shifts:
 
     @property
     def baseline(self) -> str:
-        """What others are compared with: the second of the contrast, or the first of all."""
+        """Policy that others are compared with: the contrast's second, else the first of all."""
         return str(self.view.contrast[1]) if self.view.contrast else self.policies[0]
 
     @property
@@ -55,7 +55,7 @@ class Shifts:
         return float(np.nanmax(found)) if np.isfinite(found).any() else FOLLOW_S
 
     def of(self, column: str) -> Floats:
-        """A measure of each run, `(shifts, policies, stops)`; nan where there is no run."""
+        """Values of a measure by run, `(shifts, policies, stops)`; nan for missing runs."""
         grid, panel = self.view.part.grid(column), self.view.panels[0]
         curves = [person_means(self.view.curve(grid, panel, p)) for p in self.view.lines]
         return np.stack(curves, axis=1)
@@ -89,7 +89,7 @@ class Shifts:
 
     @property
     def titles(self) -> list[str]:
-        """What each stop is called: its load, where that is what was varied."""
+        """Titles of the stops: the load where it was varied, else the setting."""
         over, loads = self.view.over, self.loads
         return [
             f"load {load:.2f}" if load is not None else setting({over.name: stop} if over else {})
@@ -98,7 +98,7 @@ class Shifts:
 
     @property
     def can_spare(self) -> bool:
-        """Whether people are in danger, and robots could be instead."""
+        """True if people are exposed to danger and robots are available instead."""
         has = self.view.part.has
         return has("use_of_robots") and bool(np.nanmax(self.means("exposure_s"), initial=0.0) > 0)
 
@@ -106,7 +106,7 @@ class Shifts:
 
     @property
     def target(self) -> str | None:
-        """What the way from the floor leads to: the oracle if it took part, else `bound`."""
+        """Policy that bounds the achievable: the oracle if it took part, else `bound`."""
         if FLOOR not in self.policies:
             return None
         return BEST if BEST in self.policies else "bound"
@@ -160,7 +160,7 @@ RESAMPLES = 1000
 def pooled(
     events: Mapping[str, NDArray[Any]], quantiles: Sequence[float], follow: float
 ) -> tuple[Floats, Floats, Floats]:
-    """Percentiles with the interval of drawing shifts anew: value, low, high, each `(q,)` [s].
+    """Percentiles with their bootstrap interval over shifts: value, low, high, each `(q,)` [s].
 
     Infinite where the percentile is not reached by `follow`: for all of a cohort that is
     followed so long this is what the cumulative incidence of response crosses.

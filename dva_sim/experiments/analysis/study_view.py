@@ -1,4 +1,4 @@
-"""How a reader looks at a study: which runs, which contrast, along what, and what was found."""
+"""Main view of a study: runs, contrast, x axis, and the finding."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ ROW = "row"  # name of the factor whose levels are the rows of a list
 
 @dataclass(frozen=True)
 class StudyView:
-    """How a reader looks at a part: what runs along x, what is a line, what is a panel.
+    """View of a part: its factors as x axis, lines and panels.
 
     Attributes:
         part: The runs.
@@ -214,7 +214,7 @@ def points_of(study: Mapping[str, Any], runs: Table) -> list[str]:
 
 
 def _spoken_of(study: Mapping[str, Any], together: Sequence[str]) -> str:
-    """Which of the factors taken together stands for them."""
+    """Choose the factor that represents those varied together."""
     declared = study.get("answer") or {}
     named = [declared.get("factor"), declared.get("over"), *(declared.get("within") or {})]
     return next((name for name in named if name in together), together[0])
@@ -233,14 +233,14 @@ def _as_trials(runs: Table) -> Table:
 
 
 def _is_sparse(runs: Table, factors: Sequence[Factor]) -> bool:
-    """Whether fewer than half of the cells of the grid were run."""
+    """True if fewer than half of the grid's cells were run."""
     treated = ~np.asarray(runs["is_reference"]).astype(bool)
     ran = len(np.unique(np.asarray(runs["cell"])[treated])) if "cell" in runs else 0
     return 2 * ran < math.prod(len(f.levels) for f in factors)
 
 
 def row_names(study: Mapping[str, Any], runs: Table) -> dict[int, str]:
-    """What each cell of a list is called, by what it sets; nothing where factors are told apart."""
+    """Names of the cells of a listed design, by their settings; empty for factorial designs."""
     factors = factors_of(study)
     listed = bool(study.get("design")) and not study.get("answer") and "cell" in runs
     if not listed or POINT in study["factors"] or not _is_sparse(runs, factors):
@@ -364,7 +364,7 @@ def possible_values(measure: str, scenario: Mapping[str, Any]) -> tuple[float, f
 
 
 def interval_of(values: Floats) -> Interval | None:
-    """Mean over persons of `(persons, trials)`, with persons drawn anew for its 95 % interval.
+    """Mean of `(persons, trials)` over persons, with a 95 % bootstrap interval over persons.
 
     The interval of persons who are all alike is that one value. None where nobody has a value.
     """
@@ -387,7 +387,7 @@ def _missed(view: StudyView) -> tuple[Missed, ...]:
 
 
 def _horizon(view: StudyView) -> float | None:
-    """What missed runs count with, if it is one and the same time."""
+    """Value that missed runs count with, if all have the same [s]."""
     if not view.part.has("confirmed") or unit_of(view.measure) != "s":
         return None
     missed = as_floats(view.part.treated["confirmed"]) == 0

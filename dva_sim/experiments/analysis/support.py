@@ -47,7 +47,7 @@ class Support:
 
 
 def support_of_part(part: RunGrid, scenario: Mapping[str, Any]) -> Support | None:
-    """What published data cover of a part; None where nobody's loop has a delay.
+    """Coverage of a part by published data; None if no control loop has a delay.
 
     Args:
         part: The runs.
@@ -79,7 +79,7 @@ def _waiting(part: RunGrid, delays: Floats) -> Floats:
 
 
 def _watched(delays: Floats, known: Sequence[tuple[float, float]]) -> Marks:
-    """Which delays lie in one of some ranges."""
+    """Mark the delays that lie within any of the ranges."""
     watched = np.zeros(delays.shape, dtype=bool)
     for low, high in known:
         watched |= (delays >= low) & (delays <= high)
@@ -93,7 +93,7 @@ def _strategies(part: RunGrid, scenario: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _has(part: RunGrid, strategy: str) -> Marks:
-    """Which cells are driven by a strategy."""
+    """Mark the cells driven by a strategy."""
     has = [setting.get(STRATEGY, strategy) == strategy for setting in part.settings()]
     return np.array(has).reshape([len(f.levels) for f in part.factors])
 

@@ -60,7 +60,7 @@ def _whom(reading: ResultsReading) -> str:
 
 
 def _persons(reading: ResultsReading, view: StudyView, finding: Finding) -> str:
-    """How many, how they steer, and what other models of them say."""
+    """Describe the simulated persons: number, strategy, and results for other models of them."""
     if reading.cluster == "shift":
         return f"{finding.persons} simulated, independent of each other."
     if reading.cluster == "repeat":
@@ -80,7 +80,7 @@ def _persons(reading: ResultsReading, view: StudyView, finding: Finding) -> str:
 
 
 def _assumptions(reading: ResultsReading, finding: Finding) -> str:
-    """How many numbers about the persons nobody measured, and which of them move an answer."""
+    """Say how many numbers about persons are assumed, and which of them move an answer."""
     if not get(reading.scenario_of(finding.part), STRATEGY):
         return ""
     count = len(all_assumptions())
@@ -92,7 +92,7 @@ def _assumptions(reading: ResultsReading, finding: Finding) -> str:
 
 
 def _how(view: StudyView, finding: Finding) -> str:
-    """Of the strategy that chooses: how much of the time they moved and waited."""
+    """Say how much of the time an adaptive strategy used move-and-wait."""
     stop = telling_stop(finding)
     if stop is None or not view.part.has(_WAITING):
         return ""
@@ -138,7 +138,7 @@ def _settings(reading: ResultsReading, view: StudyView, finding: Finding) -> Ite
 
 
 def _elsewhere(view: StudyView, finding: Finding, others: list[Setting]) -> str:
-    """The same difference, at the place of which the answer speaks first."""
+    """Give the same difference in the other settings, at the stop the answer leads with."""
     stop = telling_stop(finding) or 0
     where = f" {there}" if (there := at(finding, [stop])) else ""
     found = [(panel, *_difference(view, finding, panel, stop)) for panel in others]
@@ -186,7 +186,7 @@ def _fixed(reading: ResultsReading, part: str) -> dict[str, Any]:
 
 
 def _beyond(view: StudyView, finding: Finding) -> str:
-    """Where nobody was ever watched who could tell whether the simulated persons are right."""
+    """Say at which delays no published experiment covers the simulated persons."""
     outside = view.stops_outside(view.panels[0], view.contrast)
     if not outside or view.over is None:
         return ""

@@ -1,4 +1,4 @@
-"""What a report is made of: blocks in order, which a page and a printed document both set."""
+"""Building blocks of a report, in order, set by both the page and the printed document."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Words:
 
 @dataclass(frozen=True)
 class First:
-    """What the first screen holds, and the first page of paper.
+    """Content of the first screen, and of the first printed page.
 
     Attributes:
         lead: The answer.
@@ -99,7 +99,7 @@ class Terms:
 
 @dataclass(frozen=True)
 class Folded:
-    """What is there for who looks for it: folded away on a page, in full on paper."""
+    """Background: folded away on the page, in full in print."""
 
     title: str
     blocks: tuple[Block, ...]
@@ -121,7 +121,7 @@ def texts_of(blocks: Iterable[Block]) -> list[str]:
 
 
 def reworded(blocks: Iterable[Block], change: Callable[[str], str]) -> list[Block]:
-    """The same blocks with every text changed, in the order in which a reader meets them."""
+    """Return the blocks with every text changed, in reading order."""
     return [_reworded(block, change) for block in blocks]
 
 

@@ -115,7 +115,7 @@ def _told_once(table: CellTable) -> CellTable:
 
 
 def _note(table: CellTable, covered: str) -> str:
-    """What all rows have in common, and which are extrapolated."""
+    """Note below the table: values common to all rows, and which rows are extrapolated."""
     same = [f"{table.heads[n]} {table.rows[0][n]}" for n in _constant(table)]
     told = f"The same in all configurations: {', '.join(same)}." if same else ""
     return " ".join(filter(None, (told, covered)))
@@ -140,7 +140,7 @@ def _cell_name(setting: Setting) -> list[str]:
 
 
 def _value(part: RunGrid, name: str) -> _Column:
-    """What a factor that is no axis of the grid is set to in each cell."""
+    """Values of a factor outside the grid, one for each cell."""
     values = [plain_level(value) for value in part.first_of_cells(name)]
     return with_unit(name), [f"{v:.3g}" if isinstance(v, float) else str(v) for v in values]
 

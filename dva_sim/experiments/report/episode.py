@@ -54,7 +54,7 @@ class Played:
 
 @dataclass(frozen=True)
 class EpisodeRequest:
-    """What is asked of one scenario.
+    """Request to run one scenario, with changes, recording and pictures.
 
     Attributes:
         scenario: By name or path.
@@ -114,7 +114,7 @@ class EpisodeRequest:
         return pairs_of(self.set)
 
     def scenarios(self) -> list[AnyScenario]:
-        """What is to be played: one scenario, or two that differ by their pattern.
+        """Scenarios to run: one, or two that differ by their pattern.
 
         Raises:
             ConfigError: it is not there or not valid, or its model has not what is asked for.
@@ -132,7 +132,7 @@ class EpisodeRequest:
         return [scenarios.build(document, changes | {"pattern": each}) for each in patterns]
 
     def _check_other(self, scenario: AnyScenario) -> None:
-        """What only runs of the full model have is refused of others, before anything is run."""
+        """Reject options that only the full model supports, before anything runs."""
         it = f"{self.scenario} is a {scenario.model} scenario"
         if self.record is not None:
             raise ConfigError(f"{it}: only full ones are recorded")
@@ -174,7 +174,7 @@ class EpisodeRequest:
 
 
 def doubts(played: Sequence[AnyScenario]) -> list[str]:
-    """What in some scenarios does not go together, each in a sentence, once."""
+    """List the scenarios' contradictory settings, one sentence each, without duplicates."""
     full = [scenario for scenario in played if isinstance(scenario, Scenario)]
     return list(dict.fromkeys(doubt for scenario in full for doubt in contradictions(scenario)))
 

@@ -36,7 +36,7 @@ class Term:
 
     @property
     def pattern(self) -> str:
-        """As a regular expression."""
+        """Regular expression that matches the term."""
         return self.said or rf"\b{re.escape(self.name)}\b"
 
 

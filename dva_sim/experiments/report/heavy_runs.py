@@ -16,7 +16,7 @@ from dva_sim.statistics import quantile_interval
 
 
 def few_that_weigh(finding: Finding, view: StudyView) -> str:
-    """Where runs that count with the whole horizon pull at the mean, and what the median is."""
+    """Warn where runs that count with the whole horizon dominate the mean; give the median."""
     if finding.horizon is None or not view.part.has("confirmed"):
         return ""
     told = [_weight(finding, view, stop) for stop in range(len(view.stops))]

@@ -1,4 +1,4 @@
-"""What was claimed beside what came out: hypotheses and comparisons, as tables."""
+"""Tables of hypotheses and comparisons: claim beside result."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ def hypothesis_table(tested: Sequence[Tested], cluster: str = "person") -> CellT
 
 
 def _few(tested: Tested, cluster: str) -> str:
-    """Why it is open, where that is for want of persons."""
+    """Say that a hypothesis stayed open for want of persons; else an empty text."""
     found, least = tested.difference, tested.contrast.smallest or tested.hypothesis.margin or None
     is_few = tested.verdict == "open" and found is not None and _are_few(found, least)
     return too_few(found.n_persons, cluster) if is_few and found is not None else ""
 
 
 def _are_few(found: Interval, smallest: float | None) -> bool:
-    """Whether more persons are needed: for the test, or to rule out what was declared to matter."""
+    """True if the test, or ruling out the declared difference, needs more persons."""
     if 2.0 ** (1 - found.n_persons) > 1 - LEVEL:  # the least p that a permutation test can give
         return True
     return smallest is not None and max(-found.low, found.high) > smallest

@@ -39,7 +39,7 @@ class AnswerRow:
 
 @dataclass(frozen=True)
 class KeptAnswer:
-    """What a study answered once.
+    """Stored answer of a published study.
 
     Attributes:
         study: Name of the study.

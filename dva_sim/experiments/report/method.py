@@ -1,4 +1,4 @@
-"""How the numbers of a report were made, as remarks."""
+"""Remarks on method: how the numbers of a report were computed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FEW = 6  # persons: with fewer nothing can be drawn anew
 
 
 def remarks(reading: Reading) -> list[str]:
-    """How large it was, how it was judged, and by which program."""
+    """Remarks on study size, statistics and program version."""
     own = reading.page.method(reading.pair_correlation) if reading.view else None
     said = _usual(reading) if own is None else own
     study = {"hypotheses": None, "comparisons": None} | reading.study
@@ -41,7 +41,7 @@ def _size(reading: Reading) -> str:
 
 
 def _trials(reading: Reading) -> str:
-    """How many each person made; part by part where they differ."""
+    """Trials per person; by part where they differ."""
     usual = reading.study.get("replications")
     parts = reading.study.get("parts", {}).items()
     counts = {name: part.get("replications") or usual for name, part in parts}
@@ -51,7 +51,7 @@ def _trials(reading: Reading) -> str:
 
 
 def _why_so_many(reading: Reading) -> str:
-    """What ended a study that could end early."""
+    """Say why a study with a stopping rule or a budget ended."""
     stopped = reading.manifest.get("stopped") or {}
     if reading.study.get("stop") is None and reading.study.get("budget_s") is None:
         return ""
@@ -103,7 +103,7 @@ def _usual(reading: Reading) -> list[str]:
 
 
 def _adjusted(reading: Reading) -> str:
-    """What the answer is adjusted for, and what that was worth at its last level."""
+    """Describe the covariates of the answer, and their gain at the last level."""
     view = reading.view
     if view is None or view.contrast is None or not view.covariates:
         return ""
@@ -123,7 +123,7 @@ def _words(covariate: str) -> list[str]:
 
 
 def _alike(reading: Reading) -> str:
-    """What pairing gave, where it was seen: nothing is claimed beyond that."""
+    """Report the observed gain from pairing."""
     if reading.pair_correlation is None:
         return ""
     words = f"; at the last level the two sides correlate with {number(reading.pair_correlation)}"
@@ -138,7 +138,7 @@ def _alike(reading: Reading) -> str:
 
 
 def _reduction(reading: Reading) -> VarianceReduction | None:
-    """Of the contrast at its last stop."""
+    """Variance reduction of the contrast at its last stop."""
     view, sides = reading.view, reading.last_sides
     if view is None or sides is None:
         return None

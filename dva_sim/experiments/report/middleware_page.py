@@ -32,7 +32,7 @@ SUMMARIES: tuple[Summary, ...] = (
 
 
 class MiddlewarePage(ModelPage):
-    """Of commands measured in real time."""
+    """Report page for commands measured in real time."""
 
     name: ClassVar[str] = "middleware"
     cluster: ClassVar[str] = "repeat"
@@ -43,9 +43,9 @@ class MiddlewarePage(ModelPage):
 
     @classmethod
     def fits(cls, view: StudyView) -> bool:
-        """Whether runs tell how late the link was itself."""
+        """True if the runs measure the lateness of the link itself."""
         return view.part.has("late_p99_s")
 
     def method(self, correlation: float | None) -> list[str] | None:
-        """How commands were sent and measured."""
+        """Describe how commands were sent and measured."""
         return paragraphs("method_middleware")

@@ -1,4 +1,4 @@
-"""What a report says otherwise of one model of a run: words, tables, and which figures it has.
+"""Model-specific parts of a report: texts, tables and figures.
 
 `ModelPage` is the usual page, of persons who drive; a model whose runs are something else has a
 page of its own, derived from it (`model_pages`).
@@ -46,7 +46,7 @@ class ModelPage:
 
     @classmethod
     def fits(cls, view: StudyView) -> bool:
-        """Whether the study is of the kind that the page is made for."""
+        """True if the page suits this kind of study."""
         return True
 
     def told(self, finding: Finding) -> Finding:
@@ -54,7 +54,7 @@ class ModelPage:
         return replace(finding, cluster=self.cluster)
 
     def answer(self, finding: Finding | None) -> Answer:
-        """What a reader should take home."""
+        """Return the study's answer."""
         if finding is None:
             return Answer(
                 "The contrast that would answer the question was not declared or not run; "
@@ -76,7 +76,7 @@ class ModelPage:
         return conditions(scenarios, factors, changed)
 
     def method(self, correlation: float | None) -> list[str] | None:
-        """How the numbers were made, as remarks; None where the usual ones hold.
+        """Remarks on method; None for the default ones.
 
         Args:
             correlation: Of the two sides of the contrast at the last level, where it is known.
@@ -85,7 +85,7 @@ class ModelPage:
 
 
 def correlated(correlation: float | None) -> str:
-    """How alike the two sides of a contrast are, as a remark; nothing where it is not known."""
+    """Remark on the correlation of a contrast's two sides; empty if unknown."""
     if correlation is None:
         return ""
     return f"The two sides of the contrast correlate with {correlation:.2f} at the last level."

@@ -1,4 +1,4 @@
-"""What functions of `dva_sim` return of runs and studies, and how a notebook shows it."""
+"""Results of runs and studies that `dva_sim` functions return, with their notebook display."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Episode:
 
     @property
     def warnings(self) -> list[str]:
-        """What in the scenario does not go together, each in a sentence."""
+        """Contradictory settings of the scenario, one sentence each."""
         return model_for(self.scenario).contradictions(self.scenario)
 
     @property
@@ -45,7 +45,7 @@ class Episode:
         return {name: values.tolist()[0] for name, values in self.tables["runs"].items()}
 
     def __repr__(self) -> str:
-        """What came out of it, and what to ask it for."""
+        """Summary of measures and tables."""
         told = {name: plain(value) for name, value in self.measures.items()}
         some = listed(f"{name} {value}" for name, value in told.items() if value)
         tables = ", ".join(f"{name} ({table.rows})" for name, table in self.tables.items())
@@ -70,13 +70,13 @@ def episode_of(scenario: AnyScenario, seed: int, tables: Tables, kept: object = 
 
 
 class Results(ResultsData):
-    """What a study left behind, and what it says."""
+    """Results of a study: its tables, answer and report."""
 
     _offers = "answer, failures, machine, report()"
 
     @cached_property
     def reading(self) -> Reading:
-        """What the runs say, in words and tables."""
+        """Reading of the runs, in words and tables."""
         from dva_sim.experiments.report.summary import Reading  # late: start-up
 
         return Reading(self)
@@ -97,7 +97,7 @@ class Results(ResultsData):
         return write_report(self.folder)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: question, answer, and how many runs stand behind it."""
+        """Notebook display: question, answer and number of runs."""
         depends = (f"{about}: {words}" for about, words in self.answer.depends.items())
         notes = "".join(f"<p>{escape(note)}</p>" for note in (*depends, *self.answer.notes))
         failed = f", {len(self.failures)} failed" if self.failures else ""

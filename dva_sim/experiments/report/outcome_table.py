@@ -1,4 +1,4 @@
-"""How it ended, as a report says it: the answer's contrast in words, and a table."""
+"""Outcomes of events in a report: the answer's contrast in words, and a table."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def sentences(endings: Endings, view: StudyView, finding: Finding | None) -> lis
 
 
 def in_a_line(endings: Endings, part: str, failed: int = 0) -> str:
-    """That all went right in a part; of failed runs nobody knows."""
+    """Say that everything went right in a part, failed runs excepted."""
     every = f"every event{' whose run did not fail' if failed else ''} was confirmed"
     cleared = ", and every false alarm cleared" if CLEARED in endings.ways else ""
     return f"In part {part} {every}{cleared}."
@@ -78,7 +78,7 @@ _MOST_PLACES = 12
 def _places(
     endings: Endings, view: StudyView, panels: Sequence[Setting]
 ) -> list[tuple[Setting, Level]]:
-    """Where not all went right."""
+    """Panels and stops where not everything went right."""
     return [
         (panel, stop)
         for panel in panels
@@ -120,7 +120,7 @@ def _side(view: StudyView, ended: Ended) -> str:
 
 
 def _apart(endings: Endings, finding: Finding, stop: Level) -> str:
-    """How far the shares confirmed lie apart, in percentage points."""
+    """Difference between the shares confirmed, in percentage points."""
     found = endings.difference(finding.first, finding.second, stop)
     if not np.isfinite(found.low) or found.mean == 0:
         return ""

@@ -67,7 +67,7 @@ def print_page(page: Path, to: Path) -> None:
 
 
 def _undated(content: bytes) -> bytes:
-    """The same PDF without what differs from one printing to the next."""
+    """Strip dates and renumber nodes, so that two printings give the same bytes."""
     nodes = sorted(set(_NODES.findall(content)))
     numbers = {node: b"%08d" % number for number, node in enumerate(nodes, 1)}
     return _DATES.sub(_DATE, _NODES.sub(lambda match: numbers[match[0]], content))

@@ -13,17 +13,17 @@ if TYPE_CHECKING:
 
 
 def caption(name: str, **facts: Any) -> str:
-    """What the macro of a name in `captions.txt.j2` says of some facts."""
+    """Render a macro of `captions.txt.j2`."""
     return _in_a_line(str(getattr(_template("captions").module, name)(**facts)))
 
 
 def note(name: str, **facts: Any) -> str:
-    """What the macro of a name in `notes.txt.j2` says of some facts."""
+    """Render a macro of `notes.txt.j2`."""
     return _in_a_line(str(getattr(_template("notes").module, name)(**facts)))
 
 
 def paragraphs(name: str, **facts: Any) -> list[str]:
-    """What a template says of some facts: its paragraphs, a line each."""
+    """Render a template to paragraphs, one line each."""
     found = _template(name).render(facts).split("\n\n")
     return [line for text in found if (line := _in_a_line(text))]
 

@@ -62,7 +62,7 @@ def _claims(study: Mapping[str, Any], runs: Table) -> Iterator[list[str]]:
 
 
 def _design(study: Mapping[str, Any]) -> str:
-    """Which levels meet, and of which factors how many."""
+    """Describe how levels are combined, and the number of levels of each factor."""
     design, factors = study.get("design") or {}, study.get("factors") or {}
     told = [f"{factor_name(f)} ({len(v)} levels)" for f, v in factors.items() if f != POINT]
     for kind, words in _DESIGNS.items():
@@ -76,7 +76,7 @@ def _design(study: Mapping[str, Any]) -> str:
 
 
 def _program(versions: Mapping[str, Any]) -> str:
-    """As a registration has it."""
+    """Program version and fingerprint, as a registration states them."""
     return f"{versions.get('dva-sim')} {versions.get('fingerprint')}"
 
 

@@ -167,7 +167,7 @@ def _comparisons(reading: Reading) -> Iterator[Block]:
 
 
 def _endings(reading: Reading) -> Iterator[Block]:
-    """How runs ended, where not all of them went right; else a line, if the answer has none."""
+    """Table of outcomes if some runs went wrong; else a line, unless the answer has one."""
     endings, view = reading.endings, reading.view
     if endings is None or view is None:
         return
@@ -219,7 +219,7 @@ def _what_varied(reading: Reading) -> Iterator[Block]:
 
 
 def _how(design: Mapping[str, Any], factors: int) -> str:
-    """Which levels met each other."""
+    """Describe how levels were combined."""
     if design.get("zip"):
         return f"{listing([factor_name(n) for n in design['zip']])} taken together"
     if design.get("rows") or design.get("csv"):
@@ -294,7 +294,7 @@ def _method(reading: Reading) -> Iterator[Block]:
 
 
 def _words(blocks: Sequence[Block]) -> Iterator[Block]:
-    """What the words that were used mean."""
+    """Glossary of the terms used in the report."""
     if terms := terms_in(texts_of(blocks)):
         yield Heading(WORDS)
         yield Terms(tuple((term.key, term.name, f"{term.means}.") for term in terms))
@@ -322,7 +322,7 @@ def _changed(study: Mapping[str, Any]) -> list[str]:
 
 
 def _treatments(study: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """What each named level changes."""
+    """Named levels and the settings they change."""
     return [
         (level_name(factor, level), setting(changes) or "nothing")
         for factor, named in study.get("treatments", {}).items()

@@ -68,7 +68,7 @@ class ResultsReading:
 
     @property
     def _is_of_events(self) -> bool:
-        """Whether the answer is about events, whoever saw to them, and not about drives."""
+        """True if the answer is about events rather than drives."""
         measure = (self.study.get("answer") or {}).get("measure")
         ends_by_event = page_of(self.scenarios.values()).ends_by_event
         return measure in ("confirmation_mean_s", "response_mean_s") and ends_by_event
@@ -80,7 +80,7 @@ class ResultsReading:
 
     @property
     def persons(self) -> int:
-        """How many were simulated, which a stopping rule or a budget may have decided."""
+        """Number of persons simulated, possibly fewer than planned after an early stop."""
         return len(np.unique(self.runs["person"])) if self.runs else 0
 
     @property
@@ -95,7 +95,7 @@ class ResultsReading:
 
     @cached_property
     def view(self) -> StudyView | None:
-        """How the study is looked at, with its extrapolations known; None without any run."""
+        """View of the study with its extrapolations marked; None without runs."""
         view = view_of(self.study, self.runs) if self.runs else None
         if view is None:
             return None
@@ -124,7 +124,7 @@ class ResultsReading:
 
     @cached_property
     def page(self) -> ModelPage:
-        """What the report says otherwise of the study's model; asked where there are runs."""
+        """Report page for the study's model. Requires at least one run."""
         assert self.view is not None
         if self.by_people:
             return PeoplePage(self.view, self.table("drives"))
@@ -139,12 +139,12 @@ class ResultsReading:
 
     @property
     def cluster(self) -> str:
-        """What is drawn anew for intervals: persons, or shifts."""
+        """Unit that is resampled for intervals: person or shift."""
         return "person" if self.view is None else self.page.cluster
 
     @cached_property
     def endings(self) -> Endings | None:
-        """How the events of the answer's part ended; None where a study has none."""
+        """Outcomes of events in the answer's part; None if the study has no events."""
         events = self.table("events")
         if self.view is None or self.by_people or "closing_s" not in events:
             return None
@@ -167,7 +167,7 @@ class ResultsReading:
 
     @cached_property
     def map(self) -> ChoiceMap | None:
-        """What each choice costs in each situation, where the study declares a map."""
+        """Choice map, if the study declares one."""
         return None if self.view is None else choice_map(self.study, self.view)
 
     @property
@@ -197,7 +197,7 @@ class ResultsReading:
 
     @cached_property
     def pair_correlation(self) -> float | None:
-        """How alike the two sides of the contrast are, run by run, at the last stop."""
+        """Correlation between the contrast's two sides over runs, at the last stop."""
         if self.last_sides is None:
             return None
         first, second = self.last_sides
@@ -208,6 +208,6 @@ class ResultsReading:
         return found if np.isfinite(found) else None
 
     def trials_of(self, part: str) -> int:
-        """How many each person made in a part; 0 where that is not known."""
+        """Trials per person in a part; 0 if unknown."""
         own = (self.study.get("parts", {}).get(part) or {}).get("replications")
         return int(own or self.study.get("replications") or 0)

@@ -1,4 +1,4 @@
-"""What a report says in words and tables about a study of dispatch."""
+"""Report page for studies of dispatch: texts and tables."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ BOUND = "the best of fresh units that stand ready at every base and station"
 
 
 class ShiftPage(ModelPage):
-    """Of policies compared on shifts, one line each."""
+    """Report page that compares policies on shifts, one line each."""
 
     name: ClassVar[str] = "shift"
     cluster: ClassVar[str] = "shift"
@@ -71,7 +71,7 @@ class ShiftPage(ModelPage):
 
     @classmethod
     def fits(cls, view: StudyView) -> bool:
-        """Whether policies are what is compared."""
+        """True if the study compares policies."""
         return is_dispatch(view)
 
     def told(self, finding: Finding) -> Finding:
@@ -83,7 +83,7 @@ class ShiftPage(ModelPage):
         return _answer(finding, self.shifts)
 
     def cells(self, part: RunGrid) -> CellTable | None:
-        """Of the part the answer speaks of: with percentiles over all its events."""
+        """Table of the answer's part, with percentiles over all its events."""
         return _cells(self.shifts) if part.name == self.view.part.name else None
 
     def conditions(
@@ -92,11 +92,11 @@ class ShiftPage(ModelPage):
         factors: Sequence[Factor],
         changed: Sequence[str],
     ) -> list[tuple[str, list[str]]]:
-        """What was the same for all policies, part by part."""
+        """Conditions common to all policies, part by part."""
         return _conditions(list(scenarios.values()))
 
     def method(self, correlation: float | None) -> list[str] | None:
-        """How shifts were simulated, followed and compared."""
+        """Describe how shifts were simulated, followed and compared."""
 
         shifts = self.shifts
         facts = {"follow": f"{shifts.follow:g} s", "correlated": correlated(correlation)}
@@ -124,7 +124,7 @@ def _cells(shifts: Shifts) -> CellTable:
 
 
 def _percentiles(shifts: Shifts, setting: Setting) -> list[str]:
-    """Of one cell; a dash in the panels of other factors, which `events_of` does not hold."""
+    """Percentiles of one cell; a dash in other panels, which `events_of` does not cover."""
     view, panel = shifts.view, shifts.view.panels[0]
     if any(setting[name] != level for name, level in panel.items()):
         return ["–" for _ in PERCENTILES]
@@ -149,7 +149,7 @@ def _answer(finding: Finding | None, shifts: Shifts) -> Answer:
 
 
 def _along_loads(finding: Finding, shifts: Shifts) -> Finding:
-    """The same along the load of people, where that is known, instead of the rate of alarms."""
+    """Return the finding by load of people, where known, instead of by rate of alarms."""
     loads = [round(load, 2) for load in shifts.loads if load is not None]
     if len(loads) == len(shifts.stops):
         finding = replace(finding, over="load", levels=tuple(loads))
@@ -157,7 +157,7 @@ def _along_loads(finding: Finding, shifts: Shifts) -> Finding:
 
 
 def _price(finding: Finding, shifts: Shifts) -> list[str]:
-    """The same contrast in exposure: both sides of the trade."""
+    """Give the same contrast in exposure: the other side of the trade-off."""
     if not shifts.can_spare:
         return []
     first, second = str(finding.first), str(finding.second)
@@ -195,7 +195,7 @@ def _calibrated(shifts: Shifts) -> str:
 
 
 def _quickest(shifts: Shifts) -> str:
-    """Who has the least mean response at each load, and which others may be as quick."""
+    """Name the policy with the least mean response at each load, and those not slower."""
     response = shifts.means("response_mean_s")
     sentences = []
     for stop, title in enumerate(shifts.titles):
@@ -225,7 +225,7 @@ def _twins(shifts: Shifts) -> list[str]:
 
 
 def _contained(shifts: Shifts) -> str:
-    """What the quickest to look pays in containment, against who contains most."""
+    """Compare the containment of the fastest policy with that of the best at containing."""
     response, share = shifts.means("response_mean_s"), shifts.means("contained_share")
     parts = []
     for stop, title in enumerate(shifts.titles):

@@ -45,6 +45,6 @@ def _stop_name(view: StudyView, stop: int) -> str:
 
 
 def _printed(found: Components) -> list[str]:
-    """As standard deviations, which have the measure's own unit."""
+    """Standard deviations in the measure's unit, and the share between persons."""
     deviations: Floats = np.sqrt([found.between, found.within])
     return [*(number(float(x)) for x in deviations), percent(found.share)]

@@ -40,7 +40,7 @@ def _people(persons: int, trials: int | None, cluster: str) -> str:
 
 
 def _version(reading: Reading, usual: Mapping[str, Any]) -> str:
-    """Which version of which study."""
+    """Name of the study, and whether this is a smaller or larger version of it."""
     if not usual:
         return ""
     name, weight = usual["name"], _weight(reading.study) / _weight(usual)
@@ -50,7 +50,7 @@ def _version(reading: Reading, usual: Mapping[str, Any]) -> str:
 
 
 def _weight(size: Mapping[str, Any]) -> float:
-    """How many runs of one part that is."""
+    """Number of runs in one part."""
     count = float(size.get("persons") or 1) * float(size.get("replications") or 1)
     for levels in (size.get("factors") or {}).values():
         count *= len(levels)
@@ -58,7 +58,7 @@ def _weight(size: Mapping[str, Any]) -> float:
 
 
 def _whole(reading: Reading, usual: Mapping[str, Any]) -> str:
-    """What the study as its file says has that this one has otherwise."""
+    """Settings of the study's own file that this run changed."""
     if not usual or _weight(reading.study) == _weight(usual):
         return ""
     persons = _people(usual["persons"], usual["replications"], reading.cluster)
@@ -66,7 +66,7 @@ def _whole(reading: Reading, usual: Mapping[str, Any]) -> str:
 
 
 def _levels(study: Mapping[str, Any], usual: Mapping[str, Any]) -> list[str]:
-    """Of which factors it has more or fewer levels."""
+    """Factors with more or fewer levels than in the study's file."""
     here = study.get("factors") or {}
     return [
         f"{len(levels)} levels of {factor_name(name)} (here {len(here.get(name, ()))})"

@@ -1,4 +1,4 @@
-"""What a results folder says, in words and tables, without a picture or a page being made."""
+"""Content of a report from a results folder, without pictures or pages."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ _MOST_ERRORS = 3
 
 
 class Reading(ResultsReading):
-    """What a results folder says: its answer, verdicts, plans, cells and warnings."""
+    """Content of a report: answer, verdicts, size plans, cells and warnings."""
 
     @cached_property
     def answer(self) -> Answer:
-        """What a reader should take home, and what it depends on."""
+        """The answer and the conditions it depends on."""
         if self.view is None:
             return Answer("No run was completed, so there is nothing to answer with.")
         if why := self.distrusted.get(self.view.part.name):
@@ -77,7 +77,7 @@ class Reading(ResultsReading):
 
     @cached_property
     def plans(self) -> list[SizePlan]:
-        """What a study would need: of an exploratory one for all, else for what stayed open."""
+        """Sizes a study needs: for all tests if exploratory, else for those left open."""
         if not self._trusted:
             return []
         explores = status_of(self.manifest).kind == "exploratory"
@@ -121,7 +121,7 @@ class Reading(ResultsReading):
 
     @property
     def warnings(self) -> list[str]:
-        """What a reader must see before anything else."""
+        """Warnings to be shown first."""
         found = []
         if failures := self.results.failures:
             errors = dict.fromkeys(str(failure.get("error")) for failure in failures)

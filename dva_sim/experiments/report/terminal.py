@@ -81,7 +81,7 @@ def show_table(results: Results, name: str, rows: int, console: Console) -> None
 
 
 def show_columns(results: Results, tables: Sequence[str], console: Console) -> None:
-    """What the columns of some tables mean, or of all.
+    """Print what the columns of some tables mean; of all tables by default.
 
     Raises:
         ConfigError: no such table.
@@ -99,7 +99,7 @@ def show_columns(results: Results, tables: Sequence[str], console: Console) -> N
 
 
 def program(results: Results) -> str:
-    """Which program made the results."""
+    """Version of the program that made the results."""
     versions = results.manifest.get("versions", {})
     told = f"dva-sim {versions.get('dva-sim')}"
     if commit := versions.get("commit"):

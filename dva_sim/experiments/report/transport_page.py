@@ -1,4 +1,4 @@
-"""What a report says in words and tables about a study of transports."""
+"""Report page for studies of transports: texts and tables."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SUMMARIES: tuple[Summary, ...] = (
 
 
 class TransportPage(ModelPage):
-    """Of sessions that compete on a congested link."""
+    """Report page for sessions that compete on a congested link."""
 
     name: ClassVar[str] = "transport"
     summaries: ClassVar[tuple[Summary, ...]] = SUMMARIES
@@ -44,9 +44,9 @@ class TransportPage(ModelPage):
 
     @classmethod
     def fits(cls, view: StudyView) -> bool:
-        """Whether runs tell what a session takes."""
+        """True if the runs measure a session's throughput."""
         return view.part.has("session_down_bps")
 
     def method(self, correlation: float | None) -> list[str] | None:
-        """How the network and the drives over it were simulated."""
+        """Describe how the network and the drives over it were simulated."""
         return paragraphs("method_transport", correlated=correlated(correlation))

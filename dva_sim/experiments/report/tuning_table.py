@@ -1,4 +1,4 @@
-"""What a tuning saw and chose, as a report prints it."""
+"""Table of a tuning: candidates tried and the value chosen."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def tuned_table(manifest: Mapping[str, Any]) -> CellTable | None:
 
 
 def tuning_warning(manifest: Mapping[str, Any]) -> str:
-    """That values were tuned with other persons or phones than the study was run with."""
+    """Warn that values were tuned with other persons or phones than the study's."""
     if not manifest.get("tuned"):
         return ""
     tuned = validate(TunedValues, manifest["tuned"])

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def cadences(view: StudyView, scenario: Mapping[str, Any]) -> list[Cadence | None]:
-    """Of each panel shown; where a delay and a pattern that waits are among the factors."""
+    """Cadence of each panel shown; None unless delay and a waiting pattern are varied."""
     waits = any(level in PATTERNS and PATTERNS[str(level)].in_step for level in view.lines)
     if view.over is None or view.over.name != "link.delay_s" or not waits:
         return [None for _ in view.shown]
@@ -27,7 +27,7 @@ def cadences(view: StudyView, scenario: Mapping[str, Any]) -> list[Cadence | Non
 
 
 def boundary(over: Factor | None, cadence: Cadence | None) -> float | None:
-    """Where along x the wanted rate becomes too high; None if it is not among the levels.
+    """Position on x where the wanted rate becomes too high; None if outside the levels.
 
     Where places are not to scale, between two levels is the middle between them.
     """

@@ -1,4 +1,4 @@
-"""What each choice costs in each situation beyond the best one: the figure of a map."""
+"""Figure of a choice map: excess cost of each choice over the best, by situation."""
 
 from __future__ import annotations
 

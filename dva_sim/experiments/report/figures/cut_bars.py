@@ -47,7 +47,7 @@ def fit_to(axes: Axes, values: Floats) -> str:
 
 @dataclass(frozen=True)
 class Bars:
-    """What may be longer than the axes are: where each bar stands `(n,)`, and from where to where.
+    """Bars that may exceed the axes: position, low end and high end of each `(n,)`.
 
     Attributes:
         axes: In which they are drawn.

@@ -139,7 +139,7 @@ def _reference_line(ax: Axes, view: StudyView) -> None:
 
 
 def _confirmed(view: StudyView) -> Floats:
-    """Whether each run ended in a confirmation; a study that does not say so has no misses."""
+    """Return 1 for runs that ended in a confirmation; all runs if the study has no misses."""
     if view.part.has("confirmed"):
         return view.part.grid("confirmed")
     return np.ones_like(view.part.grid(view.measure))

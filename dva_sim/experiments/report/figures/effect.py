@@ -1,4 +1,4 @@
-"""What the factor does to the measure: paired differences of its levels."""
+"""Effect of the factor on the measure: paired differences of its levels."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Differences(style.ReportFigure):
 
 
 def _few_words(reading: Reading) -> str:
-    """That what cannot be told is no evidence, where nothing else was found."""
+    """Warn that overlapping bars show no equality when there are too few persons."""
     found = getattr(reading, "told", None)
     if found is None or not found.has_too_few:
         return ""

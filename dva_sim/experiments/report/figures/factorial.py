@@ -1,4 +1,4 @@
-"""What each factor does on average, and which two depend on each other."""
+"""Main effects of the factors, and the interactions of two."""
 
 from __future__ import annotations
 

@@ -46,13 +46,13 @@ def key(figure: Figure, handles: Sequence[Artist], names: Sequence[str]) -> None
 
 
 def key_height(names: Sequence[str]) -> float:
-    """What a key takes of a figure's height [in]."""
+    """Height that a legend needs in a figure [in]."""
     columns = columns_of([len(name) for name in names])
     return _ROW * -(-len(names) // columns)
 
 
 def columns_of(lengths: Sequence[int]) -> int:
-    """How many names stand abreast, if each column is as wide as the longest name in it."""
+    """Number of columns that fit, each as wide as its longest name."""
     for columns in range(len(lengths), 1, -1):
         if sum(max(lengths[c::columns]) + _HANDLE for c in range(columns)) <= _LINE:
             return columns

@@ -29,14 +29,14 @@ DIVERGING = "PuOr_r"  # purple below zero, white, orange above: far apart for ev
 
 
 class Look(NamedTuple):
-    """Of a line and its marks."""
+    """Style of a line and its markers."""
 
     colour: str
     mark: str
 
 
 class Fill(NamedTuple):
-    """Of a surface; white lines in it, if any."""
+    """Fill of a surface: colour and white hatching."""
 
     colour: str
     hatch: str = ""
@@ -141,12 +141,12 @@ def colours(factor: Factor | None) -> dict[Level, str]:
 
 
 def is_of_palette(colour: str) -> bool:
-    """Whether a colour, as `#rrggbb`, is one of those that a figure may use."""
+    """True if a colour, as `#rrggbb`, may be used in figures."""
     own = [INK, SOFT, FAINT, WARNING, HAZARD, "#ffffff", *(look.colour for look in LOOKS)]
     fills = [fill.colour for kind in (FATES, STAGES) for fill in kind.values()]
     return colour.lower() in {known.lower() for known in (*own, *fills)}
 
 
 def look_of(name: str) -> Look:
-    """Of a kind of agents: its own, or that of what is alone."""
+    """Return the style for a kind of agent, or the default."""
     return _OWN.get(name, ONE)

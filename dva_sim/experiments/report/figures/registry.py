@@ -107,7 +107,7 @@ def load_figures(names: Iterable[str], base: Path | None = None) -> list[ReportF
 
 
 def _problem_of_name(figure: ReportFigure, taken: set[str]) -> str:
-    """What is wrong with its name or title; nothing where they can be used."""
+    """Say what is wrong with a figure's name or title; empty if nothing."""
     name = getattr(figure, "name", None)
     if not isinstance(name, str) or not name.isidentifier() or name != name.lower():
         return f"its name is {name!r}; should be small letters, digits and underscores"
@@ -154,7 +154,7 @@ def _drawn(figure: ReportFigure, view: StudyView, reading: Reading) -> list[Draw
 
 
 def _what_panels_are(view: StudyView) -> str:
-    """Which factors a panel stands for, and whether there is one for each of their settings."""
+    """Say which factors the panels show, and whether every setting has a panel."""
     if len(view.panels) < 2:
         return ""
     names = listing([factor_name(name) for name in view.panels[0]])

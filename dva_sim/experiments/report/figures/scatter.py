@@ -46,7 +46,7 @@ class Cloud(NamedTuple):
 
 
 class Points(NamedTuple):
-    """What every point of the ranges gave.
+    """Results at all sampled points.
 
     Attributes:
         clouds: Each line, or the contrast of two of them if one was declared.

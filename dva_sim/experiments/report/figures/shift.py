@@ -36,7 +36,7 @@ _QUANTILES = (0.5, 0.9, 0.95)
 
 
 class ShiftFigure(ReportFigure):
-    """Of policies compared on shifts."""
+    """Figure that compares policies on shifts."""
 
     pages = ("shift",)
 
@@ -51,7 +51,7 @@ class ShiftFigure(ReportFigure):
 
 
 def _looks(shifts: Shifts) -> dict[Level, Look]:
-    """Of each policy, the same in every figure."""
+    """Return the style of each policy, the same in every figure."""
     return looks(Factor("dispatch.policy", shifts.policies))
 
 
@@ -126,7 +126,7 @@ def _scatter_numbers(shifts: Shifts, column: str) -> Numbers:
 
 
 def _act(shifts: Shifts) -> float:
-    """What containing costs, in the middle of all cells [s per event]."""
+    """Median extra exposure of containing an event, over all cells [s per event]."""
     return float(np.nanmedian(shifts.means("exposure_s") - shifts.means("exposure_look_s")))
 
 

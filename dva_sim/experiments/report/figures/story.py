@@ -48,7 +48,7 @@ _FATES = (  # as they are stacked
 def fates(
     outcome: NDArray[Any], responder_kind: NDArray[Any], is_true: NDArray[np.bool_]
 ) -> NDArray[np.str_]:
-    """What became of each event, in words of `_FATES`; outcomes it does not know are `other`."""
+    """Classify each event's outcome, in the words of `_FATES`; unknown outcomes are `other`."""
     words = np.char.add("confirmed by a ", responder_kind.astype(str))
     words = np.where(is_true, words, "false alarm confirmed")
     words = np.where(np.isin(outcome, ("confirmed", "contained")), words, outcome.astype(str))
@@ -83,7 +83,7 @@ class Events:
         return len(self.rows["part"])
 
     def under(self, panel: Setting, line: Level, stop: Level) -> NDArray[np.bool_]:
-        """Which events happened under these levels `(n,)`."""
+        """Select the events under these levels `(n,)`."""
         wanted = self._view.setting(panel, line) | style.stop_of(self._view, stop)
         mask = np.ones(len(self), dtype=bool)
         for name, (factor, codes) in self._codes.items():
@@ -91,7 +91,7 @@ class Events:
         return mask
 
     def by(self, responder: str) -> NDArray[np.bool_]:
-        """Which events were answered by this kind of responder `(n,)`."""
+        """Select the events answered by this kind of responder `(n,)`."""
         return np.asarray(self.rows["responder_kind"].astype(str) == responder)
 
     def times(self, column: str, mask: NDArray[np.bool_]) -> Floats:
@@ -115,7 +115,7 @@ class Events:
         }
 
     def one_fate(self) -> str | None:
-        """What became of every event, if it was the same for all."""
+        """Outcome of every event, if all had the same."""
         found = np.unique(self._fates)
         return str(found[0]) if len(found) == 1 else None
 
@@ -128,7 +128,7 @@ def story_part(table: Table, view: StudyView) -> str | None:
 
 
 class _Story(style.ReportFigure):
-    """Of the events of the part that tells a story."""
+    """Figure of the events of one part."""
 
     pages = ("driving",)
     tables = ("runs", "events")
@@ -216,7 +216,7 @@ def _quartiles(ax: Axes, offset: float, times: list[Floats], look: Look) -> None
 
 
 def _quantiles(times: list[Floats]) -> dict[str, Any]:
-    """How many events of each stop have a time, and its quartiles [s]."""
+    """Number of events with a time, and its quartiles [s], at each stop."""
     found = [np.quantile(t, [0.25, 0.5, 0.75]) if len(t) else np.full(3, np.nan) for t in times]
     names = ("p25_s", "p50_s", "p75_s")
     quartiles = {name: [float(q[i]) for q in found] for i, name in enumerate(names)}

@@ -228,7 +228,7 @@ def _factor_label(factor: Factor, unit: str) -> str:
 
 
 def is_to_scale(factor: Factor) -> bool:
-    """Whether the steps between its levels are equal; words have none that could differ."""
+    """True if the levels are equally spaced; always true of words."""
     if not factor.is_numeric:
         return True
     steps = np.diff([float(v) for v in factor.levels if isinstance(v, int | float)])
@@ -269,7 +269,7 @@ def hatch_stops(axes: Axes, stops: Sequence[int]) -> None:
 
 
 def hatch_words(view: StudyView) -> str:
-    """What the hatching means, if a panel has any."""
+    """Caption of the hatching; empty if no panel has any."""
     if not any(view.stops_outside(panel) for panel in view.shown):
         return ""
     return "Hatched: at least one line is extrapolated there (marked † in the tables)."
@@ -319,7 +319,7 @@ def outer_labels(axes: list[list[Axes]], shown: Sequence[Setting], text: str) ->
 
 
 def _make_room(axes: Axes, columns: int) -> None:
-    """Where several stand abreast, names below them must not run into each other."""
+    """Wrap or shrink the tick labels so that panels side by side do not overlap."""
     axes.set_xlabel(wrapped(axes.get_xlabel(), _TITLE // columns))
     names = [label.get_text() for label in axes.get_xticklabels()]
     if columns * sum(map(len, names)) > _CROWDED:
@@ -334,7 +334,7 @@ def has_lines(view: StudyView) -> bool:
 
 
 def leads_on(view: StudyView) -> bool:
-    """Whether one stop comes after the other; between words there is nothing to lead through."""
+    """True if the stops are numeric, so that a line may join them."""
     return view.over is not None and view.over.is_numeric and len(view.stops) > 1
 
 
@@ -350,7 +350,7 @@ def stop_of(view: StudyView, stop: Level) -> Setting:
 
 
 def place_of(over: Factor, value: float) -> float | None:
-    """Where a value lies between the evenly spaced levels; None outside of them."""
+    """Position of a value among evenly spaced levels; None if outside."""
     levels = np.array([float(v) for v in over.levels if isinstance(v, int | float)])
     if not over.is_numeric or len(levels) < 2 or not levels[0] <= value <= levels[-1]:
         return None
@@ -385,7 +385,7 @@ class ReportFigure(ABC):
     has_panels: ClassVar[bool] = False
 
     def applies(self, view: StudyView, reading: Reading) -> bool:
-        """Whether the results hold what is drawn: its page, its tables and its columns."""
+        """True if the results have the page, tables and columns that the figure needs."""
         if self.pages and reading.page.name not in self.pages:
             return False
         return all(map(reading.table, self.tables)) and all(map(view.part.has, self.columns))

@@ -58,7 +58,7 @@ _NUMBERED = 9  # of a kind: more have no room for their numbers
 
 
 class _TimeLapse(ReportFigure):
-    """Where everybody was at some moments of one run, with the way so far.
+    """Positions and paths of all agents at some moments of one run.
 
     Attributes:
         which: Of the runs that were kept.
@@ -159,7 +159,7 @@ def _with(times: Sequence[float], when: Floats, places: Floats) -> tuple[Floats,
 
 
 def _place_of(incident: SeenIncident, site: Site | None) -> tuple[float, float]:
-    """Where it is [m]; of one whose room alone is known, a place in that, for its name."""
+    """Position of an incident [m]; the middle of its room if only the room is known."""
     if not incident.room or site is None:
         return incident.x, incident.y
     boxes = [room.box for room in site.rooms if room.name == incident.room]

@@ -1,4 +1,4 @@
-"""How soon somebody is there against how long people stand in danger: both are better small."""
+"""Response time against time people spend in danger; smaller is better on both axes."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ PATH, TOUCHED = LOOKS[0].colour, LOOKS[1].colour
 
 
 class LengthUnit(NamedTuple):
-    """Of length, in a picture."""
+    """Unit of length used in a figure."""
 
     name: str
     per_m: float
@@ -47,7 +47,7 @@ def draw_trial(scenario: TaskScenario, seed: int, path: Path, number: int = 0) -
 
 
 def trial_figure(scenario: TaskScenario, row: Row, trace: Trace) -> Figure:
-    """Of a trial: the way that was taken, and the speed over time.
+    """Draw a trial: its path, and speed over time.
 
     Args:
         scenario: The task.
@@ -88,7 +88,7 @@ def _title(scenario: TaskScenario, row: Row) -> str:
 
 
 def name_and_unit(key: str) -> tuple[str, str]:
-    """What `length_m` or `bandwidth_rad_s` is, and in which unit."""
+    """Split a key such as `length_m` or `bandwidth_rad_s` into name and unit."""
     name, _, unit = key.partition("_")
     return name, unit.replace("_", "/")
 
@@ -148,7 +148,7 @@ def _numbers(ax: Axes, trace: Trace, unit: LengthUnit) -> None:
 
 
 def _place(ax: Axes, trace: Trace, unit: LengthUnit) -> None:
-    """Of what moves on a line: where it is over time, and its target."""
+    """Draw position and target over time, for one-dimensional motion."""
     for target in trace.walls:
         times, at = zip(*target, strict=True)
         ax.plot(times, unit.per_m * np.array(at), color=SOFT, lw=1.2, label="target")
