@@ -1,4 +1,4 @@
-"""How a study is run: by which workers, in which rounds, and how it goes on after an interruption.
+"""Execution of a study: workers, batches, and resuming after an interruption.
 
 It may import `study` and `results`. Begin reading at `runner.py`, then `scheduling.py` (runs handed
 out in chunks) and `checkpoint.py` (what is done so far).

@@ -1,4 +1,4 @@
-"""What a running study has done so far: one row per run, safe against being killed.
+"""Journal of a running study: one row per run, safe against a kill.
 
 From it a study is gone on with, and shown while it still runs.
 """
@@ -46,7 +46,7 @@ WHERE tables IS NULL
 
 @dataclass(frozen=True, slots=True)
 class RunOutcome:
-    """How one run ended.
+    """Result of one run: its tables, or the error that it failed with.
 
     Attributes:
         key: The run: hash of its configuration, and seed.
@@ -159,7 +159,7 @@ class Checkpoint:
             raise
 
     def _patiently(self, statement: str) -> None:
-        """Wait for whoever holds the checkpoint, in steps that let Ctrl-C through."""
+        """Retry while another process holds the lock, in steps that let Ctrl-C through."""
         end = time.monotonic() + _PATIENCE_S
         while True:
             try:
@@ -179,7 +179,7 @@ class Checkpoint:
             self._db.execute("UPDATE study SET manifest = ?", [json.dumps(manifest)])
 
     def manifest(self) -> dict[str, Any] | None:
-        """What the study is, as `describe` was told; None if nobody has."""
+        """Manifest stored by `describe`; None if there is none."""
         if "manifest" not in {row[1] for row in self._ask("PRAGMA table_info(study)")}:
             return None
         ((text,),) = self._ask("SELECT manifest FROM study")
@@ -200,13 +200,13 @@ class Checkpoint:
         return next((json.loads(text) for (text,) in self._ask(query, key) if text), None)
 
     def costs(self) -> dict[RunKey, float]:
-        """What each run that is done has cost [CPU s]."""
+        """Cost of each completed run [CPU s]."""
         query = "SELECT config, seed, cost_s FROM runs WHERE tables IS NOT NULL"
         return {(config, seed): cost for config, seed, cost in self._ask(query)}
 
     @property
     def wall_s(self) -> float:
-        """How long the study has been run so far, in all sessions together [s]."""
+        """Run time of the study so far, over all sessions [s]."""
         return float(self._ask("SELECT wall_s FROM study")[0][0])
 
     def _ask(self, query: str, values: Sequence[Any] = ()) -> list[Any]:

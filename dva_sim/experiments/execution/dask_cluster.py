@@ -143,13 +143,13 @@ class DaskCluster(Workers):
             return None
 
     def _is_connected(self) -> bool:
-        """Whether there is a connection, or hope for one."""
+        """True if connected or reconnecting."""
         return self._client.status in ("running", "connecting")
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep the library from logging what is told in one line when the block ends."""
+    """Silence the library's log; one line at the end of the block says the same."""
     loggers = [logging.getLogger(name) for name in _NOISY]
     levels = [logger.level for logger in loggers]
     for logger in loggers:
@@ -209,7 +209,7 @@ def differences(wanted: Versions, found: Versions) -> str:
 
 @cache
 def _mine() -> Versions:
-    """Of this process, as it was when it began: files that change later are not loaded again."""
+    """Versions of this process when it started; files changed later are not loaded."""
     return versions()
 
 

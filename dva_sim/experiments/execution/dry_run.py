@@ -1,4 +1,4 @@
-"""What running a study would mean: how many runs, what is done already, how long the rest takes."""
+"""Preview of a study: number of runs, runs already done, and time the rest takes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _SHORT_S = 1.0  # the first run reads files too; if it is as short as this it is
 
 @dataclass(frozen=True)
 class DryRun:
-    """What running a study would mean.
+    """Preview of a study's runs and costs.
 
     Attributes:
         runs: Different runs in all.
@@ -61,7 +61,7 @@ class DryRun:
 
 
 class _Tried(NamedTuple):
-    """What some configurations cost [s], and what is told of it; see `DryRun`."""
+    """Costs of some trial runs [s] and their warnings; see `DryRun`."""
 
     costs: dict[str, float]
     is_least: bool = False
@@ -75,7 +75,7 @@ def dry_run(
     jobs: int | None = None,
     probe: Simulate | None = None,
 ) -> DryRun:
-    """What `run_study` would do, without doing it.
+    """Return what `run_study` would do, without doing it.
 
     Args:
         asked: From `load_study`, or its plan if that has been made.
@@ -114,7 +114,7 @@ def dry_run(
 
 
 def _by_config(costs: Mapping[RunKey, float]) -> dict[str, float]:
-    """What a run of each configuration costs on the average [s]."""
+    """Mean cost of a run of each configuration [s]."""
     spent: dict[str, list[float]] = defaultdict(list)
     for (config, _), cost in costs.items():
         spent[config].append(cost)
@@ -122,7 +122,7 @@ def _by_config(costs: Mapping[RunKey, float]) -> dict[str, float]:
 
 
 def _estimate(left: Sequence[StudyJob], known: Mapping[str, float]) -> float | None:
-    """What the rest costs [s]; a configuration never run is taken for an average one."""
+    """Estimate the cost of the rest [s], new configurations at the mean of the others."""
     if not known and left:
         return None
     average = sum(known.values()) / max(1, len(known))
@@ -163,7 +163,7 @@ def _spread(count: int) -> list[int]:
 
 
 def contradictions_in(cells: Sequence[DesignCell]) -> list[str]:
-    """What does not go together in some configurations, each kind told once, as a sentence.
+    """List contradictory settings, one sentence for each kind.
 
     Two are of one kind if they begin with the same words, up to the first number.
     """

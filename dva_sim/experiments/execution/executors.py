@@ -1,4 +1,4 @@
-"""Who makes the runs: this process, or processes of this machine; a cluster has its own module.
+"""Workers in this process or in processes of this machine; a cluster has its own module.
 
 They give executors of `concurrent.futures`; who hands out runs knows nothing else of them.
 """
@@ -30,7 +30,7 @@ class WorkersLost(RunsFailed):
 
 
 class Workers(ABC):
-    """Who makes the runs, wherever that is.
+    """Interface of everything that makes runs.
 
     Attributes:
         is_here: Whether runs are made in this process, one by one.
@@ -91,7 +91,7 @@ def local(processes: int | None) -> Workers:
 
 
 def cores() -> int:
-    """How many processes can run at the same time here."""
+    """Number of CPU cores available to this process."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

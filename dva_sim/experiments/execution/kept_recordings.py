@@ -1,4 +1,4 @@
-"""Which runs of a study are kept as recordings, and how they are made.
+"""Runs of a study that are kept as recordings: their choice, and their making.
 
 A run is determined by its configuration and seed, so those chosen are simply run again after the
 study. What is chosen hangs on the tables alone: not on processes, interruptions or their order.
@@ -151,7 +151,7 @@ def name_of(job: StudyJob) -> str:
 
 
 def position_of(job: StudyJob) -> RunPosition:
-    """Where a run stands in its study."""
+    """Position of a run in its study: part, cell, person and trial."""
     return job.part, job.index, job.person, job.trial
 
 
@@ -164,7 +164,7 @@ def rows_of(results: Results) -> dict[RunPosition, Row]:
 
 
 def badness(measure: str, row: Row) -> float:
-    """How bad a run is; what never came is worst."""
+    """Rank a run by a measure: larger is worse, a missing value worst."""
     value = row.get(measure)
     if value is None or math.isnan(value):
         return math.inf
@@ -224,19 +224,19 @@ class Rerun:
 
 
 def _fingerprint(job: StudyJob, row: Row, own: Iterable[str]) -> str:
-    """Of what a run came to, beside what it was to be and what the user measured of it."""
+    """Hash of a run's measures, without its design columns and the user's measures."""
     asked = {*DESIGN_COLUMNS, *(factor for factor, _ in job.cell), *own}
     return _print_of({name: value for name, value in row.items() if name not in asked})
 
 
 def _print_of(row: Row) -> str:
-    """The same for a row as it was made and as a table holds it."""
+    """Hash a row, the same for the row of a run and for that of a table."""
     there = {name: v for name, v in row.items() if v is not None and v == v}
     return stable_hash({n: v if isinstance(v, str) else float(v) for n, v in there.items()})
 
 
 def _about(job: StudyJob) -> dict[str, str]:
-    """What tells the run from the others of its study."""
+    """Labels that identify a run within its study."""
     return {
         "part": job.part,
         "cell": str(job.index),

@@ -134,7 +134,7 @@ class _Session:
         self._tell(self._count, self._total)
 
     def left(self, batch: Sequence[StudyJob]) -> list[StudyJob]:
-        """What is not done yet, each run once, person by person.
+        """Runs of a batch not done yet, each once, person by person.
 
         So what is known on the way is known of whole persons, in all cells. Where the machine may
         change meanwhile, the cells of each come in random order.
@@ -246,7 +246,7 @@ def _workers(plan: StudyPlan, jobs: int | None, scheduler: str | None) -> Iterat
 
 
 def _is_written(out: Path, manifest: Mapping[str, Any]) -> bool:
-    """Whether this program has written the tables of these very runs, and nobody has changed them.
+    """True if this very program wrote the tables of these runs, and they are unchanged.
 
     What a run has made never changes once it is kept. So the same runs, with the same failures,
     make the same tables; only a program that is being changed may write them in another way.
@@ -301,12 +301,12 @@ class RunRequest:
 
     @property
     def folder(self) -> Path:
-        """Where results go; if nobody says, each variant of a study has its own folder."""
+        """Folder of the results; by default one for each variant of a study."""
         marks = [Path(self.study).stem, self.version, None if self.pilot is None else "pilot"]
         return Path(self.out or Path("results") / "-".join(filter(None, marks)))
 
     def dry_run(self, plan: StudyPlan, probe: Simulate | None = None) -> dry_run.DryRun:
-        """What `run` would do; see `dry_run`."""
+        """Preview what `run` would do; see `dry_run`."""
         jobs = self.jobs if self.scheduler is None else 1  # who knows how many are free there
         return dry_run.dry_run(plan, self.folder, jobs=jobs, probe=probe)
 

@@ -87,7 +87,7 @@ def perform(
 
 
 def clock_of(job: StudyJob) -> Callable[[], float]:
-    """What tells the cost of a run [s]: CPU time, or the wall clock where it is real time."""
+    """Clock for the cost of a run [s]: CPU time, or wall clock in real time."""
     is_real_time = job.scenario is not None and model_for(job.scenario).is_real_time
     return time.monotonic if is_real_time else time.thread_time
 
@@ -121,7 +121,7 @@ def _scalar(value: Any) -> Any:
 
 
 class _Pace:
-    """How long a chunk should be: about a second, so that little is lost and progress is seen.
+    """Size of a chunk: about a second of work, so that little is lost by a kill.
 
     Runs of one random seed plan the same ways to the same places, and a process plans each once:
     they stay together, unless workers would wait for each other at the end.
@@ -189,7 +189,7 @@ def _alone(suspects: deque[StudyJob], run: _Chunk, episode: Simulate, workers: W
 
 
 def _answers(under_way: _UnderWay, dead: deque[StudyJob], workers: Workers) -> _Batches:
-    """What has come, after waiting for a while at most; the runs of dead workers apart."""
+    """Yield finished chunks, after a limited wait; queue the runs of dead workers separately."""
     done = wait(under_way, timeout=_LOOK_S, return_when=FIRST_COMPLETED).done
     workers.look_after(is_idle=not done)
     for future in done:

@@ -67,7 +67,7 @@ class WorkerProcess:
 
     @property
     def is_stopped(self) -> bool:
-        """Whether a signal has stopped it, where the system tells."""
+        """True if a signal has stopped the process; False where the system does not tell."""
         with suppress(OSError):
             stat = Path(f"/proc/{self._process.pid}/stat").read_text()
             return stat.rpartition(")")[2].split()[0] == "T"

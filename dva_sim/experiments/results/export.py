@@ -61,7 +61,7 @@ _Write = Callable[[Path], object]
 def _files(
     results: Results, out: Path, tables: Sequence[str], form: str | None
 ) -> dict[Path, _Write]:
-    """How each file is written."""
+    """Writers of the output files, by path."""
     if form is not None and form not in FORMATS:
         raise ConfigError(f"--format {form!r} should be {either(FORMATS)}")
     ending = out.suffix.removeprefix(".")
@@ -94,7 +94,7 @@ _CELLS = {
 
 
 def _write_csv(source: Path, path: Path) -> None:
-    """What is nan is as empty as what is missing: both say that there is no number."""
+    """Write a table as CSV; nan and missing values both become empty cells."""
     import duckdb
 
     with duckdb.connect(config={"threads": 1}) as connection:

@@ -108,7 +108,7 @@ def _locked(file: int, path: Path) -> bool:
 
 
 def _is(file: int, path: Path) -> bool:
-    """Whether a path still leads to an open file."""
+    """True if a path still refers to an open file."""
     try:
         return os.path.samestat(os.fstat(file), path.stat())
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""What a results folder says of itself: what was asked and run, and what it may be called.
+"""Manifest of a results folder: request, runs and status.
 
 What differs from machine to machine is apart, in a file of its own.
 """
@@ -33,7 +33,7 @@ _PACKAGES = ("duckdb", "lxml", "numpy", "pymunk", "scipy", "shapely", "simpy")
 
 
 def manifest_of(plan: StudyPlan) -> dict[str, Any]:
-    """What was asked and run: nothing in it depends on when, where or how fast.
+    """Manifest of a plan, independent of time, place and speed.
 
     Its `hash` is the identity of the results: a folder holds one study, of one program.
     """
@@ -82,7 +82,7 @@ def versions() -> dict[str, str | bool | None]:
 
 
 def _simulating() -> dict[str, str]:
-    """What the numbers of a run depend on; a folder holds runs of one such state only."""
+    """Versions that the numbers of a run depend on; each folder holds runs of one set only."""
     packages = {name: version(name) for name in _PACKAGES}
     return {"dva-sim": __version__, "fingerprint": fingerprint()} | packages
 
@@ -93,7 +93,7 @@ def failures(todo: Sequence[StudyRun], failed: Mapping[RunKey, str]) -> list[dic
 
 
 def machine(todo: Sequence[StudyRun], costs: Mapping[RunKey, float]) -> dict[str, Any]:
-    """What is different on every machine and at every time.
+    """Details that differ between machines and times.
 
     Args:
         todo: The runs of the study.
@@ -123,7 +123,7 @@ def write_json(path: Path, data: dict[str, Any]) -> None:
 
 
 def status_of(manifest: Mapping[str, Any]) -> Status:
-    """What the result may be called; results that do not say are judged by what was set.
+    """Status of the results; judged from the settings if the manifest states none.
 
     A confirmation has all the runs that were registered. Runs that took too long are others on
     another machine. Verdicts are replaced whenever they are told, by the program as it is then.

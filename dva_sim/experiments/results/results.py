@@ -1,4 +1,4 @@
-"""What a results folder holds: the manifest, and the tables as columns of numpy arrays.
+"""Results folder: the manifest, and tables as columns of numpy arrays.
 
 Nothing is concluded or drawn here: `experiments.report` reads results, and `dva_sim.Results` adds
 what it finds. The data dictionary says what every column means: times of events are seconds of the
@@ -97,7 +97,7 @@ def _meaning(
 
 
 def _of_model(model: str, table: str, name: str) -> str:
-    """What one of our models says; of others the results tell themselves."""
+    """Meaning of a column in a shipped model; empty for other models."""
     columns = MODELS[model].columns.get(table, ()) if model in MODELS else ()
     return next((column.meaning for column in columns if column.name == name), "")
 
@@ -115,7 +115,7 @@ class Frame(dict[str, Array]):
 
     @property
     def rows(self) -> int:
-        """How many rows it has."""
+        """Number of rows."""
         return len(next(iter(self.values()), ()))
 
     def where(self, rows: Array) -> Frame:
@@ -123,7 +123,7 @@ class Frame(dict[str, Array]):
         return Frame({name: values[rows] for name, values in self.items()})
 
     def to_pandas(self) -> Any:
-        """The same as a pandas.DataFrame; pandas must be installed.
+        """Convert to a pandas.DataFrame; pandas must be installed.
 
         Raises:
             ModuleNotFoundError: it is not.
@@ -131,7 +131,7 @@ class Frame(dict[str, Array]):
         return import_module("pandas").DataFrame(dict(self))
 
     def to_duckdb(self) -> DuckDBPyRelation:
-        """The same as a relation of duckdb, to ask by SQL; missing numbers are NULL."""
+        """Convert to a DuckDB relation for SQL queries; missing numbers are NULL."""
         import duckdb
 
         connection = duckdb.connect()
@@ -218,7 +218,7 @@ def digest_of(path: Path) -> str:
 
 @dataclass(frozen=True)
 class Results:
-    """What a study left behind.
+    """Results of a study.
 
     Every table begins with the design columns `part`, `cell` (position in the grid, -1 for
     a reference run), `config` (hash of the resolved scenario), one column per factor under
@@ -266,12 +266,12 @@ class Results:
 
     @property
     def question(self) -> str:
-        """What was asked."""
+        """Question that the study answers."""
         return str(self.study.get("question", ""))
 
     @property
     def partial(self) -> str:
-        """How much of an unfinished study is there; nothing where it is complete."""
+        """Remark on how much of an unfinished study is there; empty if complete."""
         found = self.manifest.get("partial")
         if found is None:
             return ""
@@ -316,7 +316,7 @@ class Results:
         return sorted(path.stem for path in self._tables.glob("*.parquet"))
 
     def has(self, name: str) -> bool:
-        """Whether the study wrote a table of that name."""
+        """True if the study wrote a table of that name."""
         return name in self.tables
 
     @cached_property
@@ -331,7 +331,7 @@ class Results:
         return self.table("runs")
 
     def columns(self, table: str) -> list[Column]:
-        """What the columns of a table mean.
+        """Meanings of a table's columns.
 
         Raises:
             ConfigError: no such table, or a damaged file.
@@ -409,7 +409,7 @@ class Results:
         return set()
 
     def __repr__(self) -> str:
-        """What it is and what to ask it for, without any table being read."""
+        """Summary of contents and queries, without reading a table."""
         runs, cells = self.manifest.get("runs", 0), len(self.manifest.get("cells", ()))
         failed = f", {len(self.failures)} failed" if self.failures else ""
         return "\n".join(
@@ -454,7 +454,7 @@ _FAILED = "plugin_failures", "policy_failed"  # columns, of which a model has on
 
 
 def _failures_in(runs: Mapping[str, Any], here: NDArray[np.bool_]) -> str:
-    """How often classes of the user's failed in some runs; empty if they did not."""
+    """Say how often user classes failed in some runs; empty if never."""
     columns = [np.asarray(runs[name], dtype=np.float64)[here] for name in _FAILED if name in runs]
     counts = np.nan_to_num(columns).sum(axis=0) if columns else np.zeros(0)
     times, failed = int(counts.sum()), int(np.count_nonzero(counts))

@@ -1,4 +1,4 @@
-"""From the rows of runs to Parquet: the same bytes whoever ran what, and in which order."""
+"""Parquet tables from rows of runs: the same bytes in any order of runs, on any workers."""
 
 from __future__ import annotations
 
@@ -154,12 +154,12 @@ class _Table:
             self._pass_on()
 
     def is_whole(self) -> bool:
-        """Whether no row had a column or a type that the table was made without."""
+        """True if every row fitted the columns and types of the table."""
         self._pass_on()
         return self._fits
 
     def anew(self) -> _Table:
-        """The same without rows, to be made for all that has been seen."""
+        """Return an empty table for all columns and types seen so far."""
         return _Table(self._folder, self._name, self._seen)
 
     def save(self) -> Path:

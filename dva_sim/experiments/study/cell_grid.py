@@ -82,17 +82,17 @@ class StudyRun:
 
     @property
     def is_reference(self) -> bool:
-        """Whether this is the run that others are compared with."""
+        """True if this is the reference run of its part."""
         return self.index == REFERENCE
 
     @property
     def is_repeat(self) -> bool:
-        """Whether it repeats the answer under another model of the persons."""
+        """True if it repeats the answer under another model of the persons."""
         return self.part == REPEATS
 
     @property
     def key(self) -> RunKey:
-        """What tells this run from all others; equal keys are the same run."""
+        """Identity of the run: runs with equal keys are the same."""
         return self.config, self.seed
 
 
@@ -129,7 +129,7 @@ def cells(study: Study, inputs: StudyInputs | None = None) -> list[DesignCell]:
 
 
 def refuse_unknown_measures(inputs: StudyInputs) -> None:
-    """What is asked for must be a column of the runs; better told before they are made.
+    """Reject a study that asks for a measure its runs do not have.
 
     Raises:
         ConfigError: it is none.
@@ -147,7 +147,7 @@ def refuse_unknown_measures(inputs: StudyInputs) -> None:
 
 
 def _refuse_impossible_measures(inputs: StudyInputs, every: Sequence[DesignCell]) -> None:
-    """What no run of a part can hold would only be missed when all of them are made."""
+    """Reject measures that no run of a part can produce, before running anything."""
     study = inputs.study
     for path, part, measure in _asked_measures(study):
         made = [c.scenario for c in every if c.part == part and c.index != REFERENCE]
@@ -159,7 +159,7 @@ def _refuse_impossible_measures(inputs: StudyInputs, every: Sequence[DesignCell]
 
 
 def _asked_measures(study: Study) -> Iterator[tuple[KeyPath, str, str]]:
-    """Where a measure is asked for, of which part, and which."""
+    """Yield each place where a measure is requested, with its part and name."""
     if study.answer is not None:
         yield ("answer", "measure"), study.answer.part, study.answer.measure
         for number, covariate in enumerate(study.covariates):
@@ -265,7 +265,7 @@ def _repeats_of(inputs: StudyInputs) -> Iterator[DesignCell]:
 
 
 def _changes(inputs: StudyInputs, levels: Mapping[str, Level]) -> dict[str, Any]:
-    """What the levels of a cell change in the scenario."""
+    """Scenario changes that the levels of a cell make."""
     changes: dict[str, Any] = {}
     for factor, level in levels.items():
         if factor in inputs.study.treatments:
@@ -292,7 +292,7 @@ def _cell(
 
 
 def _every_change(inputs: StudyInputs, part: str, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """What is otherwise than in a scenario's file: by the part, by `--set`, and by the cell."""
+    """All changes to a scenario's file: by the part, by `--set` and by the cell."""
     study, part = inputs.study, _source_of(inputs.study, part)
     fixed = {**study.parts[part].changes, **study.changes}
     of_study = model_of(inputs.scenarios[part]).set_by_study(study.seed)
@@ -300,7 +300,7 @@ def _every_change(inputs: StudyInputs, part: str, changes: Mapping[str, Any]) ->
 
 
 def _build(inputs: StudyInputs, part: str, changes: Mapping[str, Any]) -> AnyScenario:
-    """The part's scenario; a mistake in a change is told where the study makes it."""
+    """Build the part's scenario; an error in a change names its place in the study."""
     part = _source_of(inputs.study, part)
     source = inputs.scenarios[part]
     try:

@@ -38,7 +38,7 @@ def located(study: Study, part: str, error: ConfigError, changes: Mapping[str, A
 
 
 def _places(study: Study, part: str, key: str, value: Any) -> Iterator[KeyPath]:
-    """Where the study might give a key of its scenarios that value."""
+    """Places where the study may give a scenario key that value."""
     yield "factors", key
     yield "parts", part, "reference", key
     yield "parts", part, "changes", key

@@ -104,7 +104,7 @@ _ONE_KIND: list[Any] = [
 
 
 class Design(Config):
-    """Which levels are run together; one key of the first six chooses how.
+    """Experimental design: which levels are combined. One of the first six keys chooses how.
 
     Attributes:
         zip: Factors whose levels are taken together: the first of each, the second of each, ...
@@ -138,12 +138,12 @@ class Design(Config):
 
     @property
     def is_sampled(self) -> bool:
-        """Whether its rows are points in ranges."""
+        """True if its rows are points in ranges."""
         return self.points > 0
 
     @property
     def points(self) -> int:
-        """How many points in ranges it has; 0 for one of listed levels."""
+        """Number of points in ranges; 0 for listed levels."""
         if self.saltelli is not None:
             return self.saltelli * (len(self.ranges) + 2)
         return self.latin_hypercube or self.sobol or 0
@@ -229,7 +229,7 @@ def saltelli(axes: int, base: int, rng: np.random.Generator) -> Floats:
 
 
 def value_at(span: ValueRange, share: float) -> float | int:
-    """What stands at a share of the way from `low` to `high`."""
+    """Value at a share of the range from `low` to `high`."""
     if span.scale == "whole":
         return min(int(span.high), math.floor(span.low + share * (span.high - span.low + 1)))
     if span.scale == "log":

@@ -40,7 +40,7 @@ Traits = dict[str, float]
 
 
 class Bands(Config):
-    """How far calibration leaves each parameter open.
+    """Calibration bands: the range that calibration leaves to each parameter.
 
     Attributes:
         bands: `[low, high]` of the median of each trait, under the trait's key.
@@ -62,7 +62,7 @@ class Bands(Config):
 
 
 def factors_of_repeats(study: Study) -> dict[str, tuple[Level, ...]]:
-    """What varies between and within repeats, in order; nothing where none are declared."""
+    """Factors varied between and within repeats, in order; empty if none are declared."""
     robustness, answer = study.robustness, study.answer
     if robustness is None or answer is None or answer.over is None:
         return {}
@@ -130,7 +130,7 @@ def levels_of_cells(study: Study) -> Iterator[Row]:
 
 
 def levels_at_ends(study: Study) -> Iterator[Row]:
-    """The same with each range at each of its ends, and the others in their middle.
+    """Levels with each range at either end, and the others at their middle.
 
     Which points are drawn depends on the seed; whether the ends are valid does not.
     """
@@ -143,7 +143,7 @@ def _crossed(study: Study, rows: list[Row]) -> Iterator[Row]:
 
 
 def _axes(study: Study, rows: list[Row]) -> Iterator[list[Row]]:
-    """What is crossed: the rows where the first of their factors stands, and each other factor."""
+    """Axes of the crossing: the listed rows, at their first factor, and each other factor."""
     in_rows = factors_in_rows(study)
     for factor, levels in study.factors.items():
         if factor not in in_rows:
@@ -179,7 +179,7 @@ def _ranges_of(study: Study) -> Mapping[str, ValueRange]:
 
 
 def size(study: Study) -> int:
-    """How many cells each part has, without making them."""
+    """Number of cells in each part, without making them."""
     design, in_rows = study.design, factors_in_rows(study)
     crossed = math.prod(len(levels) for f, levels in study.factors.items() if f not in in_rows)
     if design is None:
@@ -190,7 +190,7 @@ def size(study: Study) -> int:
 
 
 def runs_of(study: Study) -> int:
-    """How many runs a study has at most, without making their list."""
+    """Maximum number of runs, without listing them."""
     cells = size(study)
     trials = [part.replications or study.replications for part in study.parts.values()]
     has_reference = [part.reference is not None for part in study.parts.values()]
@@ -199,7 +199,7 @@ def runs_of(study: Study) -> int:
 
 
 def cells_of_repeats(study: Study) -> int:
-    """How many cells the repeats of the answer have."""
+    """Number of cells in the repeats of the answer."""
     factors = factors_of_repeats(study)
     return math.prod(map(len, factors.values())) if factors else 0
 
@@ -221,7 +221,7 @@ def factors_in_rows(study: Study) -> set[str]:
 
 
 def path_in_design(study: Study, key: str, value: Any) -> KeyPath | None:
-    """Where the design gives a key that value; None if it does not."""
+    """Path of the design's key with that value; None if absent."""
     if study.design is not None and key in study.design.ranges:
         return "design", "ranges", key
     for index, row in enumerate(study.listed_rows):

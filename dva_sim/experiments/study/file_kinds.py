@@ -134,7 +134,7 @@ def opened(load: Callable[[], Document]) -> Document | None:
 
 
 def of_other_kind(document: Document, command: str, wanted: str) -> ConfigError | None:
-    """That a file is of another kind than a command takes; None if it is not, or cannot be told.
+    """Error for a file of another kind than a command takes; None if it fits or is unknown.
 
     Args:
         document: The file.

@@ -1,4 +1,4 @@
-"""What tells configurations, studies and files apart: hashes that are the same on every machine.
+"""Hashes of configurations, studies and files, the same on every machine.
 
 What a run's numbers depend on besides its configuration: the program and what users edit.
 
@@ -124,7 +124,7 @@ def _edited() -> Iterator[tuple[str, Path]]:
 
 @cache
 def program_state() -> dict[str, str | bool | None]:
-    """Of the program that is running, as it was when first asked for; see `state_of`."""
+    """State of the running program at the first call; see `state_of`."""
     return state_of(Path(dva_sim.__file__).parent)
 
 
@@ -146,7 +146,7 @@ def state_of(package: Path) -> dict[str, str | bool | None]:
 
 
 def _git(folder: Path, *words: str) -> str | None:
-    """What git says, or None if it cannot."""
+    """Output of a git command; None if it fails."""
     # A hook that started us names its own repository in the environment.
     environment = {k: v for k, v in os.environ.items() if not k.startswith("GIT_")}
     try:

@@ -19,7 +19,7 @@ from dva_sim.simulation.run_measures import RunMeasure, reads
 
 @dataclass(frozen=True, eq=False)
 class StudyInputs:
-    """What the files of a study say.
+    """Contents of a study's files.
 
     Each property raises a `ConfigError` if its file cannot be read or is not valid.
     """

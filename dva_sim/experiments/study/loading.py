@@ -1,4 +1,4 @@
-"""A study's file: written anew from a template, and read with what a command changes in it.
+"""Study files: created from a template, and read with a command's changes.
 
 `--set`, and the keys `quick` and `full` of a study, change keys of the study or of its scenarios.
 Settings come as the `key=value` pairs of the command line, or as Python has them.
@@ -48,7 +48,7 @@ class Changed:
     touched: tuple[KeyPath, ...]
 
     def holds(self, path: KeyPath) -> bool:
-        """Whether what stands at `path` is as it was."""
+        """True if the value at `path` is unchanged."""
         return not any(path[: len(t)] == t for t in self.touched)
 
 
@@ -90,7 +90,7 @@ def change(
 
 
 def _path(data: Any, key: str, kind: Any) -> tuple[str, ...]:
-    """Where a dotted key of the study stands, by what may stand there.
+    """Resolve a dotted key of the study to its path, by the types along it.
 
     Raises:
         ConfigError: it leads through what is not there, or to what holds no keys.
@@ -261,7 +261,7 @@ def _version_of(
 
 
 def _size_of(study: Study) -> dict[str, Any]:
-    """What a report needs to tell one version of a study from another."""
+    """Size of the study, by which a report tells its versions apart."""
     factors = {name: list(levels) for name, levels in study.factors.items()}
     size = {"persons": study.persons, "replications": study.replications, "factors": factors}
     return {"name": study.file.stem} | size
@@ -305,7 +305,7 @@ def _scenarios_of(data: Changed, document: Document) -> list[type[Config]]:
 
 
 def _piloted(study: Study, persons: int) -> Study:
-    """Some persons with luck of their own, so that nothing of the study itself is seen."""
+    """Return a pilot with its own random numbers, so that it reveals nothing of the study."""
     if persons < 1:
         raise ConfigError(f"a pilot should have at least 1 person, not {persons}")
     seed = derive_seed(study.seed, "pilot")

@@ -60,7 +60,7 @@ def _placed(error: ConfigError, name: str, pairs: Sequence[str], seed: int) -> C
 
 
 def blamed_in(document: Document, error: ConfigError) -> ConfigError:
-    """The same mistake at the key that it is about, unless another file holds it."""
+    """Locate an error at the key that it concerns, unless another file holds it."""
     problem = error.problem
     if error.file is not None:
         if Path(error.file).exists():

@@ -1,4 +1,4 @@
-"""What a study measures beyond what our models do: its own measures, and models of the user's."""
+"""User-defined measures and models of a study."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def own_measures(study: Study) -> dict[str, RunMeasure]:
 def columns_told(
     measures: Iterable[RunMeasure], scenarios: Iterable[AnyScenario]
 ) -> dict[str, Any]:
-    """What a results folder keeps of columns that are none of ours, by table and name.
+    """Descriptions of user-defined columns, by table and name, kept with the results.
 
     It is read without the files that the columns come from.
 

@@ -161,7 +161,7 @@ class Hypothesis(Config):
 
 
 class StopRule(Config):
-    """When enough persons were simulated: decided after whole batches of them, in seed order.
+    """Stopping rule: after each batch of persons, in seed order, decide if there are enough.
 
     The study's `persons` are the first batch. After each, every half-width of the 95 % interval
     is looked at: of the mean of a measure in each cell of a part, or of a contrast at each level
@@ -200,7 +200,7 @@ class StopRule(Config):
 
 
 class Prediction(Config):
-    """What is expected of one contrast, written down before the first run.
+    """Prediction for one contrast, written down before the first run.
 
     Attributes:
         text: In words.
@@ -292,7 +292,7 @@ class RobustnessRule(Config):
 
 
 class MapRule(Config):
-    """What each level of the answer's factor costs at each level that it runs over.
+    """Map of costs: each level of the answer's factor at each level that it runs over.
 
     Attributes:
         models: Factor whose levels are the models of persons that the data leave open; what is
@@ -305,7 +305,7 @@ class MapRule(Config):
 
 
 class ScreeningRule(Config):
-    """Which assumed numbers are varied within their bands, to see which move the answer.
+    """Screening: assumed numbers varied within their bands, to see which move the answer.
 
     `dva-sim screen` runs it: each trajectory changes one number after the other, so that with `k`
     numbers there are `trajectories` times `k + 1` points, each with both sides of the contrast.

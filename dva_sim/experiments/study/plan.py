@@ -18,7 +18,7 @@ from dva_sim.simulation.run_measures import RunMeasure
 
 @dataclass(frozen=True, eq=False)
 class StudyPlan:
-    """What running a study means, before anything is run.
+    """Plan of a study's runs, made before anything is run.
 
     Attributes:
         study: As it was loaded; with the seed of its registration, if it is run as registered.
@@ -64,7 +64,7 @@ class StudyPlan:
 
     @property
     def is_real_time(self) -> bool:
-        """Whether runs are measured by the clock, so that nothing may run beside them."""
+        """True if runs take real time, so that nothing else may run beside them."""
         return any(model_for(scenario).is_real_time for scenario in self.scenarios.values())
 
     @cached_property

@@ -35,7 +35,7 @@ _ANY_SEED = 0  # what is fixed must not depend on the seed that follows from it
 
 
 class Preregistration(Config):
-    """What was registered.
+    """Registered study.
 
     Attributes:
         study: Name of the study.
@@ -66,7 +66,7 @@ class Preregistration(Config):
 
     @property
     def seed(self) -> int:
-        """Of the confirmatory run."""
+        """Seed of the confirmatory run."""
         return derive_seed("registration", self.hash)
 
 
@@ -184,7 +184,7 @@ def settled(study: Study) -> Study:
 
 
 def _liberties(study: Study) -> Iterator[str]:
-    """What leaves open, when a study is started, what will come of it."""
+    """Name the settings that leave the outcome open when the study starts."""
     yield from (f"--set {setting}" for setting in study.settings)
     if study.pilot is not None:
         yield f"a pilot of {study.pilot} persons"
@@ -208,7 +208,7 @@ def departures(found: Preregistration, study: Study) -> Iterator[str]:
 
 
 def _remarks(found: Preregistration, study: Study) -> Iterator[str]:
-    """What a reader should know, although it is no departure."""
+    """Yield remarks for the reader that are not departures."""
     if found.study != study.file.stem:
         yield f"it was registered as {found.study!r}"
     if found.question not in ("", study.question):

@@ -29,7 +29,7 @@ _WIDE = 3.0  # from this ratio of its ends on, a band is divided by equal ratios
 
 
 def rule_of(study: Study) -> tuple[ScreeningRule, Contrast]:
-    """What a study is screened by, and its answer.
+    """Screening rule of a study, and its answer.
 
     Raises:
         ConfigError: it has no screening, or nothing to screen.

@@ -34,7 +34,7 @@ def rounds(study: Study, jobs: Sequence[StudyJob]) -> list[list[StudyJob]]:
 
 
 def is_enough(study: Study, rows: Sequence[Row]) -> bool:
-    """Whether every interval of the stopping rule is as narrow as it asks.
+    """True if every interval of the stopping rule is narrow enough.
 
     Args:
         study: What is asked.
@@ -55,7 +55,7 @@ def half_widths(study: Study, stop: StopRule, rows: Sequence[Row]) -> Floats:
 
 
 def _edges(study: Study) -> list[int]:
-    """How many persons there are after each batch."""
+    """Number of persons after each batch."""
     if study.stop is not None:
         most, step = study.most_persons, study.stop.batch_persons
         return [*range(study.persons, most, step), most]
@@ -65,7 +65,7 @@ def _edges(study: Study) -> list[int]:
 
 
 def _of_measure(measure: str, rows: Iterable[Row]) -> Floats:
-    """Of the mean in each cell, in excess of the reference run where there is one."""
+    """Half-widths of each cell's mean, in excess of the reference run if there is one."""
     cells: dict[int, dict[_Run, float]] = defaultdict(dict)
     aside: dict[_Run, float] = {}
     for row in rows:
@@ -80,7 +80,7 @@ def _of_measure(measure: str, rows: Iterable[Row]) -> Floats:
 
 
 def _of_contrast(study: Study, asked: Contrast, rows: Iterable[Row]) -> Floats:
-    """Of the paired difference at each level of `over`, all at once; the reference cancels.
+    """Half-widths of the paired difference at each level of `over`; references cancel.
 
     The answer's is adjusted for the covariates.
     """
@@ -116,7 +116,7 @@ def _minus(measure: str, first: Row, second: Row) -> float:
 
 
 def _middle(covariate: str, first: Row, second: Row) -> float:
-    """What a covariate is in a pair of runs."""
+    """Mean of a covariate over a pair of runs."""
     names = multiplied(covariate)
     return sum(math.prod(_number(row.get(name)) for name in names) for row in (first, second)) / 2
 

@@ -39,7 +39,7 @@ FOLDER = "experiments"
 
 
 class Status(Config):
-    """What a result may be called, and why; the manifest holds it, the report shows it.
+    """Status of a result and its reasons; kept in the manifest and shown in the report.
 
     Attributes:
         kind: `declared`: run as its file says, nothing registered. `exploratory`: something was
@@ -57,7 +57,7 @@ class Status(Config):
 
 
 class Study(Config):
-    """What is asked, and all that is run to answer it.
+    """Study: a question, and everything that is run to answer it.
 
     Attributes:
         question: In words.
@@ -142,7 +142,7 @@ class Study(Config):
 
     @property
     def most_persons(self) -> int:
-        """How many persons are simulated at most."""
+        """Maximum number of persons."""
         return self.persons if self.stop is None else max(self.persons, self.stop.most_persons)
 
     @property
@@ -165,7 +165,7 @@ class Study(Config):
 
     @property
     def folder(self) -> Path:
-        """Where the study's file lies."""
+        """Folder of the study's file."""
         return self.file.parent
 
     @property
@@ -185,12 +185,12 @@ class Study(Config):
 
     @property
     def pilot(self) -> int | None:
-        """How many persons a pilot of it has; None where it is none."""
+        """Number of persons in a pilot; None if it is not a pilot."""
         return self._pilot
 
     @property
     def version(self) -> Version | None:
-        """Which of its versions it is; None where it is as its file says."""
+        """Version of the study; None if unchanged from its file."""
         return self._version
 
     @property
@@ -205,7 +205,7 @@ class Study(Config):
 
     @property
     def status(self) -> Status:
-        """What its results may be called."""
+        """Status of its results."""
         return self._status
 
     def error(self, problem: str, path: KeyPath) -> ConfigError:
@@ -228,7 +228,7 @@ class Study(Config):
         return None
 
     def is_from_file(self, path: KeyPath) -> bool:
-        """Whether the study's file, rather than `--set`, says what stands at `path`."""
+        """True if the value at `path` comes from the study's file rather than from `--set`."""
         if self._table is not None and path[:2] == ("design", ROWS):
             return path[1:] in self._table.places
         return path in self._document.places

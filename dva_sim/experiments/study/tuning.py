@@ -57,7 +57,7 @@ class TriedValue(Config):
 
 
 class TuningBasis(Config):
-    """What users edit and tuned values rest on: hashes over the values in those files.
+    """Hashes of the user-editable files that tuned values depend on.
 
     Attributes:
         persons: Of the population.
@@ -69,7 +69,7 @@ class TuningBasis(Config):
 
     @classmethod
     def of(cls, population: str) -> TuningBasis:
-        """As the files are now."""
+        """Read the current files."""
         phones = resources.available("agents/phones")
         return cls(
             persons=_hash_of([resources.find(population, "agents/people")]),
@@ -77,13 +77,13 @@ class TuningBasis(Config):
         )
 
     def unlike(self, other: TuningBasis) -> list[str]:
-        """Which of them are others."""
+        """Names of the entries that differ."""
         ours, theirs = self.model_dump(), other.model_dump()
         return [name for name in ours if ours[name] != theirs[name]]
 
 
 class TunedValues(Config):
-    """What a tuning chose, and all that it saw.
+    """Tuned values, with all trials of the tuning.
 
     Attributes:
         study: Name of the study.
@@ -102,7 +102,7 @@ class TunedValues(Config):
     seen: tuple[TriedValue, ...]
 
     def remark(self, now: TuningBasis) -> str:
-        """That it was tuned with others than there are now; empty if it was not."""
+        """Remark that persons or phones have changed since the tuning; empty if not."""
         others = " and ".join(self.basis.unlike(now))
         return f"tuned with other {others}: run 'dva-sim tune {self.study}' again" if others else ""
 
@@ -126,12 +126,12 @@ def choose(means: Mapping[float, float]) -> float:
 
 
 def file_of(study: Study) -> Path:
-    """Where the tuned values of a study are kept."""
+    """File of a study's tuned values."""
     return study.folder / FOLDER / f"{study.file.stem}.yaml"
 
 
 def folder_of_tuning(name: str) -> Path:
-    """Where the trials of a tuning go if nobody says."""
+    """Default folder for the trials of a tuning."""
     return Path("results") / f"{Path(name).stem}-tuning"
 
 
@@ -181,7 +181,7 @@ def _how_to_make(name: str) -> str:
 
 
 def tuning_study(study: Study) -> Study:
-    """The study that tries every value: its own persons and luck, the same budget for all.
+    """Study that tries every value with persons and seeds of its own, on equal budgets.
 
     Raises:
         ConfigError: the study tunes nothing.

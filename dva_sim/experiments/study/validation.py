@@ -1,4 +1,4 @@
-"""What makes no sense in a study although each of its keys does: told before anything runs."""
+"""Checks for contradictions between a study's keys, made before anything runs."""
 
 from __future__ import annotations
 
@@ -169,7 +169,7 @@ def _faults_of_tuning(study: Study) -> Iterator[Problem]:
 
 
 def of_claims(study: Study) -> Iterator[Problem]:
-    """What was declared about factors and levels that the study does not have."""
+    """Problems of declarations about factors and levels that the study lacks."""
     yield from of_answer(study)
     yield from of_robustness(study)
     yield from of_map(study)
@@ -224,7 +224,7 @@ def lost_claims(study: Study) -> list[str]:
 
 
 def of_answer(study: Study) -> Iterator[Problem]:
-    """Why the declared contrast cannot be computed."""
+    """Reasons why the declared contrast cannot be computed."""
     if study.answer is not None:
         yield from _faults_of_contrast(study, study.answer, (ANSWER,))
 
@@ -263,7 +263,7 @@ def _faults_of_hypothesis(study: Study, name: str) -> Iterator[Problem]:
 
 
 def of_stop(study: Study) -> Iterator[Problem]:
-    """Why a stopping rule cannot be applied."""
+    """Reasons why a stopping rule cannot be applied."""
     stop = study.stop
     if stop is None:
         return
@@ -289,7 +289,7 @@ def _faults_of_prediction(study: Study, prediction: Prediction, path: KeyPath) -
 
 
 def of_robustness(study: Study) -> Iterator[Problem]:
-    """Why the contrast cannot be repeated."""
+    """Reasons why the contrast cannot be repeated."""
     robustness = study.robustness
     if robustness is None:
         return
