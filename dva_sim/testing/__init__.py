@@ -1,4 +1,4 @@
-"""What plug-ins and files promise, tried: for `dva-sim check`, and for test suites of users.
+"""Checks of plug-ins and files, for `dva-sim check` and for users' own tests.
 
 Each `check_...` takes a name (`mine.py:Mine`, a shipped or an installed one) or a class, and
 options; it returns an `Outcome`, or raises `BrokenPromises`, an `AssertionError`. The room may
@@ -34,7 +34,7 @@ _PLACES = {"BrokenPromises": "promises", "Outcome": "promises"}
 
 
 def __getattr__(name: str) -> Any:
-    """What is here is loaded when it is first used: each kind needs other rooms."""
+    """Load a name at its first use: each kind needs other rooms."""
     trial = TRIALS.get(name.removeprefix("check_"))
     if trial is not None and name == f"check_{trial.kind}":
         return trial.load_check()

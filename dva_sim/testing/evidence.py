@@ -1,4 +1,4 @@
-"""What proves something: recordings, traces and audit logs.
+"""Checks of evidence: recordings, traces and audit logs.
 
 Messages are valid, every decision is made the same again, a chain of rows is whole; and what
 happened in a recorded run is held against the safety rules, whatever was decided.
@@ -85,7 +85,7 @@ def judged_recording(opened: Opened) -> list[Verdict]:
 
 
 def check_trace(path: Path) -> Found:
-    """What is decided otherwise than a trace tells, and whether its end is missing."""
+    """Check a trace: decisions that differ when replayed, and a missing end."""
     *lines, rest = path.read_bytes().split(b"\n")
     replayed = _replayed(lines, path)
     return replayed.problems, [CUT] if rest else [], f"{replayed.decisions} decisions"
@@ -111,7 +111,7 @@ def check_audit_log(path: Path) -> Found:
 
 
 def check_recorded_link(path: Path) -> Found:
-    """What is wrong with a recorded link: packet opportunities, a log of delays, or bare delays."""
+    """Check a recorded link: packet opportunities, a log of delays, or bare delays."""
     from dva_sim.network.link import recorded  # late: start-up
 
     file = str(path)
@@ -143,7 +143,7 @@ def _of_delay_log(log: DelayLog) -> str:
 
 
 class _Replayed(NamedTuple):
-    """How many decisions were made again, and which of them otherwise."""
+    """Number of decisions replayed, and those that differ."""
 
     decisions: int
     problems: list[Problem]

@@ -1,4 +1,4 @@
-"""What every figure of a report promises, tried on made-up results of every shape."""
+"""Checks of report figures, on made-up results of every shape."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def _reading(folder: Path, shape: Shape, figure: ReportFigure) -> Reading:
 def _tried(
     make: Callable[[], ReportFigure], reading: Reading, shape: Shape, took: list[float]
 ) -> Iterator[Case]:
-    """What is wrong with the figure of one study; the first that is drawn is drawn again."""
+    """Yield the faults of the figure of one study; the first one is drawn twice."""
     drawn: list[Drawn] = []
     for _ in range(1 if took else 2):
         try:
@@ -199,7 +199,7 @@ def _other_colours(figure: Figure) -> Iterator[Case]:
 
 
 def _colours_of(artist: Any) -> Iterator[str]:
-    """As `#rrggbb`, of all that is not quite transparent; none of what a colour map paints."""
+    """Colours of all visible parts as `#rrggbb`, colour maps excepted."""
     from matplotlib.colors import to_hex, to_rgba_array
 
     if getattr(artist, "get_array", lambda: None)() is not None:
@@ -212,7 +212,7 @@ def _colours_of(artist: Any) -> Iterator[str]:
 
 
 def _painted(artist: Any) -> list[str]:
-    """Of what it consists; a line may have none, or no marks."""
+    """Names of an artist's colour properties; a line may lack markers or the line itself."""
     from matplotlib.lines import Line2D
 
     if not isinstance(artist, Line2D):
@@ -239,7 +239,7 @@ def _numbers(table: bytes) -> Floats:
 
 
 def _unwritten(figure: Figure, known: Floats) -> Iterator[Case]:
-    """Marks, lines and bars along an axis with a scale; places beside each other are no numbers."""
+    """Values drawn along a numeric axis that the data lack; categories are skipped."""
     for axes in figure.axes:
         for artist, points in _points(axes):
             for which, axis, values in zip("xy", (axes.xaxis, axes.yaxis), points.T, strict=True):
@@ -250,7 +250,7 @@ def _unwritten(figure: Figure, known: Floats) -> Iterator[Case]:
 
 
 def _points(axes: Axes) -> Iterator[tuple[str, Floats]]:
-    """What is drawn at places of the data: `(n, 2)` of each."""
+    """Yield the points drawn in data coordinates, `(n, 2)` each."""
     for one in axes.lines:
         if one.get_transform() == axes.transData and not _is_aside(one):
             yield "line", np.asarray(one.get_xydata(), dtype=float)
@@ -267,18 +267,18 @@ def _points(axes: Axes) -> Iterator[tuple[str, Floats]]:
 
 
 def _is_aside(artist: Any) -> bool:
-    """Whether it is no result: hidden, or marked as the site, a scale, a reference."""
+    """True if the artist shows no result: hidden, or marked as site, scale or reference."""
     return not artist.get_visible() or artist.get_label() == ASIDE
 
 
 def _end(patch: Any) -> tuple[float, float]:
-    """What a bar's length says; nan across it, where it is only wide."""
+    """Length of a bar; nan across it, where the width has no meaning."""
     width, height = patch.get_width(), patch.get_height()
     return float(width), float(height)
 
 
 def _has_scale(axis: Axis) -> bool:
-    """Whether its places are numbers, rather than what stands beside each other."""
+    """True if positions on the axis are numbers rather than categories."""
     from matplotlib.category import StrCategoryLocator
     from matplotlib.ticker import FixedLocator, NullLocator
 

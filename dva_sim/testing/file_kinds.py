@@ -1,4 +1,4 @@
-"""What a YAML file should be, tried by the code that runs it, and where in it a mistake was made.
+"""Kinds of YAML files: recognise, check with the code that runs them, locate mistakes.
 
 It stands above all rooms whose files it knows: the table of all kinds stands at the end.
 """
@@ -60,7 +60,7 @@ _HOSTILE: Final = (ValueError, OverflowError, Image.DecompressionBombError)
 
 
 def check_config(kind: FileKind, document: Document) -> list[Problem]:
-    """What is wrong with a configuration, by the code that runs it."""
+    """List the mistakes in a configuration, as found by the code that runs it."""
     return _collect(
         document.file, partial(_mistakes, kind.model, document), partial(blamed_in, document)
     )
@@ -77,7 +77,7 @@ def _mistakes(model: type[Config], document: Document) -> Iterator[ConfigError]:
 
 
 def doubts(kind: FileKind, document: Document) -> list[str]:
-    """What does not go together in a valid study or scenario."""
+    """List contradictory settings in a valid study or scenario."""
     if kind.model is Study:
         return contradictions_in(cell_grid.cells(load_study(document.file)))
     if kind.model is RosMap:
@@ -105,7 +105,7 @@ def _without_a_place(document: Document) -> Iterator[str]:
 
 
 def check_plan(path: Path) -> list[Problem]:
-    """What is wrong with a drawn plan; whether its bases are free is for its site to say."""
+    """List the mistakes in a drawn plan; its site decides if the bases are free."""
 
     def read() -> Iterator[ConfigError]:
         make_plan(read_features(path, _frame_of(path)))

@@ -58,7 +58,7 @@ class NotReadError(DvaSimError):
 
 @dataclass(frozen=True)
 class FileVerdict:
-    """What was found: the kind of a file, its problems, and what does not go together in it.
+    """Result of checking a file: its kind, problems and contradictory settings.
 
     It is valid if it has no problems, and breaks no rule. A note says how much was looked at.
     """
@@ -94,7 +94,7 @@ def check_file(path: Path) -> FileVerdict:
 
 
 def _by_content(head: bytes) -> str | None:
-    """What a file without a telling name holds."""
+    """Recognise a file by its content when its name does not tell."""
     text = head.lstrip()
     if text.startswith(b"<"):
         return "message"
@@ -124,7 +124,7 @@ def _read(path: Path, limit: int) -> bytes:
 
 
 def _flawed(path: Path, limit: int) -> list[Problem]:
-    """What is wrong before anything is parsed."""
+    """List problems visible before parsing."""
     data = _read(path, limit + 1)
     if not data.strip():
         return [Problem(1, 1, "is empty")]

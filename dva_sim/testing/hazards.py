@@ -1,4 +1,4 @@
-"""What every hazard promises, tried in the rooms of a site from its start to two hours on."""
+"""Checks of hazards, in the rooms of a site from the start to two hours later."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class _Trial:
     # --- by itself ---------------------------------------------------------------------
 
     def _told(self) -> Iterator[Case]:
-        """What people and files are told of it."""
+        """Check the texts that people and files get."""
         hazard = self._hazard()
         if not hazard.title:
             yield "has no title", "title is empty"
@@ -155,7 +155,7 @@ class _Trial:
                 yield "changes the air ten kilometres away", f"after {age:g} s"
 
     def _repeats(self) -> Iterator[Case]:
-        """The same answers from another field, in any order, and when it begins later."""
+        """Check that another field, another order or a later start gives the same answers."""
         answers = self._answers(self._field())
         if self._answers(self._field()) != answers:
             yield "draws random numbers, or shares memory", "a new field answers differently"
@@ -182,7 +182,7 @@ class _Trial:
             yield "radiates more once its source is stopped", f"after {AGES[-1]:g} s"
 
     def _sight(self) -> Iterator[Case]:
-        """What hides things is the extinction in the air at eye height."""
+        """Check that sight is limited by the extinction at eye height."""
         field, building = self._field(), building_of(self._site)
         places = SitePoints(building, np.array(AROUND))
         for age in AGES:
@@ -233,7 +233,7 @@ class _Trial:
                 yield "goes otherwise when it begins later", f"its {kind} alarm"
 
     def _doses(self) -> Iterator[Case]:
-        """Whoever stays takes in a dose that is a number and never falls."""
+        """Check that the dose of a person who stays is finite and never falls."""
         field = self._field()
         for place in AROUND:
             dose, last = Dose(), 0.0
@@ -245,7 +245,7 @@ class _Trial:
                 last = dose.heat + dose.toxic
 
     def doubts(self, slow: float) -> Iterator[str]:
-        """What is allowed, and hardly meant."""
+        """Yield warnings about allowed but unlikely behaviour."""
         yield from is_slow(self.mean, slow, "an answer")
         if self._picture > SLOW_PICTURE * slow / SLOW:
             yield f"draws slowly: {self._picture:.2g} s a picture; picture() may be defined"
@@ -254,7 +254,7 @@ class _Trial:
 
 
 def _odd(air: Conditions, where: str) -> Iterator[Case]:
-    """What air cannot have."""
+    """Yield physically impossible conditions."""
     for name, value, most in zip(air._fields, air, MOST, strict=True):
         least = CLEAR.temperature if name == "temperature" else 0.0
         if not least <= value <= most:
@@ -262,5 +262,5 @@ def _odd(air: Conditions, where: str) -> Iterator[Case]:
 
 
 def _alike(one: object, other: object) -> bool:
-    """Whether numbers are the same, but for rounding."""
+    """True if numbers are equal up to rounding."""
     return bool(np.allclose(np.array(one), np.array(other), rtol=CLOSE, atol=1e-9, equal_nan=True))

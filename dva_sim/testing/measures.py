@@ -1,4 +1,4 @@
-"""What every measure of the user's promises, tried on short runs of the models that it reads."""
+"""Checks of user-defined measures, on short runs of the models that they read."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class _Trial:
             yield "is called as another measure is", about.name
 
     def answer_all(self) -> Iterator[Case]:
-        """What it says of short runs of all models that it reads."""
+        """Check the answers for short runs of all models that it reads."""
         for name in self._models:
             for scenario, changes in SHORT[name]:
                 document = scenarios.load(scenario)
@@ -101,7 +101,7 @@ class _Trial:
                 yield from self._of_run(model, runs, f"of {scenario}, seed {SEED}")
 
     def _of_run(self, model: Model[Any], runs: list[Any], where: str) -> Iterator[Case]:
-        """What it says of a run, of the same once more, and of the same run replaced."""
+        """Check the answers for a run, for the same run again, and for a replaced copy."""
         before = repr(model.rows(runs[0], with_tracks=True))  # in which missing numbers are alike
         first = self._ask(self._used, runs[0])
         if not _is_answer(first):
@@ -142,7 +142,7 @@ def _same(one: Any, other: Any) -> bool:
 
 
 def _is_as_before(model: Model[Any], recording: Any, before: str) -> bool:
-    """Whether all else that is measured of a recording still is what it was."""
+    """True if all other measures of a recording are unchanged."""
     try:
         return repr(model.rows(recording, with_tracks=True)) == before
     except FAILURES:

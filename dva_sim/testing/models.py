@@ -1,4 +1,4 @@
-"""What every model of a run promises, tried on a scenario of its own and on scenarios near it."""
+"""Checks of run models, on a scenario of their own and on scenarios near it."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class _Trial:
             yield "its scenario is another one in another process", repr(there)
 
     def _runs(self) -> Iterator[Case]:
-        """The same seed comes to the same, whatever ran before."""
+        """Check that the same seed gives the same result after any other runs."""
         before = repr(self._scenario.model_dump())
         first = {seed: repr(self._run(self._scenario, seed)) for seed in SEEDS}
         self.seen.extend(first.values())
@@ -91,7 +91,7 @@ class _Trial:
             yield "changes its scenario", before
 
     def _columns(self) -> Iterator[Case]:
-        """What it says of its tables is what they hold."""
+        """Check the declared tables and columns against the actual ones."""
         tables = self._run(self._scenario, SEEDS[0])
         if len(tables.get("runs", ())) != 1:
             yield "has not one row for a run", f"{len(tables.get('runs', ()))} in table 'runs'"
@@ -116,7 +116,7 @@ class _Trial:
                     yield "has something else than words in a column of words", where
 
     def _rehearses(self) -> Iterator[Case]:
-        """What cannot run is refused before it runs."""
+        """Check that scenarios that cannot run are rejected before they run."""
         for key, value in self._scenario.model_dump().items():
             if not isinstance(value, int | float) or isinstance(value, bool):
                 continue

@@ -1,4 +1,4 @@
-"""What every strategy of an operator promises, tried on whatever may be seen, and in drives."""
+"""Checks of operator strategies, on arbitrary sightings and in drives."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ class _Trial:
                     yield "wants a turn rate beyond reach", case
 
     def _cursors(self) -> Iterator[Case]:
-        """The same of cursors."""
+        """Check sightings of cursors."""
         strategy, now = self.new(self._persons[0], CURSOR), 0.0
         path = Route(np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 0.5)]))
         for number in range(LOOKS):
@@ -171,7 +171,7 @@ class _Trial:
     # --- drives ------------------------------------------------------------------------
 
     def _alike(self) -> Iterator[Case]:
-        """The same again, and the same beside another one; by one of them for long."""
+        """Check repeatability: alone, beside another strategy, and over a long drive."""
         for person in self._persons:
             is_first = person is self._persons[0]
             route, seconds = ("a long way", LONG) if is_first else ("a double bend", 20.0)
@@ -223,7 +223,7 @@ class _Trial:
         push: float = 0.0,
         strategy: Strategy | None = None,
     ) -> list[_Step]:
-        """A drive of a robot that does at once what it is told; pictures are late by `delay`."""
+        """Drive a robot that obeys at once, with pictures late by `delay`."""
         self.count += 1
         strategy, route = strategy or self.new(person, reach), _way(WAYS[name])
         x = y = heading = 0.0
@@ -256,7 +256,7 @@ class _Trial:
 
     @staticmethod
     def _rests(track: Sequence[_Step]) -> bool:
-        """Whether it has stood for long, so that nothing new will come."""
+        """True if the robot has stood still for so long that nothing new will come."""
         long = track[-round(2 * REST / FRAME) :]
         return len(track) > len(long) and long[0][1:] == long[-1][1:] and not any(long[-1].wanted)
 
@@ -269,7 +269,7 @@ def _way(corners: Sequence[tuple[float, float]]) -> Route:
 
 
 def _is_pair(got: Any) -> bool:
-    """Whether that is two finite numbers."""
+    """True if the value is a pair of finite numbers."""
     try:
         one, other = got
         return math.isfinite(one) and math.isfinite(other)

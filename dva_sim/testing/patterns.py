@@ -1,4 +1,4 @@
-"""What every messaging pattern promises, tried in drives over links that delay and lose.
+"""Checks of messaging patterns, in drives over links with delay and loss.
 
 The robot and the app here are the smallest that tell: the app numbers its commands and counts what
 becomes of each, the robot obeys whatever is newer than the last.
@@ -314,7 +314,7 @@ class _Trial:
             yield "brings commands out of their order", f"{numbers[:9]}"
 
     def _facts(self) -> Iterator[Case]:
-        """What others read of it."""
+        """Check the attributes that other code reads."""
         made = self._make()
         for name in ("answered", "in_step", "published", "newest_wins"):
             if not isinstance(getattr(made, name), bool):
@@ -324,7 +324,7 @@ class _Trial:
                 yield "says what is no text", f"{name} is {getattr(made, name)!r}"
 
     def _good_links(self) -> Iterator[Case]:
-        """Where nothing is lost, commands come without end, and young."""
+        """Check that commands keep coming, and stay fresh, on links without loss."""
         for delay in DELAYS:
             drive, where = self._drive(delay), f"with a delay of {delay:g} s"
             yield from self._run(drive)
@@ -339,7 +339,7 @@ class _Trial:
                 yield "gives up a robot that obeys", f"after {drive.told[0][0]:.1f} s {where}"
 
     def _copies(self) -> Iterator[Case]:
-        """The same again from a new copy: no memory is shared, and nothing is drawn."""
+        """Check that a new copy repeats the drive: no shared memory, no random numbers."""
         one, other = self._drive(DELAYS[1]), self._drive(DELAYS[1])
         for drive in (one, other):
             yield from self._run(drive, LONG / 2)

@@ -1,4 +1,4 @@
-"""What every policy promises, tried in some hundred situations.
+"""Checks of policies, in some hundred situations.
 
 They are ordinary ones, and all the corners that a run can come to.
 """
@@ -37,7 +37,7 @@ _PACE: Final = {"guard": (1.3, 20.0), "robot": (0.35, 4.0)}  # [m/s], mobilisati
 
 @dataclass(frozen=True)
 class _Draw:
-    """What a kind of situation is like; the rest is chance.
+    """Parameters of a kind of situation; the rest is random.
 
     Attributes:
         tasks: How many, from and to; so of guards, robots and operators.

@@ -21,7 +21,7 @@ Case = tuple[str, str]  # a promise in words, and what happened
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of trying it.
+    """Result of checking a plug-in.
 
     Attributes:
         broken: One line for each promise that it broke, with the first case.
@@ -49,7 +49,7 @@ class BrokenPromises(AssertionError):
 
 
 def kept(broken: Sequence[str], warnings: Sequence[str], tries: int, slowest: float) -> Outcome:
-    """What came of it, if all promises were kept; see `Outcome`.
+    """Return the outcome, or raise if a promise was broken; see `Outcome`.
 
     Raises:
         BrokenPromises: they were not.
@@ -61,7 +61,7 @@ def kept(broken: Sequence[str], warnings: Sequence[str], tries: int, slowest: fl
 
 
 def tried(check: Callable[..., Outcome], *given: Any, **options: Any) -> Outcome:
-    """What comes of a check, whether all promises are kept or not.
+    """Run a check and return its outcome, even if promises were broken.
 
     Raises:
         ConfigError: there is nothing to try.
@@ -86,7 +86,7 @@ def is_slow(slowest: float, slow: float, what: str) -> list[str]:
 
 
 def part_by_part(parts: Iterable[Callable[[], Iterable[Case]]]) -> Iterator[Case]:
-    """What the first part finds broken that finds anything: each builds on those before it."""
+    """Yield the faults of the first part that has any: later parts build on earlier ones."""
     from dva_sim.kernel.plugins import FAILURES  # late: start-up
 
     for part in parts:
@@ -114,7 +114,7 @@ def said(error: BaseException) -> str:
 
 @dataclass(frozen=True)
 class CheckedKind:
-    """How one kind is tried.
+    """Kind of plug-in, and the way it is checked.
 
     Attributes:
         kind: The word for one: `dva-sim check KIND NAME`.
@@ -136,16 +136,16 @@ class CheckedKind:
 
     @property
     def classes(self) -> str:
-        """What several classes of it are called."""
+        """Plural of the word for its classes."""
         return plural(self.class_word or self.kind)
 
     @property
     def many(self) -> str:
-        """What several are called."""
+        """Plural of the kind."""
         return plural(self.kind)
 
     def load_plugins(self) -> Plugins[Any]:
-        """What users may add of this kind."""
+        """Load the plug-ins of this kind."""
         found: Plugins[Any] = import_module(f"dva_sim.{self.room}").PLUGINS
         return found
 
@@ -169,19 +169,19 @@ class CheckedKind:
         return sorted(available(self.folder)) if self.folder else self.load_plugins().known()
 
     def load_check(self) -> Callable[..., Outcome]:
-        """What users call in tests of their own, by name or as a class, with options."""
+        """Load the check that users call in their own tests, by name or class, with options."""
         module = import_module(f"dva_sim.testing.{self.module}")
         found: Callable[..., Outcome] = getattr(module, f"check_{self.kind}")
         return found
 
     def ways(self, outcome: Outcome) -> str:
-        """How it was tried, in words."""
+        """Describe how it was checked."""
         slowest = outcome.slowest
         return self.told.format(tries=outcome.tries, ms=1e3 * slowest, us=1e6 * slowest)
 
 
 def plural(kind: str) -> str:
-    """What several of a kind are called."""
+    """Plural of a kind's name."""
     return f"{kind.removesuffix('y')}ies" if kind.endswith("y") else f"{kind}s"
 
 

@@ -29,7 +29,7 @@ _OUTCOMES: Final = ("confirmed", "confirmed", "refuted", "escalated", "expired",
 
 @dataclass(frozen=True)
 class Shape:
-    """Of a study.
+    """Shape of a made-up study.
 
     Attributes:
         factors: Levels of what is varied.

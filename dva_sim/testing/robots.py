@@ -1,4 +1,4 @@
-"""What every robot's motors promise, tried by themselves and in a hall."""
+"""Checks of robot motors, alone and in a hall."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every filter and every mapping of a tilt phone promises, tried on made-up readings."""
+"""Checks of the filters and mappings of a tilt phone, on made-up readings."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def check_mapping(
 def _concluded(
     parts: Sequence[Part], doubts: Callable[[], Iterator[str]], took: list[float], slow: float
 ) -> Outcome:
-    """What came of all parts; after one that is broken the next ones mean nothing."""
+    """Outcome of all parts, up to the first that is broken."""
     broken = broken_in(part_by_part(parts))
     slowest = min(took, default=0.0)
     warnings = [] if broken else list(doubts())
@@ -134,7 +134,7 @@ class _FilterTrial:
                         yield "leaves the range of its input", f"{_told(value)} in run {number + 1}"
 
     def _copies(self) -> Iterator[Case]:
-        """The same from each copy, whatever others of its kind are told; asking changes nothing."""
+        """Check that copies give the same values independently, and that reading has no effect."""
         samples, other = self._samples(), self._samples()
         alone = self._values(self.make(), samples)
         one, disturbing = self.make(), self.make()
@@ -152,7 +152,7 @@ class _FilterTrial:
             yield "shares memory with other copies, or draws random numbers", f"value {place + 1}"
 
     def _constant(self) -> Iterator[Case]:
-        """What stands comes through, whatever was before."""
+        """Check that a constant input comes through, regardless of the history."""
         for level, turn in ((7.0, -20.0), (0.0, 0.0), (3.0, 30.0)):
             filter_ = self.make()
             self._values(filter_, self._samples())
@@ -226,7 +226,7 @@ class _MappingTrial:
                     yield "leaves the limits of a command", case
 
     def _copies(self) -> Iterator[Case]:
-        """The same from each copy; a new drive is a new beginning; no memory without saying so."""
+        """Check that copies and new drives start afresh, and that memory is declared."""
         readings = self._readings()
         one, other = self.make(), self.make()
         alone = [one.command(*reading, PERIOD) for reading in readings]
@@ -247,7 +247,7 @@ class _MappingTrial:
                 yield "depends on readings before, though it does not integrate", "in other order"
 
     def _steps(self) -> Iterator[Case]:
-        """How a second is cut into steps is no matter to what a reading that stands leads to."""
+        """Check that a constant reading integrates to the same value for any step."""
         if not self.make().integrates:
             return
         for share in (1.0, 0.3, 0.1, 0.03):

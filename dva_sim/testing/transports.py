@@ -1,4 +1,4 @@
-"""What every transport promises, tried with both ends in this process, over the loopback."""
+"""Checks of transports, with both ends in this process, over the loopback."""
 
 from __future__ import annotations
 
