@@ -1,4 +1,4 @@
-"""How every validation plays its jobs, what it comes to, and what it leaves behind.
+"""Frame of all validations: running the jobs, the outcome, and the files written.
 
 Each kind judges by rules of its own and puts its lines into words; all else is alike: runs that
 are spread over processes, tables, figures and a page.
@@ -123,7 +123,7 @@ class ResultSheet:
 
 @dataclass(frozen=True)
 class ValidationResult:
-    """What a validation found.
+    """Result of a validation.
 
     Attributes:
         name: `dispatch`, `operators` or `network`: of its table, and of its page's method.

@@ -100,7 +100,7 @@ class Sample:
 
 
 def occupied(starts: Floats, ends: Floats, edges: Floats) -> Floats:
-    """How much of many intervals lies in each window, in total [s].
+    """Total length of the intervals within each window [s].
 
     Args:
         starts: Of the intervals `(n,)`.
@@ -115,7 +115,7 @@ def occupied(starts: Floats, ends: Floats, edges: Floats) -> Floats:
 
 
 def _since(moments: Floats, times: Floats) -> Floats:
-    """How long ago all moments before each time were, in total [s]."""
+    """Total age of all earlier moments at each time [s]."""
     ordered = np.sort(moments)
     ordered = ordered[np.isfinite(ordered)]
     upto = np.concatenate([[0.0], np.cumsum(ordered)])
@@ -124,7 +124,7 @@ def _since(moments: Floats, times: Floats) -> Floats:
 
 
 def sample_of(recording: TimedRecording) -> Sample:
-    """What a recorded run shows."""
+    """Extract the sample from a recorded run."""
     scenario, columns = recording.scenario, recording.columns
     order = np.argsort(columns["detected"], kind="stable")
     order = order[np.isfinite(columns["detected"][order])]
@@ -167,7 +167,7 @@ def sample_of(recording: TimedRecording) -> Sample:
 def _busy_times(
     scenario: TimedScenario, row: dict[str, Floats], who: dict[str, Ints]
 ) -> tuple[Ints, Floats, Floats]:
-    """Who had an order from when to when: to look, with the way back, and to act."""
+    """Return the units' busy times: looking, with the way back, and acting."""
     returns = np.array([g.after == "return" for g in scenario.responders for _ in range(g.count)])
     looked, acted = who["responder"] != NOBODY, who["actor"] != NOBODY
     ended = np.where(np.isfinite(row["confirmed"]), row["confirmed"], row["closed"])
@@ -252,7 +252,7 @@ class Batches:
         return np.asarray(sums, dtype=np.float64)
 
     def count(self, which: NDArray[np.bool_]) -> Floats:
-        """How many events there are of some kind, in each batch."""
+        """Number of selected events in each batch."""
         return self.total(np.ones(len(which)), which)
 
 
@@ -387,7 +387,7 @@ def _open(batches: Batches) -> Sums:
 
 
 def _resting(batches: Batches) -> Sums:
-    """How many of the finite sources have no event open."""
+    """Number of finite sources without an open event."""
     area, lengths = _open(batches)
     return batches.sample.sources * lengths - area, lengths
 
@@ -426,7 +426,7 @@ def _group(batches: Batches, group: str) -> Sums:
 
 
 def _share(batches: Batches, detail: str) -> Sums:
-    """Of all events served, those of a stream that a unit served."""
+    """Share of served events that are of one stream and were served by one unit."""
     sample = batches.sample
     unit, _, stream = detail.partition("/")
     which = sample.unit == sample.units.index(unit)

@@ -36,7 +36,7 @@ _LAWS = tuple(
 def exact_values(
     name: str | None, parameters: Mapping[str, Any], scenario: TimedScenario
 ) -> tuple[Measures, str]:
-    """What a formula says of a scenario, and on whose authority.
+    """Exact values of a scenario by a formula, and the formula's source.
 
     Args:
         name: The formula's; None gives nothing.
@@ -81,7 +81,7 @@ def _resolved(value: Any, scenario: TimedScenario) -> Any:
 
 
 def _walk(node: Any, path: list[str], whole: str) -> Any:
-    """What stands at a path: keys, names or numbers of items, `*` for all items."""
+    """Value at a path: keys, names or numbers of items, `*` for all items."""
     if not path:
         return node
     step, rest = path[0], path[1:]
@@ -146,7 +146,7 @@ def _wants_law(hint: Any) -> bool:
 
 
 def _mentions(hint: Any, test: Any) -> bool:
-    """Whether an annotation, or one inside it, passes a test."""
+    """True if an annotation, or one inside it, passes a test."""
     return bool(test(hint)) or any(_mentions(inner, test) for inner in get_args(hint))
 
 

@@ -73,7 +73,7 @@ class Check:
 
     @property
     def deviation(self) -> float:
-        """How far off, in standard errors; 0 where nothing is left to chance and all is right."""
+        """Deviation in standard errors; 0 for an exact match without randomness."""
         off = self.found.value - self.exact
         if self.found.error > 0:
             return off / self.found.error
@@ -172,7 +172,7 @@ def check_identities(seed: int, progress: Progress = lambda done: None) -> list[
 
 
 def runs_of(cases: Sequence[Case], quick: bool) -> int:
-    """How many runs it takes to check all cases."""
+    """Number of runs needed to check all cases."""
     return sum(_runs(case, quick) for case in cases)
 
 
@@ -190,7 +190,7 @@ def _jobs(case: Case, seed: int, runs: int) -> list[StudyJob]:
 
 
 def _little(sample: Sample, batches: Batches) -> dict[str, tuple[Floats, Floats]]:
-    """How many wait and are served: as the world sums it up, and by the times of the events.
+    """Number waiting and in service: integrated by the model, and from the events' times.
 
     The first follows what happens as it happens, the second is who came and went when. Their
     ratio is 1 in every run, not only on average: Little's law, path by path.

@@ -1,4 +1,4 @@
-"""From batches to an estimate with its standard error, sharper by what is known of the luck.
+"""Estimates with standard errors from batches, sharpened by known random inputs.
 
 A run is cut into batches, long enough to be almost independent; a measure is a sum over a sum
 (waits over customers), batch by batch. Its error comes from how much the batches differ.
@@ -60,7 +60,7 @@ _ROUNDING = 1e-9  # what arithmetic alone may cost
 
 @dataclass(frozen=True)
 class Estimate:
-    """A measure, with and without what is known of the luck.
+    """Estimate of a measure, with and without control variates.
 
     Attributes:
         value: The estimate.
@@ -125,7 +125,7 @@ def adjusted(values: Floats, controls: Floats) -> Floats:
 
 
 def verdict(found: Estimate, exact: float, precision: float | None = PRECISION) -> CheckVerdict:
-    """Whether an estimate agrees with the exact value.
+    """Judge whether an estimate agrees with the exact value.
 
     Args:
         found: The estimate.
@@ -158,7 +158,7 @@ def _errors_allowed(batches: int) -> float:
 
 
 def expected_alarms(checks: int) -> float:
-    """How many of so many right checks differ all the same, on average, at most.
+    """Expected maximum number of false alarms among correct checks.
 
     Each may by either of its two estimates.
     """
@@ -193,7 +193,7 @@ def controls(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
 
 
 def inputs(batches: Batches, scenario: TimedScenario) -> dict[str, tuple[Floats, Floats]]:
-    """What was put in, and what the scenario lets expect of it: events and looking time.
+    """Observed and expected inputs: number of events and looking times.
 
     A control takes the luck of the inputs off; that the inputs are right must be seen apart:
     their means, and their shapes by one value of the Laplace transform. That is a mean of
@@ -247,7 +247,7 @@ def _gaps(sample: Sample, number: int) -> tuple[Floats, NDArray[np.bool_]]:
 
 
 def _counts(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
-    """How many events of each stream came, above what its intervals let expect."""
+    """Number of events of each stream above the expectation from its intervals."""
     found = {}
     for number, (name, stream) in enumerate(
         zip(scenario.stream_names, scenario.demand, strict=True)
@@ -270,7 +270,7 @@ def _look_law_of(
 
 
 def _looks(sample: Sample, scenario: TimedScenario) -> tuple[Floats, Floats]:
-    """How much longer than its mean each look took, and its square; 0 where nobody looked."""
+    """Excess of each look over its mean, and of its square; 0 where nobody looked."""
     surplus, square = np.zeros(len(sample.stream)), np.zeros(len(sample.stream))
     took = sample.confirmed - sample.arrived
     for law, which in _look_law_of(sample, scenario):
@@ -335,7 +335,7 @@ def _means(scenario: TimedScenario, pace: float, ranks: list[int]) -> list[float
 
 
 def _look_laws(scenario: TimedScenario) -> list[Law] | None:
-    """How long looking takes for each stream; None if it depends on who looks."""
+    """Law of the looking time for each stream; None if it depends on the responder."""
     robots = any(group.kind == "robot" for group in scenario.responders)
     kind = "robot" if robots else "guard"
     own = {group.look for group in scenario.responders if group.kind == kind}

@@ -118,7 +118,7 @@ def _stationary(calls: Floats, rates: Floats, chosen: Ints) -> Floats:
 
 
 def _queued(load: float, chance: Floats) -> float:
-    """How likely a queue is, relative to no queue: all units serve it, so it is geometric."""
+    """Probability of a queue relative to no queue; geometric, as all units serve it."""
     require_stable(load, "units")
     return float(chance[-1] * load / (1 - load))
 
@@ -179,7 +179,7 @@ def finite_source(
 
 
 def fan_out(neglect_s: float, interaction_s: float, robots: int = 1) -> Measures:
-    """How many robots one operator can serve if nothing is left to chance.
+    """Number of robots one operator can serve in the deterministic case.
 
     `fan_out` is the number at which the operator has just no pause left; with fewer `robots`
     nobody waits, with more each waits until all the others have been served.

@@ -1,4 +1,4 @@
-"""What must hold exactly, whatever the numbers: no chance, no tolerance but the clock's step.
+"""Identities that hold exactly for any numbers; the only tolerance is the clock's step.
 
 One of them turns and shuffles instances: a policy must choose the same all the same.
 """
@@ -64,7 +64,7 @@ def _turned(points: Floats, angle: float) -> Floats:
 def _choice(
     policy: str, goals: Floats, starts: Floats, severities: Floats, robots: Flags, order: Ints
 ) -> Choice:
-    """Who is sent where, by number of the event and name."""
+    """Assignments of a policy, by event number and responder."""
     tasks = tuple(
         Task(
             event=number + 1,
@@ -251,12 +251,12 @@ def _run(scenario: dict[str, Any], seed: int) -> TimedRecording:
 
 
 def _beyond(off: float) -> float:
-    """What is more than the clock explains."""
+    """Deviation that the clock's step does not explain."""
     return float(off) if off > SLACK_S else 0.0
 
 
 def _slower(node: Any, key: str = "") -> Any:
-    """The same scenario with every time `FACTOR` times as long, and every pace as slow."""
+    """Return the scenario with every time `FACTOR` times as long, and every pace as slow."""
     if isinstance(node, dict):
         return {name: _slower(value, name) for name, value in node.items()}
     if isinstance(node, list):

@@ -35,7 +35,7 @@ Memoryless = Annotated[float, "exponential"]
 
 
 class DurationLaw(Protocol):
-    """What most formulas want to know of a duration."""
+    """Moments of a duration that most formulas need."""
 
     @property
     def mean(self) -> float:

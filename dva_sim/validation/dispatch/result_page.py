@@ -1,4 +1,4 @@
-"""What a validation of dispatch found, in figures and in words: by which rule it passes.
+"""Result page of the dispatch validation: figures, text and the rule for passing.
 
 A line agrees if it is within some standard errors, or a small share, of the exact value. All
 must agree, and of a full run none may be too rough. The figures show how far off each check is, and
@@ -64,7 +64,7 @@ def _deviations(checks: Sequence[Check]) -> Drawn:
 
 
 def _relative(checks: Sequence[Check]) -> Drawn:
-    """The same as a share of the exact value, with intervals."""
+    """Deviations as a share of the exact value, with intervals."""
     shown = [c for c in checks if c.exact != 0]
     figure, axes = _rows(shown)
     axes.axvspan(-100 * TOLERANCE, 100 * TOLERANCE, color=FAINT, alpha=0.5, lw=0)
@@ -158,7 +158,7 @@ HEADS = ("case", "measure", "exact", "simulated", "std. error", "deviation", "ve
 def evidence(
     checks: Sequence[Check], conditions: Mapping[str, str], quick: bool
 ) -> ValidationResult:
-    """What all checks come to.
+    """Result of all checks.
 
     Args:
         checks: Line by line.
@@ -190,7 +190,7 @@ def _events(checks: Sequence[Check]) -> int:
 
 
 def _agreeing(checks: Sequence[Check]) -> list[str]:
-    """How many agree of those that are not results themselves."""
+    """Count the checks that agree, by kind, results excepted."""
     told = {
         "input": "checks of what the scenarios put in agree",
         "identity": "identities hold (Little's law, conservation, scaling, the oracle, ...)",
@@ -210,7 +210,7 @@ def headline(checks: Sequence[Check]) -> str:
 
 
 def notes(checks: Sequence[Check], quick: bool) -> list[str]:
-    """What belongs to the outcome: what is too rough, and what chance would do."""
+    """Notes on the outcome: rough estimates, and expected false alarms."""
     by_chance = [c for c in checks if c.found.error > 0]
     off = sum(abs(c.deviation) > ERRORS for c in by_chance)
     found = [

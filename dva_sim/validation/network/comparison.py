@@ -129,7 +129,7 @@ WANTED, WANTED_POOLED = 150, 40  # conditions that should be judged
 
 @dataclass(frozen=True)
 class NetworkSetting:
-    """How much is played.
+    """Scope of a comparison: number of runs.
 
     Attributes:
         seed: Of all luck.
@@ -144,7 +144,7 @@ class NetworkSetting:
     ablate: bool = False
 
     def runs(self, group: ConditionGroup) -> int:
-        """Of the model for a condition: one where nothing is left to chance."""
+        """Number of model runs of a condition: one if nothing is random."""
         condition = group.condition
         if condition.loss > 0:
             return QUICK_RUNS if self.quick else RUNS
@@ -152,13 +152,13 @@ class NetworkSetting:
 
     @property
     def control_runs(self) -> int:
-        """Of each variant that is only looked at for pooled conditions."""
+        """Number of runs of each control variant, for pooled conditions only."""
         return QUICK_CONTROL_RUNS if self.quick else CONTROL_RUNS
 
 
 @dataclass(frozen=True)
 class NetworkComparison:
-    """What was found.
+    """Result of a comparison.
 
     Attributes:
         groups: The conditions that were judged, with their measurements.
@@ -184,7 +184,7 @@ class NetworkComparison:
         return [v for v in self.verdicts if v.cell.group.kind == kind]
 
     def passes_bands(self, kind: ConditionKind) -> bool:
-        """Whether enough lies inside: everything, of single runs under loss nine of ten."""
+        """True if enough lies inside: everything, but nine of ten single runs under loss."""
         inside, judged = share_inside(self.of_kind(kind))
         return inside >= (MIN_INSIDE if kind == "single" else 1.0) * judged
 
@@ -212,13 +212,13 @@ class NetworkComparison:
 
     @property
     def passes(self) -> bool:
-        """Whether all bands hold and all that is too simple fails."""
+        """True if all bands hold and every oversimplified control fails."""
         bands = all(self.passes_bands(kind) for kind in KINDS)
         return bands and (self.pooled.passes or not self.pooled.scored) and not self.fooled
 
     @property
     def missing(self) -> tuple[int, int]:
-        """How many conditions, and how many pooled ones, are wanted beyond those judged."""
+        """Number of conditions, and of pooled ones, still needed."""
         judged = self.judged
         pooled = sum(group.kind == "pooled" for group in judged)
         return max(0, WANTED - len(judged)), max(0, WANTED_POOLED - pooled)
@@ -267,7 +267,7 @@ def compare(
 def orders_of(
     groups: Sequence[ConditionGroup], setting: NetworkSetting
 ) -> dict[str, list[ModelRuns]]:
-    """What to play: the model as it is, what is too simple, and with mechanisms left out."""
+    """Model runs to make: full model, oversimplified controls, and ablations."""
     pooled, runs = pooled_of(groups), setting.control_runs
     orders = {MODEL: [ModelRuns(g.condition, setting.runs(g)) for g in groups]}
     for name, depth in CONTROLS.items() if pooled else ():
@@ -283,13 +283,13 @@ def pooled_of(groups: Sequence[ConditionGroup]) -> list[ConditionGroup]:
 
 
 def runs_in(groups: Sequence[ConditionGroup], setting: NetworkSetting) -> int:
-    """How many runs a comparison takes."""
+    """Number of runs in a comparison."""
     played = [group for group in groups if not group.left_out]
     return sum(order.runs for own in orders_of(played, setting).values() for order in own)
 
 
 def depths_of(comparison: NetworkComparison) -> dict[str, int]:
-    """How many conditions were played how deep."""
+    """Number of conditions simulated at each depth."""
     return Counter(depth_for(group.condition) for group in comparison.groups)
 
 

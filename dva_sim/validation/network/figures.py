@@ -79,7 +79,7 @@ def _scatter(comparison: NetworkComparison) -> Drawn:
 
 
 def _ratios(comparison: NetworkComparison) -> Drawn:
-    """The same as predicted over measured: what is off can be seen."""
+    """Ratios of predicted to measured, which make deviations visible."""
     figure, axes = panels(len(KINDS), len(_PAIRS), 1.9)
     for panel in _panels(comparison, axes):
         for cell, marker, colour in panel.marks:
@@ -137,7 +137,7 @@ def _panels(comparison: NetworkComparison, axes: list[list[Axes]]) -> list[_Pane
 
 
 def _label(figure: Figure, axes: list[list[Axes]], text: str) -> None:
-    """What is common to rows and columns, and the key."""
+    """Label rows and columns, and draw the legend."""
     for row, kind in zip(axes, KINDS, strict=True):
         row[0].set_ylabel(f"{_ROWS[kind]}\n{text}")
         for ax in row:
@@ -156,7 +156,7 @@ def _label(figure: Figure, axes: list[list[Axes]], text: str) -> None:
 
 
 def _bar(kind: ConditionKind, cell: ComparedCell) -> tuple[float, float]:
-    """Where the model expects what was measured."""
+    """Range in which the model expects the measured value."""
     least = 0.02 * cell.model  # a logarithmic axis has no zero
     if kind == "single":
         low, high = np.percentile(cell.predicted, (2.5, 97.5))
@@ -168,7 +168,7 @@ def _bar(kind: ConditionKind, cell: ComparedCell) -> tuple[float, float]:
 
 
 def _diagonal(axes: Axes, kind: ConditionKind, is_time: bool) -> None:
-    """Where both agree, and the band around it."""
+    """Draw the line of equality and the band around it."""
     axes.set(xscale="log", yscale="log")
     low = min(axes.get_xlim()[0], axes.get_ylim()[0])
     high = max(axes.get_xlim()[1], axes.get_ylim()[1])
@@ -186,7 +186,7 @@ def _diagonal(axes: Axes, kind: ConditionKind, is_time: bool) -> None:
 
 
 def _level(axes: Axes, kind: ConditionKind, is_time: bool) -> None:
-    """The same for predicted over measured."""
+    """Draw the line of equality and its band, for predicted over measured."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
     axes.set(xscale="log", yscale="log")
@@ -218,7 +218,7 @@ def _log_ticks(axis: Axis, reach: float) -> None:
 
 
 def _scores(comparison: NetworkComparison) -> Drawn:
-    """How z is distributed, and of each measure."""
+    """Distribution of z, overall and by measure."""
     pooled = comparison.pooled
     figure, [[left, right]] = panels(1, 2, 3.2, width_ratios=(1, 1.3))
     far = _FARTHEST_Z

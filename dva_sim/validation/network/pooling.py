@@ -57,7 +57,7 @@ class Scored:
 
 @dataclass(frozen=True)
 class Pooled:
-    """What all pooled conditions come to.
+    """Result of all pooled conditions.
 
     Attributes:
         scored: Each measure of each condition.
@@ -83,17 +83,17 @@ class Pooled:
 
     @property
     def spread_is_right(self) -> bool:
-        """Whether the root mean square lies in the expected range."""
+        """True if the root mean square lies in the expected range."""
         return self.expected[0] <= self.rms <= self.expected[1]
 
     @property
     def passes(self) -> bool:
-        """Whether all three hold."""
+        """True if all three criteria hold."""
         return not self.significant and self.spread_is_right and not self.biased
 
 
 def bias_limit(measure: ComparedMeasure) -> float:
-    """How large a median bias may be."""
+    """Largest acceptable median bias."""
     tail_of_age = measure.is_tail and measure.name.startswith(("age", "stale"))
     return MAX_TAIL_BIAS if tail_of_age else MAX_BIAS
 
@@ -138,7 +138,7 @@ def pool(judged: Sequence[ComparedCell], rng: np.random.Generator) -> Pooled:
 
 
 def _judged(scored: Sequence[Scored], expected: tuple[float, float], false_alarms: float) -> Pooled:
-    """What scores come to."""
+    """Judge the scores."""
     found = holm([s.p for s in scored]) <= SIGNIFICANT
     offs = {m: [s.cell.off for s in scored if s.cell.measure == m] for m in MEASURES}
     return Pooled(
@@ -152,7 +152,7 @@ def _judged(scored: Sequence[Scored], expected: tuple[float, float], false_alarm
 
 
 def tells(cell: ComparedCell) -> bool:
-    """Whether a mean over runs says anything: defined nearly always, and not of rare events."""
+    """True if a mean over runs is meaningful: nearly always defined, events not rare."""
     runs = len(cell.group.runs)
     if not len(cell.measured) or len(cell.predicted) < 2:
         return False
@@ -162,7 +162,7 @@ def tells(cell: ComparedCell) -> bool:
 
 
 def is_steady(cell: ComparedCell) -> bool:
-    """Whether runs differ less than the model can tell."""
+    """True if runs differ by less than the model's resolution."""
     return tells(cell) and chance(cell) < resolution(cell)
 
 
@@ -174,7 +174,7 @@ def score(cell: ComparedCell) -> Scored:
 
 
 def standard_error(cell: ComparedCell) -> float:
-    """Of the difference of the means: chance on both sides, and what cannot be told apart."""
+    """Standard error of the difference of means, with chance on both sides and resolution."""
     return float(np.hypot(chance(cell), resolution(cell)))
 
 
@@ -185,7 +185,7 @@ def chance(cell: ComparedCell) -> float:
 
 
 def resolution(cell: ComparedCell) -> float:
-    """What half a millisecond more for each command would change."""
+    """Change of the measure if each command took half a millisecond longer."""
     measure, condition = cell.measure, cell.group.condition
     if measure.is_time:
         return 1000.0 * EXACT_S

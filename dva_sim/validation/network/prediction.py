@@ -33,7 +33,7 @@ from dva_sim.validation.network.verdicts import OVERLOAD, PACKET_BYTES, is_bound
 
 
 class ModelProgram:
-    """What both programs have in common.
+    """Base of both programs.
 
     Args:
         clock: The run's clock.
@@ -229,7 +229,7 @@ WITHOUT: dict[str, dict[str, Any]] = {
 def predict(
     condition: Condition, seed: int, depth: Depth = "auto", without: Sequence[str] = ()
 ) -> Measures:
-    """What the model says of a condition: the columns of results of one run.
+    """Predict a condition: the result columns of one run.
 
     Args:
         condition: What is set.
@@ -246,7 +246,7 @@ def predict(
 
 
 def depth_for(condition: Condition, depth: Depth = "auto") -> Played:
-    """How deep a condition is played.
+    """Depth at which a condition is simulated.
 
     Messages are enough where the link is calm, the robot keeps up, no buffer matters, and
     what is under way fits into TCP's initial window.
@@ -388,7 +388,7 @@ class Session:
         return kind(self.clock, out, back, at_robot, at_operator)
 
     def _ends(self) -> tuple[ZmtpOptions, ZmtpOptions]:
-        """What is set on the operator's and on the robot's socket."""
+        """Socket options of the operator and of the robot."""
         condition = self._condition
         both = TcpOptions(congestion=condition.cc)
         operator = dataclasses.replace(both, **{"send_buffer": condition.sndbuf} | self._tcp)

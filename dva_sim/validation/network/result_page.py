@@ -1,4 +1,4 @@
-"""What a comparison with real sockets found, in words: its criteria, its conditions, its rows.
+"""Result page of a comparison with real sockets: criteria, conditions and rows.
 
 Without loss a prediction lies in its band, and a single run under loss in the model's interval;
 pooled runs are scored together, and models that are too simple have to be found out.
@@ -166,7 +166,7 @@ WORST = 12  # of the largest z that are named
 def evidence(
     comparison: NetworkComparison, conditions: Mapping[str, str], causes: Mapping[str, str]
 ) -> ValidationResult:
-    """What all conditions come to.
+    """Result of all conditions.
 
     Args:
         comparison: What was found.
@@ -216,7 +216,7 @@ def _sheet(
 
 
 def headline(comparison: NetworkComparison) -> str:
-    """What it comes to, in two sentences."""
+    """Headline of the result, in two sentences."""
     judged = comparison.judged
     counts = ", ".join(
         f"{sum(g.kind == kind for g in judged)} {words}"
@@ -229,7 +229,7 @@ def headline(comparison: NetworkComparison) -> str:
 
 
 def notes(comparison: NetworkComparison) -> list[str]:
-    """What is missing, and what was found out."""
+    """Notes on missing conditions and on findings."""
     found = []
     every, pooled = comparison.missing
     if every or pooled:
@@ -308,7 +308,7 @@ def _significant(pooled: Pooled) -> str:
 
 
 def left_out(comparison: NetworkComparison) -> list[tuple[str, str]]:
-    """Why conditions were not judged, and how many."""
+    """Reasons why conditions were not judged, with their labels."""
     reasons: dict[str, list[str]] = {}
     for group in comparison.left_out:
         reasons.setdefault(group.left_out, []).append(group.condition.label)

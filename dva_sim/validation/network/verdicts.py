@@ -1,4 +1,4 @@
-"""What is compared of a condition, by which band it is judged, and what must not be judged.
+"""Comparison rules: measures, bands, and conditions that must not be judged.
 
 One number per run and measure is compared, from sockets and from the model alike. Which kind a
 condition is, and whether it may be judged, is decided by the condition alone: without loss by
@@ -45,7 +45,7 @@ class ConditionGroup:
 
 
 def grouped(runs: Sequence[SocketRun]) -> list[ConditionGroup]:
-    """The runs by condition; under loss, those only whose luck is their own, if there are any."""
+    """Group the runs by condition; under loss, prefer those with independent random losses."""
     by_condition: dict[Condition, list[SocketRun]] = {}
     for run in runs:
         by_condition.setdefault(run.condition, []).append(run)
@@ -66,7 +66,7 @@ def _group(condition: Condition, runs: Sequence[SocketRun]) -> ConditionGroup:
 
 
 def why_not_judged(condition: Condition) -> str:
-    """Why a condition must not be judged; empty if it may.
+    """Reason why a condition must not be judged; empty if it may.
 
     Where the service time is a whole number of periods, the next command comes just when the
     robot is free: whether it counts hangs on how much longer than asked a program sleeps.
@@ -98,14 +98,17 @@ def load(condition: Condition) -> float:
 
 
 def is_bounded(condition: Condition) -> bool:
-    """Whether a buffer somewhere is smaller than it is by default."""
+    """True if a buffer is smaller than by default."""
     small = condition.sndbuf is not None or condition.rcvbuf is not None
     return small or condition.hwm < 1000 or condition.conflate != "none"
 
 
 def may_livelock(condition: Condition) -> bool:
-    """Whether one loss can end all control: a new socket needs three round trips before its
-    request leaves, and the reply one more and the service time."""
+    """True if one loss can end all control.
+
+    A new socket needs three round trips before its request leaves, and the reply needs one more and
+    the service time.
+    """
     if condition.pattern != "req-rep" or condition.loss == 0:
         return False
     assert condition.timeout_ms is not None
@@ -134,12 +137,12 @@ class ComparedMeasure:
 
     @property
     def is_time(self) -> bool:
-        """Whether bands in milliseconds belong to it."""
+        """True if bands in milliseconds apply to it."""
         return self.unit == "ms"
 
     @property
     def is_tail(self) -> bool:
-        """Whether it is a 95th percentile."""
+        """True if it is a 95th percentile."""
         return self.name.endswith("_p95")
 
 
@@ -205,7 +208,7 @@ class ComparedCell:
 
     @property
     def off(self) -> float:
-        """How far the prediction is off, as a share of what was measured."""
+        """Relative error of the prediction."""
         return self.model / self.real - 1 if self.real else math.nan
 
 
@@ -259,7 +262,7 @@ class CellVerdict:
 
     @property
     def compared(self) -> float:
-        """What has to lie in the band."""
+        """Value that has to lie in the band."""
         return self.cell.real if self.cell.group.kind == "single" else self.cell.model
 
     @property
@@ -278,7 +281,7 @@ def judge(cell: ComparedCell) -> CellVerdict:
 
 
 def reason_against(cell: ComparedCell) -> str:
-    """Why a measure of a condition is not judged; empty if it is."""
+    """Reason why a measure of a condition is not judged; empty if it is."""
     group, measure = cell.group, cell.measure
     if group.left_out:
         return group.left_out
@@ -315,7 +318,7 @@ def _band(cell: ComparedCell) -> tuple[float, float]:
 
 
 def _absolute(cell: ComparedCell) -> float:
-    """What is added to the share; in an overload nothing."""
+    """Absolute part of the band, added to the share; none in an overload."""
     if cell.group.kind == "overload":
         return 0.0
     return TIME_MS if cell.measure.is_time else RATE_HZ
@@ -331,6 +334,6 @@ def _interval(cell: ComparedCell) -> tuple[float, float]:
 
 
 def share_inside(verdicts: Sequence[CellVerdict]) -> tuple[int, int]:
-    """How many of those that are judged lie inside, and how many are judged."""
+    """Number of judged verdicts inside, and number of judged verdicts."""
     judged = [v for v in verdicts if v.word != "shown only"]
     return sum(v.word == "inside" for v in judged), len(judged)

@@ -32,13 +32,13 @@ def ages() -> Values:
 
 
 def steps() -> Values:
-    """What the two variants make of a level of 2, then 8, then 2, with a longest delay of 0.2 s."""
+    """Outputs of both variants for a level of 2, then 8, then 2, with a maximum delay of 0.2 s."""
     copy, in_place = step_outputs(COPY), step_outputs(IN_PLACE)
     return {"copy": max(copy), "rises": max(in_place), "never-returns": in_place[-1]}
 
 
 def step_outputs(name: str) -> list[float]:
-    """What a filter makes of that, look by look, `STEP_LOOK` apart."""
+    """Outputs of a filter for those levels, one per `STEP_LOOK`."""
     return _outputs(load_filter(name)(1.0 / RATE), STEP_LEVELS, STEP_LOOK)
 
 

@@ -52,7 +52,7 @@ def critical(loop: Loop, low: float, high: float) -> float:
 
 
 def grows(errors: Sequence[float]) -> bool:
-    """Whether the last eighth swings farther than the second; the first is the start."""
+    """True if the last eighth swings farther than the second; the first is the start."""
     swings = np.abs(np.asarray(errors))
     eighth = len(swings) // 8
     return bool(swings[-eighth:].max() > swings[eighth : 2 * eighth].max())
@@ -104,7 +104,7 @@ def pure_pursuit(speed_delay: float) -> list[float]:
 
 
 def smith_response(gain: float, delay: float, end: float) -> list[float]:
-    """Where a cursor that `Predictor` steers is, step by step after a target appears 1 m away.
+    """Positions of a cursor steered by `Predictor` after a target appears 1 m away.
 
     The predictor adds to what is seen what was asked for since and cannot be seen yet, so the
     loop is closed on the present: y(t) = 1 - exp(-gain (t - delay)) from the delay on.

@@ -45,7 +45,7 @@ PPM = (30, 50, 100, 300)
 
 
 def fires() -> Values:
-    """When each class of fire has grown to 1055 kW [s]."""
+    """Times at which each class of fire reaches 1055 kW [s]."""
     times = np.arange(0.0, 700.0, 0.05)
     found = {}
     for growth in GROWTH_S:
@@ -80,7 +80,7 @@ def helpers(seed: int) -> Values:
 
 
 def alarms() -> Values:
-    """When a carbon monoxide alarm sounds in air of so many ppm [min]; never: infinite."""
+    """Times at which a carbon monoxide alarm sounds, by ppm [min]; infinite if never."""
     return {str(ppm): _alarm_time(float(ppm)) / 60.0 for ppm in PPM}
 
 

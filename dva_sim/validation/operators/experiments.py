@@ -135,7 +135,7 @@ def throughput(trials: Trials) -> float:
 
 # --- steering: Wang et al. 2021; latency of steering -----------------------------------------
 def steering_values(cells: Cells) -> Values:
-    """How straight mean and variance of the movement time are in ID and its square."""
+    """Linearity in ID of the movement time's mean, and in its square of the variance."""
     ids, means, variances = steering_points(cells["tunnel"])
     return {
         "S11/mean": fit_line(ids, means).r2,
@@ -144,7 +144,7 @@ def steering_values(cells: Cells) -> Values:
 
 
 def steering_points(trials: Trials) -> tuple[Floats, Floats, Floats]:
-    """Of each index of difficulty: it, mean [s] and variance [s^2] over all trials of all."""
+    """Index of difficulty, mean [s] and variance [s^2], over all trials."""
     rows = [
         (key, some["movement_time_s"].mean(), some["movement_time_s"].var(ddof=1))
         for (key,), some in trials.by("steering_id")
@@ -161,7 +161,7 @@ def latency_values(cells: Cells) -> Values:
 
 # --- waiting for what one has done: Ferrell 1965, an excavator -------------------------------
 def wait_values(cells: Cells) -> Values:
-    """How straight completion times are in the delay, and their slope less the waits.
+    """Linearity of completion time in the delay, and the slope without the waits.
 
     The slope of who does not wait says nothing of move-and-wait.
     """
@@ -175,7 +175,7 @@ def wait_values(cells: Cells) -> Values:
 
 
 def excavator_values(cells: Cells) -> Values:
-    """What the delay adds, as a share."""
+    """Relative increase of the time by the delay."""
     late, prompt = (mean(cells[name], "movement_time_s") for name in (str(EXCAVATOR_S), "0"))
     return {"S17/increase": late / prompt - 1.0}
 
@@ -234,7 +234,7 @@ def log_times(trials: Trials) -> Floats:
 
 
 def moving_ratios(cells: Cells, added: float, speeds: Sequence[float] = SPEEDS_MPS) -> Floats:
-    """Of each person, time at a lag over that at none, geometric mean over speeds `(persons,)`."""
+    """Ratio of the times with and without lag, geometric mean over speeds `(persons,)`."""
     logs = [
         person_means_of(cells[moving_cell(added, v)], log_times)
         - person_means_of(cells[moving_cell(0.0, v)], log_times)
@@ -244,7 +244,7 @@ def moving_ratios(cells: Cells, added: float, speeds: Sequence[float] = SPEEDS_M
 
 
 def moving_values(cells: Cells) -> Values:
-    """What lag costs, how convex that is, how persons differ and learn, and how often they miss."""
+    """Cost of lag, its convexity, differences and learning of persons, and misses."""
     logs = {added: np.log(moving_ratios(cells, added)) for added in ADDED_S}
     ratio = {added: float(np.exp(log.mean())) for added, log in logs.items()}
     slow = [cells[moving_cell(a, SPEEDS_MPS[0])] for a in (0.2, 0.0)]
@@ -303,7 +303,7 @@ CLICK_S = {"0": 0.05, "0.25": 0.3}
 
 
 def click_values(cells: Cells) -> Values:
-    """How far off the one click is under lag, and what lag costs in time."""
+    """Error of a single click under lag, and the cost in time."""
     off = {c: person_medians(trials, "miss_m") for c, trials in cells.items()}
     times = {c: person_medians(trials, "movement_time_s") for c, trials in cells.items()}
     return {
@@ -314,7 +314,7 @@ def click_values(cells: Cells) -> Values:
 
 # --- resisting a push: Yamagami et al. 2019 ----------------------------------------------------
 def pushed_values(cells: Cells) -> Values:
-    """What is read off the open loops, and how persons differ."""
+    """Parameters of the open loops, and differences between persons."""
     trials = cells["pushed"]
     frequency = person_means(trials, "crossover_rad_s")
     margins = person_means(trials, "phase_margin_deg")
@@ -371,7 +371,7 @@ def choice_values(cells: Cells) -> Values:
 
 
 def vehicle_values(cells: Cells) -> Values:
-    """What a second vehicle costs the first, by persons."""
+    """Cost of a second vehicle for the first, by persons."""
     logs = [person_means_of(cells[n], lambda t: np.log(t["finish_s"])) for n in ("2", "1")]
     return {"E1/ratio": float(np.exp(np.mean(logs[0] - logs[1])))}
 
@@ -399,7 +399,7 @@ def item_values(cells: Cells) -> Values:
 
 
 def walker_values(cells: Cells) -> Values:
-    """Of all walkers together."""
+    """Statistics of all walkers."""
     speeds = cells["street"]["speed_mps"]
     return {"G1/mean": float(speeds.mean()), "G1/sd": float(speeds.std(ddof=1))}
 
@@ -499,7 +499,7 @@ Traits = Mapping[str, float]
 
 @dataclass(frozen=True)
 class OperatorsSetting:
-    """How experiments are played.
+    """Settings of the simulated experiments.
 
     Attributes:
         strategy: How the persons steer.
@@ -567,7 +567,7 @@ def measured(
 
 
 def jobs_of(experiments: Sequence[Experiment], setting: OperatorsSetting) -> int:
-    """How many jobs the experiments take."""
+    """Number of jobs in the experiments."""
     return sum(len(e.cells) for e in experiments) * setting.persons
 
 
@@ -586,14 +586,14 @@ def perform(job: StudyJob) -> Tables:
 
 
 def _asked_person(job: StudyJob) -> Person:
-    """Who is asked, of the population that the job names."""
+    """Person for a job, drawn from the population that it names."""
     asked = dict(job.cell)
     everybody = population(OperatorConfig()).with_medians(json.loads(str(asked["traits"])))
     return draw_person(everybody, int(str(asked["population"])), job.person)
 
 
 def _jobs(experiment: Experiment, setting: OperatorsSetting) -> dict[str, list[StudyJob]]:
-    """Those of each cell; a person meets the same luck in all of them."""
+    """Jobs of each cell; a person meets the same random numbers in all of them."""
     jobs: dict[str, list[StudyJob]] = {cell: [] for cell in experiment.cells}
     if experiment.scenario is None:
         traits = json.dumps(setting.traits or {})

@@ -55,7 +55,7 @@ def paired(
     persons: Sequence[Floats],
     colour: str = BLUE,
 ) -> None:
-    """The same with the means given, and 95 % intervals of a mean from the persons."""
+    """Plot given means with 95 % intervals computed from the persons."""
     halves = [float(1.96 * p.std(ddof=1) / np.sqrt(len(p))) for p in persons]
     look: dict[str, Any] = {"fmt": "o-", "color": colour, "ms": 5, "lw": 1.2, "elinewidth": 1.4}
     axes.errorbar(x, means, yerr=halves, clip_on=False, **look)
@@ -228,7 +228,7 @@ def _waiting(lines: ByLine, cells: Cells) -> Drawn:
 
 
 def _excavator(axes: Axes, verdict: LineVerdict) -> None:
-    """What the delay adds to its time."""
+    """Plot the time added by the delay."""
     compared(axes, 0, verdict)
     axes.set_xlim(-0.8, 0.8)
     axes.set_ylim(bottom=0)

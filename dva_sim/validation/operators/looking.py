@@ -1,4 +1,4 @@
-"""What people decide by looking, played with the parts of an operator and no task around them.
+"""Decisions that people make by looking, simulated with parts of an operator and no task.
 
 Looks at one of two screens, two vehicles that ask at once, choices in a hurry, items found by a
 searcher, an alarm, people who walk in a street. Each is asked of one person after the other.
@@ -73,7 +73,7 @@ def looks(person: Person, cell: str, seed: int) -> list[Row]:
 
 
 def vehicles(person: Person, cell: str, seed: int) -> list[Row]:
-    """When each of some vehicles is done that ask at once, the opening of its picture included."""
+    """Finishing times of vehicles that ask at the same time, opening the picture included."""
     clock, every = Clock(), [_Vehicle() for _ in range(int(cell))]
     attention = _attention(clock, person, seed)
     for vehicle in every:

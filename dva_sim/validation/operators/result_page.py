@@ -1,4 +1,4 @@
-"""What a validation of operators found, in words: its lines, and what it leaves.
+"""Result page of the operator validation: its lines, and what remains open.
 
 A line passes if the simulated value lies in the published band; the split says which shares of
 the exact and of the held-out lines must.
@@ -52,7 +52,7 @@ def evidence(
     played: Mapping[str, Cells],
     conditions: Mapping[str, str],
 ) -> ValidationResult:
-    """What all lines come to.
+    """Result of all lines.
 
     Args:
         verdicts: Line by line.
@@ -99,7 +99,7 @@ def grouped(verdicts: Sequence[LineVerdict]) -> Iterator[tuple[str, list[LineVer
 
 
 def steered(played: Mapping[str, Cells]) -> list[tuple[str, str]]:
-    """Of each experiment and its cells, in which share of the time they moved and waited."""
+    """Share of time in move-and-wait, by experiment and cell."""
     found = []
     for name, cells in by_strategy(played).items():
         shares = [
@@ -121,7 +121,7 @@ def by_strategy(played: Mapping[str, Cells]) -> dict[str, Cells]:
 
 
 def headline(outcome: Tally) -> str:
-    """What it comes to, in three sentences."""
+    """Headline of the result, in three sentences."""
     (exact, exact_of), (held, held_of) = outcome.exact, outcome.held_out
     whole, whole_of = outcome.publications
     share = f"{100 * held / held_of:.0f} %" if held_of else "none"
@@ -195,7 +195,7 @@ def simulated(verdict: LineVerdict) -> str:
 
 
 def _with_sources(verdicts: Sequence[LineVerdict]) -> list[Sequence[str]]:
-    """Of each check what it measured and its source, and below that its lines in words."""
+    """Table rows: measure and source of each check, followed by its lines."""
     rows: dict[str, list[Sequence[str]]] = {}
     for verdict in verdicts:
         line = verdict.line

@@ -101,7 +101,7 @@ def collect(rows: Sequence[tuple[int, Sequence[Mapping[str, Any]]]]) -> Trials:
 
 
 def with_intervals(measure: Measure, cells: Cells, rng: np.random.Generator) -> dict[str, Found]:
-    """What is measured, and its interval over draws of as many persons.
+    """Values of a measure with bootstrap intervals over persons.
 
     Args:
         measure: From trials to numbers.
@@ -123,7 +123,7 @@ def with_intervals(measure: Measure, cells: Cells, rng: np.random.Generator) -> 
 
 
 def _middle(draws: Sequence[float]) -> tuple[float, float]:
-    """From where to where the middle of some draws lies, without those that are no number."""
+    """Central interval of the draws, nan excluded."""
     known = [draw for draw in draws if not math.isnan(draw)]
     if not known:
         return math.nan, math.nan

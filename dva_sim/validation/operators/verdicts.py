@@ -29,7 +29,7 @@ class LineVerdict:
 
     @property
     def inside(self) -> bool:
-        """Whether what is simulated lies in the band, for sure on the side that is asked for."""
+        """True if the simulated value lies in the band, for certain where the line asks for it."""
         found = self.found
         held = not math.isnan(found.value) and self.line.holds(found.value)
         return held and self.line.is_sure(found.low, found.high)
@@ -44,7 +44,7 @@ class LineVerdict:
 
 @dataclass(frozen=True)
 class Tally:
-    """What all verdicts come to.
+    """Tally of all verdicts.
 
     Attributes:
         exact: Exact lines that pass, and all of them.
@@ -60,7 +60,7 @@ class Tally:
 
     @property
     def passes(self) -> bool:
-        """Whether both shares are reached."""
+        """True if both shares are reached."""
         return _reaches(self.exact, self.rule.exact) and _reaches(self.held_out, self.rule.held_out)
 
 
@@ -71,7 +71,7 @@ def judge(lines: Sequence[TargetLine], found: Mapping[str, Found]) -> list[LineV
 
 
 def outcome_of(verdicts: Sequence[LineVerdict], rule: RuleConfig) -> Tally:
-    """What the verdicts come to, by the rule of the split."""
+    """Tally the verdicts by the rule of the split."""
     exact, held_out = _share(verdicts, "exact"), _share(verdicts, "held-out")
     return Tally(exact, held_out, _whole(verdicts), rule)
 

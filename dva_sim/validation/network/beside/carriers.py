@@ -43,7 +43,7 @@ def _nothing() -> None:
 
 @dataclass(frozen=True)
 class BetweenPrograms:
-    """What a carrier stands between.
+    """Context of a carrier: the two programs it connects.
 
     Attributes:
         clock: Virtual time.
@@ -473,7 +473,7 @@ class RequestCarrier(ZeroMqCarrier):
 
 
 def why_not(transport: CommandTransport) -> str:
-    """Why the model says nothing of a transport; empty if it does."""
+    """Reason why the model does not cover a transport; empty if it does."""
     if isinstance(transport, MqttTransport):
         if transport.qos > 1:
             return "MQTT's quality of service 2 is not modelled"

@@ -109,7 +109,7 @@ class BesideRow:
 
     @property
     def median(self) -> float:
-        """Of what was measured; nan of nothing."""
+        """Median of the measured values; nan without any."""
         return float(np.median(self.values)) if len(self.values) else float("nan")
 
     @property
@@ -140,7 +140,7 @@ def rows_beside(
 
 
 def _against(own: Measured, values: Sequence[float]) -> str:
-    """Why a predicted row is not judged; empty if it is."""
+    """Reason why a predicted row is not judged; empty if it is."""
     if len(values) >= MIN_RUNS:
         return ""
     late = f", {own.disturbed} more were disturbed" if own.disturbed else ""
@@ -149,7 +149,7 @@ def _against(own: Measured, values: Sequence[float]) -> str:
 
 @dataclass(frozen=True)
 class Beside:
-    """What was found.
+    """Comparison of measured rows with predicted bands.
 
     Attributes:
         rows: Every measure of every configuration.
@@ -167,12 +167,12 @@ class Beside:
 
     @property
     def share(self) -> tuple[int, int]:
-        """How many of the rows that are judged lie inside, and how many are judged."""
+        """Number of judged rows inside their bands, and number of judged rows."""
         return len(self.with_word("inside")), len(self.with_word("inside", "outside"))
 
     @property
     def passes(self) -> bool:
-        """Whether enough lie inside."""
+        """True if enough rows lie inside."""
         inside, judged = self.share
         return inside >= MIN_INSIDE * judged
 

@@ -27,7 +27,7 @@ _LEAST_S = 0.01  # where logarithmic axes begin [s]
 
 
 def evidence(beside: Beside, conditions: Mapping[str, str]) -> ValidationResult:
-    """What all rows come to.
+    """Result of all rows.
 
     Args:
         beside: What was found.
@@ -64,7 +64,7 @@ def evidence(beside: Beside, conditions: Mapping[str, str]) -> ValidationResult:
 
 
 def headline(beside: Beside) -> str:
-    """What it comes to."""
+    """Headline of the result."""
     inside, judged = beside.share
     if not judged:
         return f"{len(beside.with_word('predicted'))} rows are predicted; nothing is judged."
@@ -76,7 +76,7 @@ def headline(beside: Beside) -> str:
 
 
 def notes(beside: Beside) -> list[str]:
-    """Where the bands come from."""
+    """Notes on the origin of the bands."""
     told = []
     if beside.kept:
         told.append(
@@ -88,7 +88,7 @@ def notes(beside: Beside) -> list[str]:
 
 
 def summary_of(beside: Beside) -> list[tuple[str, str, str, str]]:
-    """How many rows of each measure lie inside."""
+    """Number of rows inside, by measure."""
     lines = []
     for measure in ALLOWANCES:
         words = [row.word for row in beside.rows if row.measure == measure]
@@ -100,7 +100,7 @@ def summary_of(beside: Beside) -> list[tuple[str, str, str, str]]:
 
 
 def reasons_of(beside: Beside) -> list[tuple[str, str]]:
-    """Why rows have no verdict, and how many."""
+    """Reasons why rows have no verdict, with counts."""
     count: dict[str, int] = {}
     for row in beside.with_word("not predicted", "not judged"):
         count[row.why] = count.get(row.why, 0) + 1

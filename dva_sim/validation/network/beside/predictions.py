@@ -1,4 +1,4 @@
-"""What the model predicts of each configuration of a middleware study, with a band around it.
+"""Predictions of the model for each configuration of a middleware study, with bands.
 
 The rule is fixed here, before any run of a study is looked at:
 
@@ -45,7 +45,7 @@ KEPT: Final = "middleware-predictions"
 
 
 class Allowance(NamedTuple):
-    """What the model leaves out: a share of the value, and an amount besides."""
+    """Allowance for effects outside the model: a share of the value, plus an amount."""
 
     share: float
     amount: Callable[[MiddlewareScenario], float]
@@ -75,13 +75,13 @@ class PredictedBand(NamedTuple):
     high: float
 
     def holds(self, value: float) -> bool:
-        """Whether a measured value lies inside."""
+        """True if a measured value lies inside."""
         return self.low <= value <= self.high
 
 
 @dataclass(frozen=True)
 class CellPrediction:
-    """What is predicted of one configuration.
+    """Prediction for one configuration.
 
     Attributes:
         config: Its hash.
@@ -116,7 +116,7 @@ class AskedCell:
 
     @property
     def why_not(self) -> str:
-        """Why the model says nothing of it; empty if it does."""
+        """Reason why the model does not cover the configuration; empty if it does."""
         if self.scenario is None:
             return "its scenario has changed since it was run"
         choice = self.scenario.transport
@@ -149,7 +149,7 @@ def predict_all(
 
 
 def plays_in(asked: Sequence[AskedCell], plays: int) -> int:
-    """How many plays that takes."""
+    """Number of runs needed."""
     return sum(plays * len(cell.seeds) for cell in asked if not cell.why_not)
 
 

@@ -31,7 +31,7 @@ assumed, equally likely in between."""
 
 
 class ProgramTimes(NamedTuple):
-    """When both programs have started, in the time of the link, and how long one ends [s]."""
+    """Start of both programs in the time of the link, and time a program takes to end [s]."""
 
     near: float
     far: float

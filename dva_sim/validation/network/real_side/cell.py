@@ -140,7 +140,7 @@ PACKETS, PROXY = "packets", "proxy"
 
 @dataclass(frozen=True)
 class EmulatedJob:
-    """What one run is told.
+    """Job of one run.
 
     Attributes:
         program: `commands` for operator and robot, `probe` for the link's own check, `nothing`
@@ -178,7 +178,7 @@ class EmulatedJob:
 
 @dataclass(frozen=True)
 class EmulatedOutcome:
-    """What one run came to.
+    """Outcome of one run.
 
     Attributes:
         operator: Notes of the operator.
@@ -245,7 +245,7 @@ class EmulatedCell:
         return EmulatedOutcome(notes[0], notes[-1], told, self._way, realtime, problem)
 
     def _set_up(self) -> tuple[EmulatedLink[Any], bytes]:
-        """The link with both ends, and what the operator is told to begin."""
+        """Set up the link with both ends, and the operator's start message."""
         operator, robot = _programs(self._job)
         if self._job.link == PROXY:
             self._start("operator", operator)
@@ -286,7 +286,7 @@ def columns_of(report: LinkReport) -> Told:
 
 
 def _networked(program: Program, end: End, congestion: str) -> Program:
-    """The program in a network of its own, whose device goes to whoever started it."""
+    """Return the program in its own network namespace; its TUN device goes to the caller."""
 
     def run(channel: socket.socket, notes: Notes) -> None:
         linux_calls.enter_network_namespace()
@@ -299,7 +299,7 @@ def _networked(program: Program, end: End, congestion: str) -> Program:
 
 
 def _programs(job: EmulatedJob) -> tuple[Program, Program]:
-    """What both ends run: the operator, the robot."""
+    """Programs of both ends: the operator's and the robot's."""
     arguments = job.arguments
     if job.program == "commands":
         condition = Condition(**arguments)

@@ -127,7 +127,7 @@ def measure(condition: Condition, seed: int, link: str = PACKETS) -> Row:
 
 
 def job_of(condition: Condition, seed: int, link: str = PACKETS) -> EmulatedJob:
-    """What the process of such a run is told."""
+    """Job for the process of one run."""
     played_s = condition.warm_s + condition.dur_s
     patience_ms = condition.timeout_ms or math.inf
     return EmulatedJob(
@@ -143,7 +143,7 @@ def job_of(condition: Condition, seed: int, link: str = PACKETS) -> EmulatedJob:
 
 
 def log_of(outcome: EmulatedOutcome) -> RunLog:
-    """What both programs noted, as the record that results are counted from."""
+    """Convert the notes of both programs to the log that results are computed from."""
     log = RunLog(start=_time(outcome.operator, NoteKind.STARTED))
     opened = _time(outcome.operator, NoteKind.OPENED)
     log.connected_s = _time(outcome.operator, NoteKind.CONNECTED) - opened
@@ -164,7 +164,7 @@ def log_of(outcome: EmulatedOutcome) -> RunLog:
 
 
 def _time(notes: list[Note], kind: NoteKind) -> float:
-    """When something happened first [s]; nan if it never did."""
+    """Time of the first note of a kind [s]; nan if absent."""
     return next((at for noted, _, at in notes if noted == kind), math.nan)
 
 
@@ -257,7 +257,7 @@ _MOST_FAILURES = 3  # in a row
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a campaign is.
+    """Progress of a campaign.
 
     Attributes:
         done: Rows that are there.
@@ -384,7 +384,7 @@ def measure_now(
 
 
 def made_with(path: Path) -> str:
-    """What a table was measured on, in words."""
+    """Describe the machine that a table was measured on."""
     machine = json.loads(path.with_suffix(".machine.json").read_text(encoding="utf-8"))
     return "; ".join(f"{name} {value}" for name, value in machine.items())
 

@@ -29,7 +29,7 @@ _NOTE = struct.Struct("iid")
 
 
 class NoteKind(IntEnum):
-    """What happened."""
+    """Kind of a noted event."""
 
     OPENED = 0
     CONNECTED = 1

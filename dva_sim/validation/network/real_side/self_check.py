@@ -1,4 +1,4 @@
-"""Whether the emulated link does what it is told, measured with real packets.
+"""Self-check of the emulated link, measured with real packets.
 
 Datagrams cross it from one namespace to the other; delay, jitter, losses and rate are counted
 where they arrive, and not where they are decided.
@@ -45,7 +45,7 @@ class LinkFinding:
 
     @property
     def passed(self) -> bool:
-        """Whether it lies within its band."""
+        """True if the value lies within its band."""
         return abs(self.found - self.wanted) <= self.band
 
     def __str__(self) -> str:
@@ -73,7 +73,7 @@ class Probe:
     find: Callable[[Crossing], list[LinkFinding]]
 
     def job(self, rootless: bool) -> EmulatedJob:
-        """What the run is told: long enough for the last one to arrive."""
+        """Job of the run, long enough for the last packet to arrive."""
         wire = self.wire
         linger_s = wire.delay_s + wire.jitter_s + 0.1
         linger_s += max(0.0, self.count * (8 * self.size / wire.rate_bps - self.interval_s))
@@ -105,7 +105,7 @@ class Crossing:
 
     @classmethod
     def of(cls, probe: Probe, outcome: EmulatedOutcome) -> Crossing:
-        """What both ends noted."""
+        """Combine the notes of both ends."""
         sent = np.array([at for _, _, at in outcome.operator])
         numbers = np.array([number for _, number, _ in outcome.robot], dtype=int)
         arrived = np.array([at for _, _, at in outcome.robot])
@@ -118,7 +118,7 @@ class Crossing:
 
     @property
     def lost(self) -> NDArray[np.bool_]:
-        """Which did not arrive, shape `(n,)`."""
+        """Mark packets that did not arrive, shape `(n,)`."""
         return ~np.isin(np.arange(len(self.sent)), self.numbers)
 
 

@@ -1,4 +1,4 @@
-"""Where the process of a run begins: first the namespaces, then everything else.
+"""Entry point of a run's process: first the namespaces, then everything else.
 
 A user namespace is refused to a process with several threads, and numerical libraries start
 some when they are imported; so this module imports none before the namespaces are made.
