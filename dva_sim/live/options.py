@@ -35,7 +35,7 @@ AS_IN_SCENARIO = "scenario"  # in place of keys of the emulated link
 
 @dataclass(frozen=True)
 class LiveOptions:
-    """What to run, where to listen, and whom to reach.
+    """Options of a live part: scenario, addresses to bind, addresses to connect to.
 
     Attributes:
         scenario: Name or path.

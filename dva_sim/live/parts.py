@@ -322,7 +322,7 @@ class OperatorPart:
         return bool(self._agent.device.round_trips)
 
     def finish(self) -> None:
-        """See `LivePart`: a robot that is still driven is told to stop."""
+        """Order a robot that is still driven to stop; see `LivePart`."""
         self._agent.put_down()
 
 

@@ -230,7 +230,7 @@ def _joining(network: RealNetwork, options: LiveOptions, name: str) -> Callable[
 
 
 class _Reporter:
-    """Collects the reports of a part; each line of the story is told once."""
+    """Collects the reports of a part; each line of the story is reported once."""
 
     def __init__(
         self, name: str, number: int, stage: Stage, part: LivePart, network: RealNetwork

@@ -74,7 +74,7 @@ class RosRobotOptions:
 
 
 def run_ros_robot(options: RosRobotOptions, say: Say) -> None:
-    """Be the device until Ctrl-C or SIGTERM; then the robot is told to stand.
+    """Run the device until Ctrl-C or SIGTERM, then stop the robot.
 
     Raises:
         ConfigError: profile, address, site or keys are not as they should be.

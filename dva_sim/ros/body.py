@@ -63,7 +63,7 @@ class RosBody(RobotBody):
 
     @property
     def is_asked_to_move(self) -> bool:
-        """Whether a command other than to stand is in force."""
+        """True if a command to move is in force."""
         return self._is_asked_to_move and self._clock.now < self._set_point[2]
 
     def place(self, motion: RosMotion) -> None:

@@ -1,4 +1,4 @@
-"""Whether a robot of ROS can be driven: the bridge is up, odometry is fresh, and it obeys.
+"""Fitness of a ROS robot for driving: bridge up, odometry fresh, commands obeyed.
 
 Pure: it takes what happened with its time, and returns what is wrong.
 """
@@ -40,7 +40,7 @@ class Fitness:
         self._late_since = math.inf
 
     def lost(self, why: str) -> None:
-        """The bridge is gone, or cannot be reached; why at first is told until it is back."""
+        """Note that the bridge is lost or unreachable, and the first reason until it is back."""
         if self._bridge in ("", NO_BRIDGE):
             self._bridge = f"the bridge is lost: {why}"
 
@@ -83,5 +83,5 @@ class Fitness:
         return ""
 
     def needs_another_bridge(self, now: float) -> bool:
-        """Whether odometry has been late for so long that a new connection may help."""
+        """True if odometry has been late for so long that a new connection may help."""
         return not self._bridge and self._behind > 0 and now - self._late_since > BACKLOG

@@ -37,7 +37,7 @@ LIDAR: Final = "lidar"
 
 
 class KnownRobot:
-    """What is known of a robot.
+    """Robot as its clients know it.
 
     Attributes:
         id_tag: Its id.
@@ -176,7 +176,7 @@ class RosDriver:
 
     @property
     def is_driving(self) -> bool:
-        """Whether it has a robot in hand."""
+        """True if the client controls a robot."""
         return bool(self._person.robots)
 
     def release_all(self) -> None:
@@ -322,7 +322,7 @@ class RosGateway:
 
     @property
     def is_driving(self) -> bool:
-        """Whether any client has a robot in hand."""
+        """True if any client controls a robot."""
         return any(driver.is_driving for driver in self._drivers)
 
     def retire(self, driver: RosDriver) -> None:
@@ -331,5 +331,5 @@ class RosGateway:
         self._free.append(driver)
 
     def emergency(self, name: str, said: Said) -> None:
-        """Stop a robot, whoever drives it."""
+        """Stop a robot, regardless of its driver."""
         ask_emergency(self.device, self.robots[name].id_tag, 0, said)

@@ -1,4 +1,4 @@
-"""What is asked of a server for clients of other makes, and how its address is told."""
+"""Options of a server for ROS clients, and the announcement of its address."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ ALIASES: Final = frozenset({"geometry_msgs/Twist", "geometry_msgs/TwistStamped"}
 
 
 class PeerHost(Protocol):
-    """What a client may ask of its server."""
+    """Requests that a client may make of its server."""
 
     def now(self) -> float:
         """Return the time [s]."""

@@ -96,7 +96,7 @@ class RosOrigin(Config):
 
 
 class RosLimits(Config):
-    """What the robot is asked at most, and how it is known to stop.
+    """Limits of a robot's commands, and the signs that it has stopped.
 
     Attributes:
         max_speed_mps: Forward speed; commands are clamped to it.

@@ -33,7 +33,7 @@ class BadReading(Exception):
 
 
 class RosMotion(NamedTuple):
-    """Where a robot is, and how it moves: site frame [m, rad], along its heading [m/s, rad/s].
+    """Pose in the site frame [m, rad], and velocity along the heading [m/s, rad/s].
 
     Attributes:
         stamp: When it was measured, by the robot's clock [s]; None: not said.

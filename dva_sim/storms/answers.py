@@ -117,7 +117,7 @@ class AnswerWatch:
                 self._breach(each.node, "has neither answered nor counted a request")
 
     def _refused(self) -> int:
-        """What a robot refuses to do is counted once more, under a name of its own."""
+        """Number of refusals, which the recorder counts under names of their own."""
         counters = self._recorder.counters
         return sum(count for name, count in counters.items() if name.startswith("refused"))
 

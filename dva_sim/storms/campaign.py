@@ -1,4 +1,4 @@
-"""Many storms: played by processes of this machine, kept as they end, gone on with later."""
+"""Campaigns of storms: run by processes of this machine, saved as they end, resumable."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def play_seed(seed: int, profile: str) -> StormOutcome:
 
 
 class Journal:
-    """The outcomes of storms in a file, one line each, so that a campaign can be gone on with.
+    """Outcomes of storms in a file, one line each, so that a campaign can be resumed.
 
     Args:
         file: Made if it is not there.

@@ -139,7 +139,7 @@ class BusyDriver:
         self._start()
 
     def _listen(self, sensor: str) -> Subscription:
-        """Listen to a sensor until the next robot is taken, whoever holds this one then."""
+        """Subscribe to a sensor until the next robot is taken, even if this one is lost."""
         self._order(m.DevSub(sensor, 1.0))
         network, me = self.device.network, self.device.id_tag
         return network.subscribe(me, self._robot, sensor_topic(sensor, me), do_nothing)

@@ -145,7 +145,7 @@ def _replay_by_another(storm: StormScene, fault: Fault, chance: random.Random) -
 
 
 def _junk(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """An intruder sends what is no message, or one that asks for what cannot be."""
+    """Send invalid messages, or impossible requests, from an intruder."""
     to = storm.id_of(fault.target)
     for _ in range(max(1, round(fault.value))):
         storm.intruder.send(to, chance.choice(_JUNK)(to, chance))

@@ -1,4 +1,4 @@
-"""How soon storms find a planted bug."""
+"""Time that storms need to find a planted bug."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dva_sim.storms.storm import play
 
 @dataclass(frozen=True)
 class Hunt:
-    """How long it took to find a planted bug.
+    """Result of a hunt for a planted bug.
 
     Attributes:
         mutant: Its name.

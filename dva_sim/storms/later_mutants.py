@@ -39,7 +39,7 @@ def _obeys_future_ticks(original: Original, bug: Bug) -> Original:
 
 
 def _keeps_mission(original: Original, bug: Bug) -> Original:
-    """Who has lost the robot has its mission carried out to the end."""
+    """Robot that completes the mission of an owner who has lost it."""
 
     def wrong(self: Any, grant: m.PermissionGrant | None) -> Any:
         held = self.grant
@@ -90,7 +90,7 @@ def _as_fast_as_wanted(original: Original, bug: Bug) -> Original:
 
 
 def _miscounts_given_up(original: Original, bug: Bug) -> Original:
-    """What is escalated counts as expired."""
+    """DVA that counts escalated events as expired."""
 
     def wrong(self: Any, event: Any, state: State, now: float) -> Any:
         original(self, event, state, now)
@@ -141,7 +141,7 @@ def _never_over(original: Original, bug: Bug) -> Original:
 
 
 def _confirms_more(original: Original, bug: Bug) -> Original:
-    """The DVA confirms to robots that whoever may drive may send them out, too."""
+    """DVA that confirms to robots that any permitted driver may also send them out."""
 
     def wrong(self: Any, message: m.Message, asker: Any, body: m.GetGrant) -> Any:
         reply, sends = original(self, message, asker, body)

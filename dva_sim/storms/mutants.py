@@ -207,7 +207,7 @@ def _emergency_of_the_holder_only(original: Original, bug: Bug) -> Original:
 
 
 def _resumes(original: Original, bug: Bug) -> Original:
-    """After an emergency it goes on with what it did as soon as anybody asks for anything."""
+    """Robot that resumes after an emergency at the next request of any kind."""
 
     def wrong(self: Any, now: float) -> Any:
         mode, owner = self.mode, self.owner
@@ -395,7 +395,7 @@ def _two_holders(original: Original, bug: Bug) -> Original:
 
 
 def _anybody_confirms(original: Original, bug: Bug) -> Original:
-    """A report of a place near an event confirms it, whoever it is of."""
+    """DVA that lets any report near an event confirm it."""
 
     def wrong(self: Any, event: Any, severity: float) -> Any:
         original(self, event, severity)

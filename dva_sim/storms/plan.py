@@ -79,7 +79,7 @@ class StormPlan:
 
     @property
     def horizon_s(self) -> float:
-        """When it is over [s]: after recovery and probes."""
+        """End of the storm, after recovery and probes [s]."""
         return self.calm_s + RECOVERS_WITHIN + PROBES_LAST
 
     def built(self) -> Scenario:

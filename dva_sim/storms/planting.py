@@ -1,4 +1,4 @@
-"""What planted bugs are made of: a function to replace, and a word when the wrong one acts."""
+"""Planted bugs: a function to replace, and a report when the wrong version acts."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ class RefusedDrivers:
         self._refused: dict[tuple[str, str], _Refused] = {}
 
     def arrives(self, now: float, passing: PassingMessage) -> None:
-        """Note what a driver is told."""
+        """Note the replies that a driver receives."""
         data, to = passing.payload, passing.to
         if to not in self._drivers or not isinstance(data, bytes):
             return
@@ -53,7 +53,7 @@ class RefusedDrivers:
             self._refused.pop(key, None)
 
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:
-        """Judge a command of somebody who was refused, unless it has started anew."""
+        """Judge a command by a refused driver, unless that driver has restarted."""
         refused = self._refused.get((source, to))
         if refused is None or not isinstance(payload, bytes):
             return

@@ -1,4 +1,4 @@
-"""What faults find in a storm: the run, its devices by label, an intruder, the DVA's lives."""
+"""Scene of a storm: the run, its devices by label, an intruder, restarts of the DVA."""
 
 from __future__ import annotations
 

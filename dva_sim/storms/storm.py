@@ -65,7 +65,7 @@ class StormOutcome:
 
     @property
     def signature(self) -> frozenset[str]:
-        """What makes two failures the same: the rules that broke, or the kind of exception."""
+        """Signature shared by equal failures: the broken rules, or the kind of exception."""
         if self.error:
             return frozenset({self.error.strip().rpartition("\n")[2].partition(":")[0]})
         return frozenset(breach.rule for breach in self.breaches)
