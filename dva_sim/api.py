@@ -1,4 +1,4 @@
-"""What the command line does, for programs and notebooks: `import dva_sim; dva_sim.run(...)`.
+"""Python interface to the commands: `import dva_sim; dva_sim.run(...)`.
 
 A command takes the parameters of the function of its name with their defaults; how they look on a
 command line stands in `cli/options.py`, whose help is the first sentence of the words here. The
@@ -206,7 +206,7 @@ def dry_run(
     full: bool = False,
     pilot: int | None = None,
 ) -> DryRun:
-    """What `run` would do, and how long it would take; a few runs are tried if none is done yet.
+    """Preview `run` and its duration; if no run is done yet, a few are tried.
 
     Raises:
         DvaSimError: a mistake in what was asked for.

@@ -63,7 +63,7 @@ def features(eta: Floats, about: Floats, robot: Floats) -> Floats:
 
 
 def _least_of_others(values: Floats, axis: int) -> Floats:
-    """The least value of all others along an axis; `MOST` where there is no other."""
+    """Least value of all others along an axis; `MOST` if there are none."""
     if values.shape[axis] < 2:
         return np.full_like(values, MOST)
     two = np.partition(values, 1, axis=axis)

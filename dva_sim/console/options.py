@@ -25,7 +25,7 @@ DEFAULT = "hands-on"
 
 @dataclass(frozen=True, kw_only=True)
 class ConsoleOptions(PageOptions):
-    """What to run, and where to show it.
+    """Options of a console: scenario, and address of its page.
 
     Attributes:
         scenario: By name or path.

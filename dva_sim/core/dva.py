@@ -385,7 +385,7 @@ class Dva:
         holder: m.Holder,
         now: float,
     ) -> Reaction:
-        """Somebody else has the robot: who asks is told who, and may ask that one for it."""
+        """Refuse a robot that is taken: name its driver, and accept a request for handover."""
         if body.takeover == "force" and not self._may_force(asker):
             text = f"{asker.label} is no supervisor"
             return self._refuse(message, m.NOT_PERMITTED, text)

@@ -81,7 +81,7 @@ class Orders:
         return Send(event.actor, m.Order(event.number, event.kind, event.position, None, task))
 
     def redirect(self, event: Event, now: float) -> list[Send]:
-        """Take back an order because its responder has to go elsewhere; that is no attempt."""
+        """Withdraw an order whose responder is needed elsewhere; does not count as an attempt."""
         self._free(event, event.responder, event.operator)
         event.preemptions += 1
         event.attempts -= event.taken_up
@@ -90,7 +90,7 @@ class Orders:
         return self._stand_down(event)
 
     def again(self) -> list[Send]:
-        """Every order that stands, to be said again by a DVA that was started anew."""
+        """All current orders, repeated by a DVA that was restarted."""
         sends = []
         for event in self.book.open.values():
             if event.state in (State.ASSIGNED, State.ON_SCENE) and event.responder is not None:
@@ -129,7 +129,7 @@ class Orders:
             self.book.touch(event)
 
     def not_taken_up(self, send: Send, now: float) -> list[Send]:
-        """An order was declined, or did not arrive: nobody set out, so it is no attempt."""
+        """Handle an order declined or undelivered; does not count as an attempt."""
         event = self._meant(send)
         to_act, looks = _is_to_act(send.body), event is not None and _somebody_looks(event)
         if event is not None and looks and not to_act and "departed" in event.times:
@@ -408,7 +408,7 @@ class Orders:
         return sends + self._stand_down(event)
 
     def settle(self, event: Event, state: State, now: float) -> list[Send]:
-        """An event is over, as a person says: whoever was sent there is free."""
+        """Close an event by a person's decision and free its responders."""
         sends = self._called_off(event) if _somebody_looks(event) else []
         self.book.move(event, state, now)
         return sends + self._stand_down(event)

@@ -70,7 +70,7 @@ class Sensing:
         return [Send(robot, m.GetSensorInfo())]
 
     def forget(self, robot: str) -> None:
-        """A robot is gone, or has started anew: it may have other sensors by now."""
+        """Forget a robot that has left or restarted: its sensors may have changed."""
         self.known.pop(robot, None)
         self._due.pop(robot, None)
         self._asked.discard(robot)

@@ -192,7 +192,7 @@ class Sessions:
             self.revoke(grant)
 
     def tell_robot(self, body: m.PermissionRevocation) -> None:
-        """A robot has to hear that a session is over, and is told until it has."""
+        """Notify a robot that a session is over, and retry until it acknowledges."""
         self.changes += 1
         self.untold[body.session] = Send(body.device, body)
         self._over.append(self.untold[body.session])

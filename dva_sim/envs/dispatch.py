@@ -352,7 +352,7 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
 
 
 def _bounded(ways: NDArray[np.float64]) -> NDArray[np.float32]:
-    """The same without infinity and nan."""
+    """Replace infinity and nan by finite values."""
     return np.where(np.isfinite(ways), np.minimum(ways, MOST), NEVER).astype(np.float32)
 
 

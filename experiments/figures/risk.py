@@ -1,4 +1,4 @@
-"""How often it took longer than a time: the share of runs still under way, at every moment.
+"""Share of runs still under way at every moment: how often it took longer than that.
 
 A mean hides the few drives that nobody can wait for. This figure has a falling line for each level
 of the compared factor: how large a share of its runs took longer than each time. Where two lines

@@ -13,7 +13,7 @@ from dva_sim.simulation.run_measures import RunMeasure
 
 
 class NearestPerson(RunMeasure):
-    """How near a robot came to somebody on foot, at the moments that tracks are sampled."""
+    """Smallest distance between a robot and a person on foot, at the sampled times."""
 
     about = Measure(
         "nearest_person_m",
@@ -23,7 +23,7 @@ class NearestPerson(RunMeasure):
     )
 
     def of(self, recording):
-        """Nothing where there are no robots, or no people."""
+        """Return the least distance [m]; None without robots or people."""
         tracks = recording.recorder.tracks
         robots = {name for name in tracks if name.startswith("robot")}
         on_foot = {}

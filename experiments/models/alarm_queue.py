@@ -17,7 +17,7 @@ from dva_sim.simulation.models import Model, OwnScenario
 
 
 class AlarmScenario(OwnScenario):
-    """What a run consists of.
+    """Keys of a run.
 
     Attributes:
         guards: How many there are.

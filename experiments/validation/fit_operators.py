@@ -71,7 +71,7 @@ def loss(lines: list[TargetLine], setting: OperatorsSetting) -> tuple[float, dic
 
 
 def miss(line: TargetLine, value: float) -> float:
-    """How far off a value is, in half widths of the band."""
+    """Distance of a value from the band's middle, in half widths."""
     assert line.low is not None
     assert line.high is not None
     half = 0.5 * (line.high - line.low)

@@ -71,7 +71,7 @@ class Seats:
         return True
 
     def silent(self, now: float) -> list[str]:
-        """The clients that held on and have said nothing since; each is told of once."""
+        """Clients that held a control and have since been silent; each is reported once."""
         late = [
             client
             for client, seat in self.taken.items()

@@ -1,4 +1,4 @@
-"""A console at a DVA that runs elsewhere: a control room like anybody's, and what it is told.
+"""Console of a remote DVA: a control room like any other, and the messages it receives.
 
 `system` is what a console shows of it, made of what `told` keeps; `options` says where the DVA is.
 """

@@ -66,7 +66,7 @@ class AttachedActions:
 
     @does("emergency")
     def _emergency(self, _: str, line: OfSome, said: Said) -> None:
-        """Each robot is told by a connection of its own; who does not answer is named."""
+        """Stop robots, each over its own connection; those that do not reply are named."""
         system, wanted = self._system, line.get("robots", "all")
         robots = system.robots()
         if isinstance(wanted, list):

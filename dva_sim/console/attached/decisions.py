@@ -66,7 +66,7 @@ class AttachedDecisions:
 
     @does("take_over")
     def _take_over(self, _: str, line: TakeoverAsked, said: Said) -> None:
-        """Take a robot from whoever holds it; it goes by itself where it was sent to."""
+        """Take a robot from its driver; it drives itself to where it was sent."""
         robot, agent = self._robot(line["robot"]), self._system.agent
         label = self._system.label_of(robot)
         sent = (e for e in agent.events.values() if e.closed_for is None and e.responder == robot)

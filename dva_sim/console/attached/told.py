@@ -89,7 +89,7 @@ class ToldSystem:
                 told.camera, told.sensors = one.camera_url, one.sensors
 
     def _meet(self, device: m.Device) -> None:
-        """Listen to a device, anew where it has moved."""
+        """Subscribe to a device, again if its address has changed."""
         known = self.devices.get(device.id_tag)
         if known is not None and known.device.address == device.address:
             known.device, known.listed = device, self._now

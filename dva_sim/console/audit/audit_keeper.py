@@ -104,7 +104,7 @@ class AuditKeeper:
         return AuditEntry(time_s=now, at_utc=now_utc(), author=author, action=action, **more)
 
     def put(self, entry: AuditEntry, then: Then = lambda _: None) -> None:
-        """Keep a row; `then` is told when it is on the disk, or why it is not yet."""
+        """Queue a row; `then` is called once it is on disk, or with the reason why not."""
         if self._asked.qsize() >= MOST_WAITING:
             self._lost += 1
             then("the audit log cannot be written, and too much waits for it already")
@@ -112,7 +112,7 @@ class AuditKeeper:
         self._asked.put((entry, then))
 
     def when_safe(self, then: Then) -> None:
-        """`then` is told when all that was put so far is on the disk, or why it is not yet."""
+        """Call `then` once all rows so far are on disk, or with the reason why not."""
         self._asked.put((None, then))
 
     def line(self, now_ms: int) -> AuditLine:
@@ -134,7 +134,7 @@ class AuditKeeper:
         return self._hears.fileno()
 
     def take(self) -> None:
-        """Tell whoever waits for rows that are on the disk by now, or are not."""
+        """Run the callbacks of rows that are on disk, or that could not be written."""
         with suppress(BlockingIOError):
             self._hears.recv(4096)
         while self._done:

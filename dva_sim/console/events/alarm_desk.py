@@ -88,7 +88,7 @@ class AlarmDesk:
     def look(
         self, events: Sequence[SiteEventShown], robots: Sequence[RobotRow], now_ms: int
     ) -> AlarmsLine:
-        """Look at what pages are told, and tell the alarms."""
+        """Derive the alarms from what pages are shown."""
         found = [*_of_events(events, now_ms), *self._lost(robots), *self._nobody(events)]
         found += self._broken()
         timed = [

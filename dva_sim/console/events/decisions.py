@@ -26,7 +26,7 @@ DECISIONS: Final = (
 def decision_of(
     line: Asked, device: Callable[[str], str], seen: Callable[[int], int | None]
 ) -> tuple[m.Body, str]:
-    """The message that a line of a page asks for, and what is told if it is done.
+    """Return the message that a page's line requests, and the text shown on success.
 
     Args:
         line: As the web process has checked it.
@@ -77,14 +77,14 @@ def place_of(line: PlaceAsked, site: Site) -> tuple[float, float]:
 
 
 def report_of(line: ReportAsked, place: m.Position) -> tuple[m.EventReport, str]:
-    """The report of an event that somebody at a page raises, and what is told if it is done."""
+    """Return the report of an event raised at a page, and the text shown on success."""
     kind, severity = str(line["kind"]), SEVERITIES[line["severity"]]
     report = m.EventReport(None, kind, place, severity, CERTAIN, "detected")
     return report, f"{kind.replace('_', ' ')} is raised"
 
 
 def answer_of(reply: m.Reply, is_robot: Callable[[str], bool]) -> Answered:
-    """Return what a page is told of a reply besides success: a proposal with its reasons."""
+    """Return what a page gets of a reply besides success: a proposal with its reasons."""
     proposal = reply.content
     if not isinstance(proposal, m.Proposal):
         return {}
@@ -117,7 +117,7 @@ def _candidate(who: m.Candidate, is_robot: Callable[[str], bool]) -> CandidateSh
 def about_event(
     events: Mapping[int, m.EventStatus], at: Mapping[int, float], number: int
 ) -> EventDecisions:
-    """Return what a page is told of an event besides what everybody sees.
+    """Return what a page gets of an event besides what everybody sees.
 
     Args:
         events: As the DVA has told of them.

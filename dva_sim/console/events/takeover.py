@@ -49,7 +49,7 @@ class Takeover:
         self._tries = 0
 
     def begin(self) -> None:
-        """Take the robot from whoever holds it."""
+        """Take the robot from its driver."""
         if self._seat is not None and self._event and self._event.operator == self._seat:
             self._ask_for_it()
         else:

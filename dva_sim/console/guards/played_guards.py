@@ -1,4 +1,4 @@
-"""The guards whom people play, and what each of them is told."""
+"""Guards played by people, and the messages that they receive."""
 
 from __future__ import annotations
 

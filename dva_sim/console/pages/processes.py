@@ -58,7 +58,7 @@ class ConsoleSubject(Protocol):
         """Tell the scene, and from then on what changes."""
 
     def show_scene(self) -> None:
-        """Tell whoever draws, from the beginning, what there is to be seen."""
+        """Send the whole scene to the renderer."""
 
     def note(self, text: str) -> None:
         """Something of the console itself has gone wrong that people should know of."""

@@ -144,7 +144,7 @@ class PhoneActions:
         return phone
 
     def _retire(self, client: str, phone: PhoneSeat) -> None:
-        """Whatever device a phone had is no more."""
+        """Remove a phone's device, if it has one."""
         if phone.person is None:
             return
         phone.person, phone.registered = None, False
@@ -194,7 +194,7 @@ class PhoneActions:
         person.take([robot], answered, level)
 
     def _asked(self, given: str) -> str:
-        """The id that is asked for: also of what is no robot, so that the DVA can say so.
+        """Resolve the requested id; unknown ones pass, so that the DVA can refuse them.
 
         Raises:
             Refused: it is no device that anybody knows.

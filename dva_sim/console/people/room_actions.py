@@ -144,7 +144,7 @@ class RoomActions:
 
     @does("take_over")
     def _take_over(self, client: str, line: TakeoverAsked, said: Said) -> None:
-        """Take a robot from whoever holds it, with what it was sent to, into the own seat."""
+        """Take a robot and its task from its driver into the client's own seat."""
         robot, reason = self._robot(line["robot"]), line["reason"]
 
         def begin(room: ConsoleRoom, told: Said) -> None:

@@ -25,7 +25,7 @@ class RecordedAudit:
         self.path.write_text("[]")
 
     def show(self, rows: Sequence[Mapping[str, Any]], name: str) -> AuditLine:
-        """Another recording is played; what pages are told of its log."""
+        """Open the log of another recording; returns the line for the pages."""
         new = self.path.with_suffix(".new")
         new.write_text(json.dumps(rows))
         new.replace(self.path)  # at once: somebody may be reading

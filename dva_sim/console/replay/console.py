@@ -21,7 +21,7 @@ Say = Callable[[str], object]
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayOptions(PageOptions):
-    """What to play, and where to show it.
+    """Options of a replay: recording, and address of its page.
 
     Attributes:
         file: A recording, or the lines of a run that was killed; None: those of `results`.

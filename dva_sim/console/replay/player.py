@@ -272,7 +272,7 @@ class Player:
 
     @does("look")
     def _look(self, _: str, line: LogsLooked) -> None:
-        """Pages look at these logs; those that are new to them are told from the beginning."""
+        """Select the logs that pages view; new ones are sent from the beginning."""
         self._looks_at_devices = "devices" in line["tables"]
         self._tell_devices()
         self._told = {name: self._told.get(name, -1) for name in line["logs"]}

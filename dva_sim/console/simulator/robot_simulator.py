@@ -124,7 +124,7 @@ class RobotSimulator:
             world.tell({"k": "bye", "t": world.feed.now_ms, "why": "the robot was ended"})
 
     def _begin(self, world: RobotWorld, dva: str) -> None:
-        """Register at once, and open the port then; what fails is told, and can be tried again."""
+        """Register, then open the port; a failure is reported and can be retried."""
 
         def registered(ok: bool, text: str) -> None:
             self._say(text)

@@ -50,7 +50,7 @@ LINK: Final[LinkShown] = {"kind": "real", "processing_s": 0.0}
 
 
 class RobotWorld:
-    """The robot, and what of it is told.
+    """World of a single robot, and the state it publishes.
 
     Args:
         scenario: Says which robot, and where it stands.
@@ -171,7 +171,7 @@ class RobotWorld:
         self.audited = Audited(keeper, name_of_page, lambda named: named and label)
 
     def deafen(self, robot: str, on: bool) -> None:
-        """The audit is told that the robot hears nothing, or hears again."""
+        """Note in the audit log that the robot stopped hearing, or hears again."""
         self.audit.deafened(self.clock.now, robot, on)
 
     def slowed(self, processing: float) -> None:

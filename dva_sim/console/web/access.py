@@ -112,7 +112,7 @@ class Entrance:
     secure: bool = False
 
     def refusal(self, asked: Asked) -> tuple[int, str] | None:
-        """Status and reason why a request is not answered, whoever asks; None if it may be."""
+        """Status and reason for refusing a request in any role; None if it may pass."""
         if not self.is_own(asked.host):
             return 421, "this console is not served under that name"
         if asked.origin is not None:

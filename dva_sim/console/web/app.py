@@ -101,7 +101,7 @@ class Doorkeeper:
             place.end(time.monotonic())
 
     def _refusal(self, scope: Scope) -> Response | None:
-        """The answer to whoever may not ask; else the role is noted in the scope."""
+        """Response to a request without permission; else the role is noted in the scope."""
         asking = HTTPConnection(scope)
         headers = asking.headers
         told = self._access.refusal(_asked(scope, headers))

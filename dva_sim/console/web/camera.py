@@ -44,7 +44,7 @@ class ConsoleCameras(CameraStreams):
             self._pipe.offer(json.dumps({"watch": robots}).encode() + b"\n")
 
     async def keep_telling(self) -> None:
-        """Say again and again who is watched: whoever draws may have begun anew."""
+        """Repeat which robot is watched: the renderer may have restarted."""
         while True:
             self.tell(again=True)
             if self.draws != self._ok:

@@ -41,7 +41,7 @@ class LogRequests:
         self._logs = hub.simulation.state.logs
 
     async def lines(self, request: Request) -> Response:
-        """`GET /api/logs/NAME?before=N&...`: lines that match, as a page is told them."""
+        """`GET /api/logs/NAME?before=N&...`: matching lines, in the form that pages get."""
         log, before = self._log(request), request.query_params.get("before", "")
         if before and not (before.isascii() and before.isdigit() and len(before) < 12):
             return problem(400, "before should be a whole number")

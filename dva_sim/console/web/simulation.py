@@ -120,7 +120,7 @@ class Simulation:
         return True
 
     def ask(self, asked: Asked, told: Told) -> None:
-        """Ask for something; `told` takes the answer, which may be that there is no room.
+        """Send a request; `told` receives the reply, which may be that the queue is full.
 
         Ids are those of the client that asks: the same id of another one is another question.
         """

@@ -53,7 +53,7 @@ def javascript() -> str:
 
 
 def line_types() -> str:
-    """The types of all lines that pages are told, of answers on the audit log, and their parts."""
+    """Types of all lines sent to pages, of audit log replies, and of their parts."""
     found: dict[type, str] = {}
     for one in (*get_args(ToPage), AuditRow, AuditCheck, AuditMeasures):
         _declare(one, found)

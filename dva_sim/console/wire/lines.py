@@ -1,4 +1,4 @@
-"""The lines that are told to pages, each kind declared once.
+"""Lines sent to pages, each kind declared once.
 
 A line has a kind `k`, and most have a time `t` of the world's clock [ms]. Lengths are in metres and
 angles in radians, unless a name says otherwise. What is null is unknown; what may be left out says

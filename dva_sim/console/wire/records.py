@@ -6,7 +6,7 @@ from typing_extensions import TypedDict
 
 
 class ExchangesLine(TypedDict):
-    """Exchanges of a device: see `shown/logs.py`; `anew`: forget what was told before."""
+    """Exchanges of a device, see `shown/logs.py`; the flag says to discard earlier lines."""
 
     k: Literal["log"]
     log: str

@@ -1,1 +1,1 @@
-"""A console's own run, and what of it is told and kept."""
+"""A console's own run, and the parts of it that are published and recorded."""

@@ -41,7 +41,7 @@ SOON = 0.05  # from one look at what has changed to the next, real time [s]
 
 
 class ToldWorld:
-    """A world whose pages are told what changes.
+    """World that publishes its changes to pages.
 
     It says when and how; what there is to be told belongs to the world that this is the base of.
     """
@@ -78,7 +78,7 @@ class ToldWorld:
         self._contained: dict[int, float] = {}
 
     def show_scene(self) -> None:
-        """Tell whoever draws, from the beginning, what there is to be seen."""
+        """Send the whole scene to the renderer."""
         raise NotImplementedError
 
     def begin(self) -> None:
@@ -192,12 +192,12 @@ class ToldWorld:
             self._news.tell(played, client)
 
     def free_seat(self, client: str) -> None:
-        """A client sits nowhere any more, and is told so."""
+        """Free a client's seat and notify the client."""
         self.tell(self.seat_lines.free(client), client)
         self._news.forget("seat", client)
 
     def tell_now(self) -> None:
-        """Something has changed that nobody shall wait for."""
+        """Publish at once instead of in the next period."""
         self._tell_rows()
         self._tell_seats()
         self._tell_audit()

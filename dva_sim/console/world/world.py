@@ -1,4 +1,4 @@
-"""The world of a console: a run on a paced clock, people's seats in it, and what pages are told.
+"""World of a console: a run on a paced clock, people's seats in it, and published state.
 
 One thread does everything, and waits for nobody: lines to other processes go into outboxes.
 """
@@ -48,7 +48,7 @@ SCREEN = 0xFFFF  # number of the console's own screen among consoles
 
 
 class ConsoleWorld(ToldWorld):
-    """Running world, and what is told of it.
+    """Running world with its published state.
 
     Args:
         scenario: What the run consists of.
@@ -155,12 +155,12 @@ class ConsoleWorld(ToldWorld):
         return windows
 
     def deafen(self, robot: str, on: bool) -> None:
-        """The audit is told that a robot hears nothing, or hears again."""
+        """Note in the audit log that a robot stopped hearing, or hears again."""
         self.run.deafened(robot, on)
 
     @property
     def console(self) -> Console:
-        """Pattern, rate and limits of whoever drives from now on."""
+        """Pattern, rate and limits of future drivers."""
         return self._console
 
     def is_ours(self, device: str) -> bool:
@@ -177,7 +177,7 @@ class ConsoleWorld(ToldWorld):
         self.tell_scene()
 
     def show_scene(self) -> None:
-        """Tell whoever draws, from the beginning, what there is to be seen."""
+        """Send the whole scene to the renderer."""
         scenario = self.scenario.model_dump(mode="json")
         self.show(scene_line(scenario, self.seed))
         for number, when in self.run.field.contained.items():

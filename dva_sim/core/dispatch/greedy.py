@@ -84,7 +84,7 @@ def serve(tasks: Iterable[int], cost: Floats, free: Free) -> list[Assignment]:
 
 
 class NearestIdle(Policy):
-    """Oldest task first; the shortest way, whoever walks or drives it."""
+    """Oldest task first, to the responder with the shortest route."""
 
     @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:

@@ -17,7 +17,7 @@ _OBJECTIVES: Final = ("eta", "distance")
 
 
 class BatchOptimal(Policy):
-    """As many tasks as possible, with the least total ETA among all assignments of that size.
+    """Serve as many tasks as possible, with the least total ETA for that number.
 
     With more tasks than responders all tasks compete for who there is, so those near to somebody
     go first. That alone could let a far one starve. So a second of waiting counts for a task

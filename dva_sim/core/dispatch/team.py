@@ -17,7 +17,7 @@ _REMEMBERED: Final = 1000  # events
 
 
 class HazardTeam(Policy):
-    """Where it is dangerous, a robot looks, and a person stands by to act on what it finds.
+    """Send a robot to look where it is dangerous, with a person on stand-by to act.
 
     A dangerous event is confirmed by the robot that is there first, unless a person would be
     there much earlier, or there is no robot or operator: then a person goes. While a robot is
