@@ -1,4 +1,4 @@
-"""Whether the tests notice faults: plants 60 of them, one at a time, and runs the nearest tests.
+"""Mutation test: plants 60 faults, one at a time, and runs the nearest tests.
 
     python tests/mutants.py                 plant each fault, tell who noticed, exit 0
     python tests/mutants.py --list          print the faults, plant none
@@ -82,7 +82,7 @@ class Mutant:
 
     @property
     def name(self) -> str:
-        """The same in every version of a file in which its function has not changed."""
+        """Name that is stable in every version in which the function is unchanged."""
         turns = f"{self.old} -> {self.new}"
         return f"{self.file}::{self.place}: {turns} #{self.number}"
 
@@ -168,7 +168,7 @@ class Sites(ast.NodeVisitor):
         self._inside(node)
 
     def visit_arg(self, node: ast.arg) -> None:
-        """Its annotation is no program."""
+        """Skip annotations: they are not executed."""
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
         if node.value is not None:
@@ -240,7 +240,7 @@ def candidates() -> dict[str, list[Mutant]]:
 
 
 def shares(sizes: dict[str, int], total: int) -> dict[str, int]:
-    """How many each room gives: one, and the rest by largest remainder."""
+    """Number of faults for each room: one, and the rest by largest remainder."""
     rest, whole = total - len(sizes), sum(sizes.values())
     exact = {room: rest * size / whole for room, size in sizes.items()}
     given = {room: int(share) for room, share in exact.items()}
@@ -279,7 +279,7 @@ def nearest_tests(mutant: Mutant, root: Path) -> list[str]:
 
 
 def copy_of_the_tree(root: Path) -> None:
-    """What Git knows of, as it stands in the working tree."""
+    """Copy the files that Git knows, as they are in the working tree."""
     words = ["git", "-C", str(ROOT), "ls-files", "-co", "--exclude-standard"]
     for name in subprocess.check_output(words, text=True).splitlines():
         if (ROOT / name).is_file():
@@ -289,7 +289,7 @@ def copy_of_the_tree(root: Path) -> None:
 
 
 def notice(mutant: Mutant, root: Path) -> str:
-    """Which test noticed a fault that is planted in a copy; empty if none did.
+    """Name of the test that noticed a planted fault; empty if none did.
 
     It fails with the fault and passes without it, each time by itself; others are left out.
     """

@@ -91,7 +91,7 @@ def worse(now: dict[str, Counter[str]], before: dict[str, dict[str, int]]) -> li
 
 
 def written(rooms: dict[str, Counter[str]]) -> str:
-    """What is left, as TOML."""
+    """Remaining findings as TOML."""
     lines = ["# Written by `python tests/prose_lint.py --write`; numbers may only become less.\n"]
     for room, rules in sorted(rooms.items()):
         inner = ", ".join(f"{rule} = {count}" for rule, count in sorted(rules.items()))

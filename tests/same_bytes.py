@@ -1,4 +1,4 @@
-"""Whether two versions of the program make the same results, byte for byte.
+"""Compare the results of two versions of the program, byte for byte.
 
     python tests/same_bytes.py                      print a line for each run of this version
     python tests/same_bytes.py --against COMMIT     run that version as well; exit 1 if they differ

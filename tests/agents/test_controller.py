@@ -1,4 +1,4 @@
-"""What a robot obeys, and what it refuses."""
+"""Commands that a robot obeys, and commands that it refuses."""
 
 import pytest
 from helpers.dva.permissions import confirmation, hear

@@ -1,4 +1,4 @@
-"""What every device does with requests and replies, whatever carries them."""
+"""Requests and replies of any device, over any transport."""
 
 import pytest
 
@@ -25,7 +25,7 @@ def request(body: m.Body, number: int = 5) -> bytes:
 
 
 def answer(device: AgentDevice, data: bytes, handler: Handler, sender: str | None = None) -> bytes:
-    """What a device answers to a request."""
+    """Reply of a device to a request."""
     replies: list[bytes] = []
     device.take(Request(data, replies.append, sender), handler)
     return replies[0]
@@ -63,7 +63,7 @@ def test_what_an_impostor_was_told_is_not_for_the_one_it_played(device):
     ids=["garbage", "of another device", "no reply", "to another request"],
 )
 def test_a_request_with_a_bad_answer_has_failed(device, answer):
-    """Else whoever asked would wait for ever, and a device would never register."""
+    """Otherwise the requester would wait forever, and a device would never register."""
     device.network.serve(DVA, lambda request: request.answer(answer))
     ended: list[str] = []
     device.ask(DVA, m.GetDeviceList(), lambda _: ended.append("reply"), lambda: ended.append("no"))
@@ -98,7 +98,7 @@ def test_a_message_to_another_device_is_refused_unless_it_is_an_emergency(device
 
 
 def test_a_reason_too_long_for_a_reply_leaves_its_code(device):
-    """Else whoever finds a way to make one could end the receiver."""
+    """Otherwise an overlong reason could crash the receiver."""
     refuse = lambda message: m.Reply(message.message_id, m.BUSY, "x" * 300)  # noqa: E731
     assert code(answer(device, request(m.GetDeviceList()), refuse)) == m.BUSY
 

@@ -1,5 +1,8 @@
-"""What a guard does for the DVA. It walks one metre a second, gets ready in 10 s, looks for 3 s
-and deals with something in 20 s; its post is at (1.4, 12), the west end of a straight corridor."""
+"""Guards following orders of the DVA.
+
+The guard walks one metre a second, gets ready in 10 s, looks for 3 s and deals with an event in 20
+s; its post is at (1.4, 12), the west end of a straight corridor.
+"""
 
 import math
 

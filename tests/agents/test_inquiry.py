@@ -1,4 +1,4 @@
-"""When a robot asks the DVA what, and what an answer settles."""
+"""Inquiries of a robot to the DVA, and the effect of their replies."""
 
 import math
 import random

@@ -1,5 +1,8 @@
-"""What an operator does when the DVA changes its mind. The robots stand in their bay, in the
-middle of the building; who drives is the first person of the population."""
+"""Operators when the DVA changes its mind.
+
+The robots stand in their bay, in the middle of the building; the driver is the first person of the
+population.
+"""
 
 import math
 

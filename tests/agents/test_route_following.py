@@ -1,4 +1,4 @@
-"""Where one is on a route: however finely it is cut, however seldom one looks."""
+"""Position along a route, for any spacing of points and any rate of updates."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What sensors make of what is there: lag, noise, range, resolution; and how they fail."""
+"""Sensor models: lag, noise, range, resolution and failures."""
 
 import math
 from collections.abc import Callable

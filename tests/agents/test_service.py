@@ -1,4 +1,4 @@
-"""How long a robot's computer takes: laws with their mean and spread, and a cold start."""
+"""Processing times of a robot's computer: laws with their mean and spread, and a cold start."""
 
 import itertools
 from typing import Any

@@ -1,4 +1,4 @@
-"""How people walk: alone, past each other, through doors, and out of what holds them up."""
+"""Walking: alone, past each other, through doors, and around obstacles."""
 
 import itertools
 import math

@@ -65,7 +65,7 @@ def files(folder):
 
 
 def python(*words, folder):
-    """What a Python of its own says, without any mistake or warning."""
+    """Output of a separate Python process, without errors or warnings."""
     done = patience.run([sys.executable, *words], capture_output=True, text=True, cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
     return done.stdout
@@ -190,7 +190,7 @@ def test_an_episode_is_kept_drawn_and_played_again(tmp_path, capfd):
 
 
 def test_it_works_where_an_event_loop_runs_and_prints_nothing(study, capfd):
-    """As in a notebook."""
+    """Runs inside an event loop, like a notebook."""
 
     async def cell():
         quiet = study.parent / "quiet"

@@ -1,4 +1,4 @@
-"""What a prompt shows of results fits a screen, and says what to ask them for."""
+"""Prompt display of results: fits a screen, and names the available queries."""
 
 import pytest
 from helpers.studies.small_study import cheap, study_in

@@ -28,7 +28,7 @@ SECOND, RUN, MESSAGE = "simulated s", "run", "message"
 
 @dataclass(frozen=True)
 class Case:
-    """What is counted.
+    """Benchmark case.
 
     Attributes:
         per: The unit that its work is told in.
@@ -69,7 +69,7 @@ def new_seed(scenario: str, **changes: Any) -> Work:
 
 
 def replayed() -> Work:
-    """The same messages at the same moments by an operator who only repeats them."""
+    """The same messages at the same moments from an operator who only repeats them."""
     from helpers.network.replaying_operator import replay, taped
 
     made = built("drive-to-event", {"pattern": "latest-wins", **FAR})
@@ -78,7 +78,7 @@ def replayed() -> Work:
 
 
 def physics_and_control() -> Work:
-    """The same world and the same pursuit of a way ten times a second, and nothing else."""
+    """The same world with path pursuit ten times a second, and nothing else."""
     from dva_sim.agents.observation import Observation
     from dva_sim.agents.operator.strategies import Pursuit, Reach, View
     from dva_sim.agents.population import Population, draw_person
@@ -151,7 +151,7 @@ def pointing() -> Work:
 
 
 def decision(policy: str) -> Work:
-    """Who of 60 goes to which of 120 events, by one of the policies."""
+    """Assign 60 responders to 120 events by one of the policies."""
     import numpy as np
     from helpers.dva.dispatch_situations import situation
 
@@ -163,7 +163,7 @@ def decision(policy: str) -> Work:
 
 
 def picture() -> Work:
-    """What a robot's camera shows of a corridor with people in it."""
+    """Camera picture of a corridor with people in it."""
     from dva_sim.worlds.camera import Camera, Figure
     from dva_sim.worlds.geo import Pose
     from dva_sim.worlds.site import load_site
@@ -253,5 +253,5 @@ RATIOS = {
 
 
 def warm() -> None:
-    """What all drives need: the site is read, its planner made, modules imported."""
+    """Load everything that drives need: site, planner and modules."""
     run("drive-to-event", pattern="latest-wins", **FAR)()

@@ -1,4 +1,4 @@
-"""The same circles in our world and in ir-sim: walls of caparica, the same tick, asked every tick.
+"""Equal circles in our world and in ir-sim: walls of caparica, the same tick, asked every tick.
 
 ir-sim moves robots by velocity alone and pushes what collides. Ours has forces, friction and
 contacts at all times.
@@ -24,7 +24,7 @@ RADIUS = SPEED / TURN_RATE
 
 
 def circles(site: Site, count: int) -> list[Pose]:
-    """Where robots begin that drive circles which touch neither walls nor each other."""
+    """Start poses of circling robots that touch neither walls nor each other."""
     rng, middles = np.random.default_rng(1), []
     while len(middles) < count:
         x, y = site.sample_free(rng, RADIUS + 0.5)
@@ -48,7 +48,7 @@ def ours(site: Site, starts: list[Pose]) -> Callable[[float], None]:
 
 
 def theirs(site: Site, starts: list[Pose], folder: Path) -> Callable[[float], None]:
-    """The same in ir-sim: a line for each wall, discs of the same size, nothing drawn."""
+    """Set up the circles in ir-sim: one line per wall, discs of the same size, no drawing."""
     irsim = pytest.importorskip("irsim", reason="ir-sim is not installed: pip install '.[bench]'")
     xmin, ymin, xmax, ymax = site.extent
     spec, document = DriveSpec(), folder / "circles.yaml"

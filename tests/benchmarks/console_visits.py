@@ -116,5 +116,5 @@ def visit(browser: Browser, address: str, **options: Any) -> Page:
 
 
 def load() -> str:
-    """How much else the machine does."""
+    """Load of the machine, in words."""
     return f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"

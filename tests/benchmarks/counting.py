@@ -1,4 +1,4 @@
-"""What counts the instructions that programs retire: they stay the same where time does not.
+"""Counters of retired instructions, which do not vary as time does.
 
 The processor counts them itself if the system lets it (perf_event_open), else Valgrind's callgrind
 does, fifty times slower. Where neither is to be had, only CPU time is measured.
@@ -58,11 +58,11 @@ class Perf:
             os.close(self._file)
 
     def read(self) -> int:
-        """What has been counted since this was made."""
+        """Count since this object was made."""
         return int.from_bytes(os.read(self._file, 8), "little")
 
     def count(self, work: Work) -> tuple[float, int]:
-        """What the work returns, and its instructions."""
+        """Result of the work, and its instructions."""
         before = self.read()
         done = work()
         return done, self.read() - before
@@ -79,7 +79,7 @@ class Callgrind:
 
     @staticmethod
     def words(folder: Path, at_once: bool = False) -> list[str]:
-        """How a process is started under it; what a process counted is in `folder/PID`.
+        """Command prefix that counts a process; the count is written to `folder/PID`.
 
         Args:
             folder: Where accounts are written.
@@ -105,7 +105,7 @@ class Callgrind:
         subprocess.run(words, check=True, capture_output=True)
 
     def count(self, work: Work) -> tuple[float, int]:
-        """What the work returns, and its instructions."""
+        """Result of the work, and its instructions."""
         self._switch("on")
         os.getpriority(os.PRIO_PROCESS, 0)
         done = work()
@@ -123,7 +123,7 @@ class Nothing:
 
     @staticmethod
     def count(work: Work) -> tuple[float, None]:
-        """What the work returns."""
+        """Result of the work."""
         return work(), None
 
 

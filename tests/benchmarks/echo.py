@@ -1,4 +1,4 @@
-"""What a command to a robot costs over sockets, against the floor and a bare echo of the same size.
+"""Cost of a command over sockets, against the floor and a bare echo of the same size.
 
 The floor is what any REQ and ROUTER in Python take that write and validate each message by our
 codec, and do nothing else: no robot, no clock, no second connection.

@@ -1,4 +1,4 @@
-"""What performance work aims at. A miss is told, and fails nothing: it may be the machine's."""
+"""Performance goals. A miss is reported, not a failure: the machine may be the cause."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What the program costs: instructions, which noise does not reach, beside CPU time.
+"""Cost of the program: instructions, which are free of noise, and CPU time.
 
     meter.py                      this version beside its parent
     meter.py --against COMMIT     beside another one
@@ -42,7 +42,7 @@ def parent() -> str:
 
 
 def figures(root: Path, names: Sequence[str], counter: str, repeats: int) -> Figures:
-    """What cases cost in the version of a folder."""
+    """Costs of cases in the version in a folder."""
     with tempfile.TemporaryDirectory() as folder:
         into = Path(folder) / "told"
         into.touch()
@@ -54,7 +54,7 @@ def figures(root: Path, names: Sequence[str], counter: str, repeats: int) -> Fig
 
 
 def measured(roots: Sequence[Path], names: Sequence[str], counter: str) -> list[Figures]:
-    """What cases cost in each version: counted side by side if that takes long, timed in turns."""
+    """Costs of cases in each version: long ones counted side by side, others timed in turns."""
     if counter != Callgrind.name:
         return [figures(root, names, counter, REPEATS) for root in roots]
     brief = [name for name in names if len(names) == 1 or not CASES[name].takes_long]
@@ -68,7 +68,7 @@ def measured(roots: Sequence[Path], names: Sequence[str], counter: str) -> list[
 
 
 def started(root: Path, names: Iterable[str], counter: str) -> Figures:
-    """What commands cost in the version of a folder."""
+    """Costs of commands in the version in a folder."""
     environment = pinned() | {"PYTHONPATH": str(root)}
     told = [startup.measured(name, counter, root, environment) for name in names]
     return {each["case"]: each for each in told}
@@ -116,7 +116,7 @@ def lines(ours: Figures, theirs: Figures) -> Iterator[str]:
 
 
 def ratios(found: Figures) -> Iterator[str]:
-    """What costs how many times as much as something else, in instructions or else in time."""
+    """Ratios of costs, in instructions or else in time."""
     for what, names in RATIOS.items():
         for measure in ("instructions", "cpu_s"):
             above, below = (found.get(name, {}).get(measure) for name in names)

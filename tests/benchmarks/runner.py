@@ -23,7 +23,7 @@ TESTS = str(Path(__file__).parents[1])
 
 
 def measured(name: str, counter: Any, repeats: int) -> dict[str, Any]:
-    """What a unit of a case costs: instructions, and the least CPU time of some repeats [s]."""
+    """Cost of one unit of a case: instructions, and the least CPU time of several repeats [s]."""
     from benchmarks.cases import CASES
 
     work = CASES[name].prepare()
@@ -46,7 +46,7 @@ def spent(work: Any) -> float:
 
 
 def in_a_copy(name: str, counter: str, repeats: int, into: Path) -> None:
-    """Measure one case in a copy of this process; what goes wrong is told instead."""
+    """Measure one case in a copy of this process; an error is recorded instead."""
     if copy := os.fork():
         _, status = os.waitpid(copy, 0)
         if status:
@@ -65,13 +65,13 @@ def in_a_copy(name: str, counter: str, repeats: int, into: Path) -> None:
 
 
 def write(told: dict[str, Any], into: Path) -> None:
-    """Add what is told of a case to the others."""
+    """Append the measurements of a case."""
     with into.open("a") as file:
         file.write(json.dumps(told) + "\n")
 
 
 def read(into: Path) -> Iterator[dict[str, Any]]:
-    """What has been measured."""
+    """All measurements so far."""
     yield from (json.loads(line) for line in into.read_text().splitlines())
 
 

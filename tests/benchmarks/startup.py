@@ -1,4 +1,4 @@
-"""What starting each command costs, as a whole process and those that it starts.
+"""Start-up cost of each command, child processes included.
 
 Commands that work for long are given a name that nobody has: that is what they load until they
 refuse it.

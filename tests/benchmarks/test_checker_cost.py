@@ -1,4 +1,4 @@
-"""What the safety checkers cost: CPU time of runs and of storms with them, and without."""
+"""Cost of the safety checkers: CPU time of runs and storms with and without them."""
 
 from __future__ import annotations
 

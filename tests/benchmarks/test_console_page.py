@@ -1,4 +1,4 @@
-"""What a person feels at the page, and what the page and the console cost.
+"""Latency that a person notices at the page, and cost of the page and the console.
 
 The way from a key to the robot's set point, over a link without delay and with 250 ms; the time
 from the command to the map; what 10 and 200 robots cost the browser; CPU of each process.

@@ -1,4 +1,4 @@
-"""How late an emergency stop is while 2,000 connections keep a port of the console busy.
+"""Latency of an emergency stop while 2,000 connections keep a console port busy.
 
 A quarter of them says nothing, a quarter stops in the middle of the TLS handshake or of a request,
 a quarter sends its request byte by byte, and a quarter has asked once without a token; another is
@@ -61,7 +61,7 @@ class Supervisor:
         Thread(target=lambda: list(self.state), daemon=True).start()
 
     def over_socket(self, key: str) -> object:
-        """Whether the stop was confirmed."""
+        """True if the stop was confirmed."""
         self.drive.send(json.dumps({"id": key, "do": "emergency", "robots": "all"}))
         while (line := json.loads(self.drive.recv(PATIENCE_S))).get("id") != key:
             pass

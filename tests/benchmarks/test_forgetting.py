@@ -46,7 +46,7 @@ SCENARIO = (
 
 
 class Voice:
-    """What a device says: each message is newer than the last."""
+    """Messages of a device, each newer than the last."""
 
     def __init__(self, id_tag: str) -> None:
         self.id_tag, self._number = id_tag, 0
@@ -284,7 +284,7 @@ class _Driver(_Device):
 
 @dataclass
 class Figures:
-    """What was seen of one wave."""
+    """Measurements of one wave."""
 
     name: str
     files: int

@@ -1,4 +1,4 @@
-"""How many packets a second an emulated link takes before it is 5 ms late.
+"""Packet rate at which an emulated link becomes 5 ms late.
 
 Datagrams of 200 bytes cross it at a steady rate, one way; the rate grows until the 99th percentile
 of the forwarder's lateness is above the bound, or the kernel drops what it does not read in time.
@@ -48,7 +48,7 @@ def crossed(rate: int) -> LinkReport:
 
 
 def is_late(rate: int) -> bool:
-    """Whether a link that is offered so many packets a second is late; says what it saw."""
+    """True if a link at this packet rate is late; prints its measurements."""
     report = crossed(rate)
     offered = report.up.offered_packets / SENT_S
     print(

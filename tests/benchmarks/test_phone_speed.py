@@ -1,4 +1,4 @@
-"""How late a phone's hand is, what a phone costs, and how late its picture is, on loopback.
+"""Latency of a phone's commands and pictures on loopback, and cost of a phone.
 
 A phone here is its page's two sockets: 60 samples a second by a clock of its own, in batches as the
 page makes them, tilted to one side and to the other. Each command that takes effect tells which
@@ -76,7 +76,7 @@ class Phone:
         self.ask("phone_register", **about)
 
     def _look(self) -> None:
-        """Read what the page is told: one that does not is dropped."""
+        """Read the page's messages; a page that does not read is dropped."""
         with suppress(ConnectionClosed):
             while True:
                 self._state.recv()

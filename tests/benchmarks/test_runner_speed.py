@@ -1,4 +1,4 @@
-"""How soon a study is done with help. What its runs cost beside themselves: docs/growth.py."""
+"""Speed-up of a study by more workers. Overhead per run: docs/growth.py."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a crowd costs against real time. What fewer robots cost: `make bench`."""
+"""Cost of a crowd relative to real time. Fewer robots: `make bench`."""
 
 import math
 import time

@@ -18,7 +18,7 @@ pictures = st.builds(
 
 
 def unpacked(data, size):
-    """What comes out of some bytes, in pieces, and how many were skipped."""
+    """Unpack bytes in pieces; returns the frames and the number of bytes skipped."""
     unpacker, found = Unpacker(), []
     for start in range(0, len(data), size):
         found += unpacker.feed(data[start : start + size])

@@ -183,7 +183,7 @@ def test_more_viewers_than_there_is_room_for_are_refused(world):
 
 
 def test_the_world_waits_for_nobody_who_draws(world):
-    """While the process is stopped and reads nothing, hundreds of frames are told to it."""
+    """The process is stopped and reads nothing while hundreds of frames are sent to it."""
     world.let(lambda: pictures(world.port, "/camera/robot-1.mjpg", 1))
     os.kill(world.process, signal.SIGSTOP)
     try:

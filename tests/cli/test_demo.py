@@ -15,7 +15,7 @@ SLEEPS = "import time; time.sleep(600)"
 
 @pytest.fixture
 def played(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, bool]]:
-    """What the demo does, in order, and whether the picture was there by then; nothing is run."""
+    """Steps of the demo, in order, each with whether the picture existed; nothing is run."""
     done: list[tuple[str, bool]] = []
 
     def study(request: RunRequest) -> ExitCode:

@@ -22,7 +22,7 @@ LIVE = ["live", "drive-to-event"]
 
 
 def stopped_at(module: str, words: list[str], ignored: bool = False) -> tuple[int, str, str]:
-    """How a command ends where Ctrl-C comes as it looks for a module: code, output, errors."""
+    """Exit code, output and errors of a command interrupted while it imports a module."""
     ended = subprocess.run(
         [sys.executable, "-c", STOPPED_AT.format(module=module, words=words)],
         preexec_fn=lambda: signal.signal(

@@ -1,4 +1,4 @@
-"""What `dva-sim link` refuses, and how it tells and keeps what became of the packets."""
+"""`dva-sim link`: options it refuses, its report and its record of packets."""
 
 import csv
 import sys

@@ -1,4 +1,4 @@
-"""What commands print: lists that do not wrap, JSON alone for other programs, less and more."""
+"""Output of commands: lists that do not wrap, pure JSON, quieter and more verbose modes."""
 
 import json
 import re

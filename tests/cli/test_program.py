@@ -1,4 +1,4 @@
-"""How the program is called: options, help, exit codes; all in this process."""
+"""Command line in this process: options, help and exit codes."""
 
 import re
 import shlex

@@ -1,4 +1,4 @@
-"""What the terminal shows of results: the commands show, compare and export, and their ends."""
+"""Results on the terminal: the commands show, compare and export, and their exit codes."""
 
 import io
 import json
@@ -37,7 +37,7 @@ def folders(tmp_path_factory):
 
 
 def shown(width, print_it):
-    """What a terminal of some width shows."""
+    """Output on a terminal of some width."""
     file = io.StringIO()
     print_it(Console(file=file, width=width, force_terminal=True, color_system=None))
     return file.getvalue()

@@ -1,4 +1,4 @@
-"""What is said before, during and after a run: plans, progress, and how to go on."""
+"""Messages before, during and after a run: plans, progress, and how to resume."""
 
 import sys
 import time

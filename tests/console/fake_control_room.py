@@ -1,4 +1,4 @@
-"""What a control room can do in the fake world: invented events, and a real audit log."""
+"""Control room actions in the fake world: invented events, and a real audit log."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class ControlRoomDesk:
         return AuditEntry(time_s=self.t, at_utc="", author=author, action=action, **more)
 
     def dispatch_lines(self) -> list[Line]:
-        """What pages are told again and again."""
+        """Lines that pages receive repeatedly."""
         control = {"k": "control", "dispatch": self.mode, "rooms": list(self.rooms.values())}
         now = self.t
         alarms = {
@@ -161,7 +161,7 @@ class ControlRoomDesk:
         return "noted"
 
     def do_event_proposal(self, asked: Line) -> str:
-        """Whom the policy would send."""
+        """The policy's proposal."""
         strange = "<img src=x onerror=alert(1)>" if self.hostile else "free"
         could = [(who, True, strange, when) for who, when in WHO.items()]
         rows = [
@@ -175,7 +175,7 @@ class ControlRoomDesk:
         return ""
 
     def do_dispatch_mode(self, asked: Line) -> str:
-        """Who decides."""
+        """Set the dispatch mode."""
         by = {"label": self._who(asked), "at_ms": self.ms}
         self.mode = self.mode | {"mode": asked["mode"], "switched": by}
         return str(asked["mode"])

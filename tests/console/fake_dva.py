@@ -17,7 +17,7 @@ REQUESTS = (
 
 
 class FakeDva:
-    """What the pages Main and Devices show."""
+    """Content of the pages Main and Devices."""
 
     def __init__(self) -> None:
         self.listens, self.port, self.count = True, 5555, 0

@@ -19,7 +19,7 @@ FAST_DEG = 30.0
 
 
 class FakePhone:
-    """What a phone is known by, and how it is calibrated."""
+    """Identity and calibration of a phone."""
 
     def __init__(self, number: int, label: str, kind: str, registered: bool = True) -> None:
         self.registered = registered
@@ -68,7 +68,7 @@ class FakePhone:
 
 
 class PhoneDesk:
-    """What phones and guards ask of the fake world; `FakeWorld` has the rest."""
+    """Requests of phones and guards in the fake world; `FakeWorld` has the rest."""
 
     def do_phone_register(self: Any, asked: dict[str, Any]) -> str:
         address = f"{asked['server']}:{asked['port']}"

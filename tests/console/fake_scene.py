@@ -79,7 +79,7 @@ class Walker:
         self.y += self.speed * dt * math.sin(self.heading)
 
     def row(self) -> list[int]:
-        """As a row of `pos`."""
+        """Row for `pos`."""
         heading = (self.heading + math.pi) % (2 * math.pi) - math.pi
         x, y = round(self.x * 100), round(self.y * 100)
         return [self.index, x, y, round(heading * 1000), round(self.speed * 1000)]
@@ -164,7 +164,7 @@ class Scene:
         return {"k": "hazards", "hazards": hazards, "fields": fields}
 
     def spots(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Where the fire and the leak are."""
+        """Positions of the fire and the leak."""
         xmin, ymin, xmax, ymax = self.site.extent
         low = xmin + 0.3 * (xmax - xmin), ymin + 0.4 * (ymax - ymin)
         return low, (xmin + 0.7 * (xmax - xmin), ymin + 0.6 * (ymax - ymin))

@@ -158,7 +158,7 @@ def test_what_an_earlier_run_left_of_a_recording_is_not_replaced(tmp_path):
 
 
 def shown(out):
-    """How much of a run its folder shows [s]; before its first line is kept it has no tables."""
+    """Simulated time in a results folder [s]; 0 before its first row."""
     results = load_so_far(out)
     return results.runs["simulated_s"][0] if results.has("runs") else 0.0
 

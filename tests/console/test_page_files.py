@@ -41,7 +41,7 @@ def test_every_vendored_package_that_is_shipped_has_its_licence():
 
 
 def test_colours_are_those_that_the_palette_writes():
-    """`python -m dva_sim.console.pages.palette` writes them anew."""
+    """`python -m dva_sim.console.pages.palette` writes them again."""
     for name, text in palette.FILES.items():
         assert (STATIC / name).read_text(encoding="utf-8") == text(), name
 

@@ -30,17 +30,17 @@ class Differs(Exception):
 
 
 def read_list() -> dict[str, Any]:
-    """What is vendored."""
+    """Read the list of vendored files."""
     return tomllib.loads(LIST.read_text())
 
 
 def sha256(data: bytes) -> str:
-    """As the list notes it."""
+    """Hash as the list notes it."""
     return hashlib.sha256(data).hexdigest()
 
 
 def written_files() -> dict[str, bytes]:
-    """What stands in the folders now, by the names of the list."""
+    """Files now in the folders, by the names of the list."""
     places = {"shipped": SHIPPED, "tests": FOR_TESTS}
     files = [(place, file) for place, folder in places.items() for file in folder.iterdir()]
     own = ".d.ts"  # types of what the console uses of them: our words, not theirs
@@ -94,7 +94,7 @@ def bundle(part: dict[str, Any], folder: Path) -> bytes:
 
 
 def licences(packages: list[dict[str, Any]], homes: dict[str, Path]) -> bytes:
-    """Who wrote what is shipped, and under which terms."""
+    """Licences of the vendored files."""
     parts = []
     for package in packages:
         text = (homes[package["name"]] / "LICENSE").read_text().strip()

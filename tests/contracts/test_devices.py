@@ -1,4 +1,4 @@
-"""What devices make of it: requests act once, emergencies always, and old commands never."""
+"""Devices over each transport: requests act once, emergencies always, old commands never."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -232,7 +232,7 @@ class DrivenRobot:
         self.world.network.publish(PHONE, command_topic(ROBOT), data, len(data))
 
     def codes(self) -> Counter[int]:
-        """What was decided on commands."""
+        """Reply codes of the commands, with counts."""
         return Counter(d.code for d in self.commands())
 
     def commands(self) -> list[Decided]:

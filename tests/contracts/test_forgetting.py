@@ -155,12 +155,12 @@ def test_the_memory_of_connections_that_are_closed_goes_back(monkeypatch):
 
 
 def files() -> int:
-    """How many are open in this process."""
+    """Number of files open in this process."""
     return len(list(FILES.iterdir()))
 
 
 def _after_a_wave(site: Site, wave: int, count: int = 25) -> int:
-    """How many files are open when all of a wave are forgotten."""
+    """Number of open files after all devices of a wave are forgotten."""
     world = site.world
     site.be_patient()
     with zmq.Context() as outside, outside.socket(zmq.DEALER) as asker:

@@ -1,4 +1,4 @@
-"""What other programs may send to a node, and how little that matters to everybody else."""
+"""Messages from foreign programs, which must not disturb anybody else."""
 
 import socket as tcp
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""What every messaging pattern promises a drive, over every transport."""
+"""Contract of every messaging pattern with a drive, over every transport."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What publishers and subscribers are promised, whatever carries the publications."""
+"""Contract of publishers and subscribers, over any transport."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""What whoever asks is promised, whatever carries the request."""
+"""Contract of requesters, over any transport."""
 
 import pytest
 from helpers.network.transports import (
@@ -32,7 +32,7 @@ WINDOWS = pytest.mark.parametrize(
 
 
 def answered(world: World, asker: Asker, *questions: bytes) -> list[bytes | None]:
-    """How all that was asked has ended, once these questions have, too."""
+    """Outcomes of all requests so far, after sending these."""
     asker.ask(*questions)
     world.run_until(asker.all_over)
     return asker.replies()
@@ -43,7 +43,7 @@ def echoes(*questions: bytes) -> list[bytes | None]:
 
 
 def asked_until_answered(world: World, asker: Asker) -> int:
-    """How many requests it took until one was answered."""
+    """Number of requests until one was answered."""
     for number in range(1, 101):
         question = b"are you there? %d" % len(asker.ends)
         if answered(world, asker, question)[-1:] == echoes(question):

@@ -1,4 +1,4 @@
-"""Whoever looks at what a node is asked and answers sees it as it is, and changes nothing."""
+"""Taps on a node see its requests and replies unchanged, and change nothing."""
 
 from typing import Any
 

@@ -49,7 +49,7 @@ def decide(
 
 
 def facts(office: Office) -> list[Fact]:
-    """What was decided since this was last asked; each can be sent."""
+    """Decisions since the last call; each can be sent."""
     taken = office.desk.trail.take()
     for fact in taken:
         record = m.Message(DVA, 1, DVA, "12:00:00", 0, fact.record())

@@ -1,4 +1,4 @@
-"""What a policy sees, and what becomes of its advice, good or bad."""
+"""Dispatcher: the situation that a policy sees, and the treatment of good and bad advice."""
 
 import sys
 from collections.abc import Callable, Iterator, Sequence

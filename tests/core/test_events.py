@@ -25,7 +25,7 @@ def office() -> Office:
 
 
 def waiting_office() -> Office:
-    """Where nobody is free to go."""
+    """Office in which nobody is free."""
     office = Office()
     office.register(OTHER_DETECTOR, "Sensor")
     office.busy(GUARD, ROBOT, OPERATOR)

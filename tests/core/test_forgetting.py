@@ -167,7 +167,7 @@ def test_of_whom_something_is_open_makes_room_last_and_its_holder_hears_that(off
 
 
 def sizes(thing: Any, depth: int = 4) -> dict[str, int]:
-    """How much everything in the core holds, by the way to it."""
+    """Number of items in every container of the core, by path."""
     found: dict[str, int] = {}
     names = [f.name for f in fields(thing)] if hasattr(thing, "__dataclass_fields__") else []
     for name in {*names, *vars(thing)} if hasattr(thing, "__dict__") else names:

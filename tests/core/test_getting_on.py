@@ -1,4 +1,4 @@
-"""Who has said OK to an order gets on with it, or somebody else is sent."""
+"""Responders who accept an order must make progress, or are replaced."""
 
 from dataclasses import replace
 

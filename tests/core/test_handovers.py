@@ -1,4 +1,4 @@
-"""Who holds a robot, and how it changes hands: asked, granted, declined or forced."""
+"""Handover of a robot: requested, granted, declined or forced."""
 
 import pytest
 from helpers.dva.dispatch_desk import (

@@ -1,4 +1,4 @@
-"""Who may act on what: grants, sessions, sensors, and the rules of access."""
+"""Permissions: grants, sessions, sensors, and the rules of access."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Who is under way may be sent to something worse, by rules that hold whatever the policy says."""
+"""Preemption of responders under way, by rules that hold for any policy."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ from dva_sim.protocol import messages as m
 
 
 class Grabbing(Policy):
-    """Sends whoever it sees to the newest event, busy or not."""
+    """Sends everybody to the newest event, busy or not."""
 
     preempts = True
 

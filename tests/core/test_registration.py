@@ -1,4 +1,4 @@
-"""Who is there: registration, a new life, silence, and the device list."""
+"""Registration: arrivals, restarts, silence, and the device list."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Which sensors robots have, and what the DVA makes of what they show."""
+"""Sensors of robots, and the DVA's use of their readings."""
 
 import pytest
 from helpers.dva.dispatch_desk import (

@@ -1,4 +1,4 @@
-"""How many robots one operator may have in hand: a rule of the desk, whatever a policy says."""
+"""Limit on the robots of one operator, which holds for any policy."""
 
 import pytest
 from helpers.dva.dispatch_desk import GUARD, OPERATOR, OTHER_OPERATOR, OTHER_ROBOT, ROBOT, Office
@@ -22,7 +22,7 @@ def office_of(span: int, operators: int = 1) -> Office:
 
 
 def three_fires(office: Office) -> list[str | None]:
-    """Who is told to look at each of three fires at 10 m."""
+    """Responders sent to look at each of three fires at 10 m."""
     return [next((send.to for send in office.fire(10)), None) for _ in range(3)]
 
 

@@ -1,4 +1,4 @@
-"""What survives a DVA that was killed, and a file that is full, locked or something else."""
+"""State that survives a killed DVA, and files that are full, locked or invalid."""
 
 import os
 import shutil
@@ -42,7 +42,7 @@ def keep(office: Office, memory: Store, now: float = 0.0) -> str | None:
 
 
 def next_life(office: Office, file: Path, now: float) -> Dva:
-    """The office goes on with a new desk that knows what the file knows."""
+    """Restart the office with a new desk that recalls the file."""
     memory = Store(file)
     office.desk = office.new_desk()
     memory.recall(office.desk, now)

@@ -38,7 +38,7 @@ def test_a_policy_decides_the_same_through_the_environment(name):
 
 
 def test_the_return_is_the_sum_of_all_response_times():
-    """Where every alarm is answered, and all of the time is measured."""
+    """Every alarm is answered, and all of the time is measured."""
     env = made("min_eta", "small-shift")
     info = play(env, load_policy("min_eta"), seed=7)
     recording = simulate_timed(env.scenario, 7, load_policy("min_eta"))

@@ -19,7 +19,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def results(finished: Path) -> Results:
-    """What Python sees of it."""
+    """Results as loaded in Python."""
     return Results.load(finished)
 
 

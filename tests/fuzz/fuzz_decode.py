@@ -39,7 +39,7 @@ def write_seeds(folder: Path) -> None:
 
 
 def inputs(made: Path) -> list[str]:
-    """What libFuzzer starts from: one file alone, or folders, of which it writes into the first."""
+    """Inputs of libFuzzer: a single file, or folders, the first of which it writes to."""
     given = [word for word in sys.argv[1:] if not word.startswith("-")]
     if any(Path(word).is_file() for word in given):
         return []

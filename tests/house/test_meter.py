@@ -1,4 +1,4 @@
-"""What `make bench` counts with, and how it tells it."""
+"""Counters and output of `make bench`."""
 
 import os
 import platform

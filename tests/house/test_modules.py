@@ -1,4 +1,4 @@
-"""What holds of the modules of the program, whatever is in them."""
+"""Rules for all modules of the program."""
 
 import ast
 import re
@@ -58,7 +58,7 @@ def late_in(path: Path) -> list[ast.ImportFrom]:
 
 @cache
 def imported_early() -> dict[str, set[str]]:
-    """What each module imports when it is imported."""
+    """Imports that each module makes when it is imported."""
     return {name: set(imports_of(tree_of(path).body)) for name, path in MODULES.items()}
 
 
@@ -156,7 +156,7 @@ VARIADIC = {"_columns", "_new", "add_row", "attrgetter", "call_at", "chain", "pa
 
 
 def faults_of(node: ast.AST, room: str) -> Iterator[str]:
-    """What a statement or expression does that none should; the room is where it stands."""
+    """Faults of a statement or expression, in its room."""
     if isinstance(node, ast.Import):
         yield from _faults_of_import([each.name for each in node.names])
     elif isinstance(node, ast.ImportFrom) and not node.level:

@@ -1,4 +1,4 @@
-"""When a run of the tests has failed, and which faults are planted to see them noticed."""
+"""Failure of a test run, and the choice of faults to plant."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""What is said of a name that there is not: the one that was meant, or what there is."""
+"""Messages for unknown names: the closest match, or the known names."""
 
 import pytest
 from helpers.wording import unnamed

@@ -16,7 +16,7 @@ def programs(tmp_path: Path) -> Iterator[Programs]:
 
 @pytest.fixture
 def address() -> Iterator[str]:
-    """Where a program may listen: two free ports in a row, of which the first is named.
+    """First of two free consecutive ports, as an address.
 
     The port before them is held meanwhile, so that no other process of these tests gets them;
     nor does anybody who asks for any free port: those lie above.

@@ -1,4 +1,4 @@
-"""What a live run leaves: every decision of the DVA made the same again, lines made a recording."""
+"""Evidence of a live run: replayed decisions of the DVA, and lines made into a recording."""
 
 import errno
 import inspect
@@ -102,7 +102,7 @@ def test_a_dva_that_remembers_an_earlier_life_decides_the_same_again(tmp_path):
 
 
 def test_every_way_to_ask_the_dva_is_written_down():
-    """What changes a DVA and is in no trace would be missed by every replay."""
+    """A change of the DVA that no trace records would be missed by every replay."""
     public = {name for name, _ in inspect.getmembers(Dva, inspect.isfunction) if name[0] != "_"}
     asked = set(re.findall(r"\bdesk\.(\w+)\(", inspect.getsource(dva_server)))
     kept = {name for name in vars(TracedDva) if name[0] != "_"}
@@ -247,7 +247,7 @@ def record(path: Path, lines: int = 20) -> Keeper:
 
 
 def found_in(path: Path) -> tuple[object, ...]:
-    """What is said of a recording, but for the safety rules: nobody has looked at robots here."""
+    """Findings of `check_recording`, without the safety rules, which live runs do not judge."""
     *found, rules = check_recording(path)
     assert {verdict.state for verdict in rules} == {"not judged"}
     return tuple(found)
@@ -280,7 +280,7 @@ def test_a_message_that_is_none_is_found_in_a_recording(tmp_path):
 
 
 def test_lines_that_were_left_are_read_like_a_recording_and_stay(tmp_path):
-    """As of a run whose supervisor was killed, in the middle of a line."""
+    """The lines are those of a run whose supervisor was killed in the middle of one."""
     keeper = record(tmp_path / "run.mcap")
     keeper.close()
     with keeper.path.open("ab") as file:

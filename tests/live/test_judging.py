@@ -1,4 +1,4 @@
-"""A live run is judged by what its parts say, whoever speaks first and whatever they hide."""
+"""Verdicts on a live run from its parts' reports, in any order and with gaps."""
 
 import json
 import random
@@ -52,7 +52,7 @@ def part_of(fact: Any) -> int:
 
 
 def line_of(fact: Any) -> Line:
-    """How a part of a live run says a fact."""
+    """Line in which a part of a live run reports a fact."""
     if not isinstance(fact, Sent):
         word, time, told = as_plain(fact)
         return [SEEN, time, word, told]
@@ -73,7 +73,7 @@ def said_by_parts(run: Run) -> dict[int, list[Line]]:
 
 
 def judged(run: Run, lines: dict[int, list[Line]], seed: int = 1) -> dict[str, str]:
-    """How the rules have fared; parts say some lines at a time, each when it comes to it."""
+    """Verdicts by rule, for parts that report some lines at a time, in random order."""
     judge, luck = LiveJudge(terms_of(run.scenario)), random.Random(seed)
     for part in lines:
         judge.joins(part)

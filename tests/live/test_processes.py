@@ -80,7 +80,7 @@ def test_a_run_tells_its_story_shows_all_devices_and_ends_when_its_script_is_don
 
 
 def all_held(run: Program) -> bool:
-    """Whether a run has said of each safety rule that it was held."""
+    """True if a run has reported each safety rule as held."""
     return all(f"\n{rule} held: " in run.said for rule in RULES)
 
 
@@ -114,7 +114,7 @@ def test_a_robot_that_answers_an_emergency_and_ignores_it_lets_no_run_end_as_don
 
 
 def count_in(recording: Path, element: bytes) -> int:
-    """How many messages with an element a recording holds; they, and its decisions, are valid."""
+    """Number of messages with an element in a recording, which must be valid."""
     ended = call("check", recording)
     assert ended.returncode == 0, ended.stdout
     traffic = read_recording(recording).playback.recorder.traffic or ()

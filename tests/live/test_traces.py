@@ -31,7 +31,7 @@ LATER = {"events": [{"kind": "fire", "at_s": 500}], "horizon_s": 600}
 
 
 def differences(path: Path) -> int:
-    """How many of a trace's decisions a fresh controller makes otherwise."""
+    """Number of a trace's decisions that a fresh controller makes differently."""
     return sum(then != now for _, then, now in replay(path))
 
 
@@ -210,7 +210,7 @@ def test_a_line_taken_out_is_found_out(drive):
 
 
 def is_told_at(path: Path, number: int) -> bool:
-    """Whether a trace is refused in one line that names it and a line of its own."""
+    """True if a trace is refused in one line that names it and a line number."""
     with pytest.raises(ConfigError) as error:
         list(replay(path))
     return str(error.value).startswith(f"{path}:{number}: ") and "\n" not in str(error.value)

@@ -1,4 +1,4 @@
-"""What may carry a run over real connections, and what is refused in one line."""
+"""Carriers of a run over real connections, and options refused in one line."""
 
 import pytest
 from helpers.wording import unnamed

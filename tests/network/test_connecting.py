@@ -1,4 +1,4 @@
-"""Which depth a connection gets: messages where that is exact, segments everywhere else."""
+"""Depth of simulated connections: messages where that is exact, segments elsewhere."""
 
 import pytest
 from helpers.network.links import link

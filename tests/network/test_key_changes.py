@@ -74,7 +74,7 @@ class Both:
                 side.network.clock.run(side.network.clock.now + STEP)
 
     def talk(self) -> bool:
-        """Whether commands and pictures come through, within a while."""
+        """True if commands and pictures come through within a while."""
         self.forget()
         self.let(PATIENCE_S, lambda: self.operator.heard and self.operator.answers)
         return bool(self.operator.heard and self.operator.answers)

@@ -14,7 +14,7 @@ SOON = 20.0  # no test waits longer for what should come at once [s]
 
 
 def passed(clock, until):
-    """How much real time goes by until virtual time has come so far [s]."""
+    """Real time until virtual time reaches a value [s]."""
     begun = time.monotonic()
     clock.run(until)
     return time.monotonic() - begun

@@ -1,4 +1,4 @@
-"""What a run of commands came to, counted by hand."""
+"""Results of command runs, counted by hand."""
 
 import math
 

@@ -78,7 +78,7 @@ def test_options_of_a_pattern_are_written_only_where_there_are_any():
 
 
 def test_a_scenario_that_is_only_read_runs_no_file(tmp_path):
-    """As from a recording or a results folder, which may come from anybody."""
+    """Scenarios in recordings or results folders may come from anybody."""
     (tmp_path / "mine.py").write_text("raise SystemExit('was run')")
     named = {"pattern": f"{tmp_path}/mine.py:Mine"}
     assert Scenario.model_validate(named).pattern == named["pattern"]

@@ -1,4 +1,4 @@
-"""A poll costs what is ready, not what is open, and misses nothing whoever used the socket."""
+"""Polling: costs depend on ready sockets, not on open ones, and no event is missed."""
 
 from collections.abc import Callable, Iterator
 

@@ -1,4 +1,4 @@
-"""What reception does to a link, place by place."""
+"""Effect of reception on a link, place by place."""
 
 from typing import Any, NamedTuple
 
@@ -19,7 +19,7 @@ class Quality(NamedTuple):
 
 
 class Place:
-    """Where the robot is, as far as the link cares."""
+    """Position of the robot, as far as the link needs it."""
 
     def __init__(self, quality: Quality | None = None) -> None:
         self.quality = quality

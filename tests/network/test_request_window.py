@@ -1,4 +1,4 @@
-"""How many requests the pattern `paced` leaves unanswered, on paths that are known exactly."""
+"""Number of unanswered requests that the pattern `paced` allows, on exactly known paths."""
 
 import heapq
 

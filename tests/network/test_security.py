@@ -130,7 +130,7 @@ def receive(ends: list[End], socket: Socket) -> list[zmq.Frame]:
 
 
 def both_say(server: End, client: End, reason: Reason) -> tuple[str, str]:
-    """What both ends say in the end: one line each, of the same reason."""
+    """Final lines of both ends: one each, with the same reason."""
     run([server, client], lambda: server.said and client.said)
     (at_server,), (at_client,) = server.said, client.said
     assert (at_server.reason, at_client.reason) == (reason, reason)

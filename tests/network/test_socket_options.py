@@ -1,4 +1,4 @@
-"""What a scenario sets on ZeroMQ sockets is set on real ones; what cannot be is refused."""
+"""Socket options of a scenario, set on real ZeroMQ sockets or refused."""
 
 from collections.abc import Iterator
 
@@ -38,7 +38,7 @@ def live_until_heard(network: SocketNetwork, got: list[bytes], last: bytes) -> N
 
 
 def heard(network: SocketNetwork) -> int:
-    """How many of 200 pictures reach a subscriber that takes them after all were sent."""
+    """Number of 200 pictures that reach a subscriber who reads after all were sent."""
     got: list[bytes] = []
     network.join("robot")
     subscription = network.subscribe("phone", "robot", "topic", got.append)

@@ -39,7 +39,7 @@ def name(one):
 
 
 def agrees(data):
-    """Whether the quick way knows the bytes; fails where the whole way says anything else."""
+    """True if the fast reader accepts the bytes; fails where the full reader disagrees."""
     quick = read_canonical(data)
     if quick is not None:
         validated = read_validated(data)
@@ -153,7 +153,7 @@ def test_damaged_messages_are_read_the_same_or_left_to_the_parser():
 
 
 def whole_way_agrees_with_the_specification(data):
-    """Whether the bytes are a message; fails where parser and specification differ."""
+    """True if the bytes are a message; fails where parser and specification differ."""
     tree = judged(data)
     try:
         read = read_validated(data)

@@ -67,7 +67,7 @@ def programs_of_the_specification():
 
 
 def run(code, dva, folder):
-    """What a program prints that is given the address of a DVA."""
+    """Output of a program that gets the address of a DVA."""
     program = folder / "client.py"
     program.write_text(code)
     client = subprocess.Popen(

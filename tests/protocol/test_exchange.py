@@ -1,4 +1,4 @@
-"""What is kept for who asks again, and who is listened to: less and less who sends no messages."""
+"""Stored replies for repeated requests, and throttling of senders of invalid messages."""
 
 import pytest
 

@@ -23,7 +23,7 @@ DRIVER, EMERGENCY = (("SESSIONS=1", "LETTERS=1", f"LIVE={n}") for n in (1, 2))
 
 
 def errors(folder: Path, *defined: str, rule: str = "", model: str = "teleop") -> int:
-    """How many errors the checker finds in a model with these definitions.
+    """Number of errors that the checker finds in a model with these definitions.
 
     Args:
         folder: Where to work.

@@ -20,5 +20,5 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="session")
 def opened(folder: Path) -> dict[str, Opened]:
-    """What is read of each of them, by its name."""
+    """Content of each recording, by its name."""
     return {path.stem: read_recording(path) for path in folder.glob("*.mcap")}

@@ -49,7 +49,7 @@ def log(tmp_path: Path) -> Path:
 
 
 def place_of(found: Verified, words: str) -> tuple[int, bool]:
-    """The row that is wrong, and whether it is told in these words."""
+    """Number of the wrong row, and whether the problem has these words."""
     assert found.problem is not None
     return found.problem.number, words in found.problem.text
 

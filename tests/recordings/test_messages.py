@@ -92,7 +92,7 @@ def test_of_somebody_who_stands_still_a_pose_a_second_is_told():
 
 
 def _strict(schema):
-    """The same schema, with no other fields than those it names."""
+    """Schema without additional fields."""
     if schema.get("type") == "object":
         fields = {name: _strict(field) for name, field in schema["properties"].items()}
         return schema | {"properties": fields, "additionalProperties": False}

@@ -1,4 +1,4 @@
-"""What is read back from a recording is what was written, as far as the file goes."""
+"""Reading a recording returns what was written, as far as the file goes."""
 
 import dataclasses
 import random

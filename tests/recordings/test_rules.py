@@ -69,7 +69,7 @@ def test_a_broken_rule_is_told_with_when_by_whom_and_how_and_makes_it_invalid(
 
 
 def test_a_recording_without_facts_is_not_taken_to_hold_any_rule(tmp_path, monkeypatch):
-    """As those of version 0.8.0 and before."""
+    """Recordings of version 0.8.0 and before have no facts."""
     run = drive()
     monkeypatch.setattr(run.recorder, "facts", None)
     write_recording(run, tmp_path / "old.mcap")

@@ -1,4 +1,4 @@
-"""Which runs of a study are kept, and that they are the same however they are made."""
+"""Runs of a study kept as recordings, equal however they are made."""
 
 import errno
 import math
@@ -77,7 +77,7 @@ def test_a_sample_is_the_first_trial_of_the_first_person_of_each_cell(tmp_path):
 
 
 def test_the_worst_has_the_largest_measure_of_its_cell_or_none_at_all(tmp_path):
-    """Of equals the first counts; a measure that never came is worse than any."""
+    """The first of equals counts; a missing measure is the worst."""
     kept = names(study_in(tmp_path, "worst"), TIMES)
     assert kept == ["drive-reference-1-1.mcap", "drive-0-0-0.mcap", "drive-1-0-1.mcap"]
 
@@ -155,7 +155,7 @@ def test_another_choice_needs_no_other_runs(kept, tmp_path):
 
 @pytest.fixture
 def emptied(kept):
-    """The same, whose recordings are gone; in the end all of them are made again."""
+    """Study without its recordings; in the end all of them are made again."""
     study, out = kept
     before = recordings(out)
     for name in before:
@@ -166,7 +166,7 @@ def emptied(kept):
 
 
 def test_a_run_that_is_not_what_the_study_has_is_not_kept(kept, monkeypatch):
-    """As after a change of the program: the table says 3 s, the run would last 2 s."""
+    """A changed program is simulated: the table says 3 s, the run would last 2 s."""
     study, out = kept
     every = cell_grid.jobs(study)
     shorter = [

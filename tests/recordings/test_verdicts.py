@@ -1,4 +1,4 @@
-"""How runs ended, in words, and which of two was ahead."""
+"""Outcomes of runs in words, and which of two was ahead."""
 
 from math import inf
 from types import SimpleNamespace

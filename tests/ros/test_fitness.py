@@ -1,4 +1,4 @@
-"""Whether a robot of ROS can be driven, by what has come from it and when."""
+"""Fitness of a ROS robot for driving, by the times of its messages."""
 
 import pytest
 from helpers.wording import unnamed

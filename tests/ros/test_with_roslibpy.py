@@ -26,7 +26,7 @@ def ros_and_world():
 
 
 def ask(world, call):
-    """What a blocking call returns, while the world goes on."""
+    """Result of a blocking call, while the world keeps running."""
     got = []
     thread = threading.Thread(target=lambda: got.append(call()), daemon=True)
     thread.start()

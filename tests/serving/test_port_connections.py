@@ -1,4 +1,4 @@
-"""Which connection makes room for which: those without a token first, a higher role before all."""
+"""Eviction of connections: those without a token first, higher roles last."""
 
 from dva_sim.serving.port_connections import IDLE, SILENT, PortConnections
 

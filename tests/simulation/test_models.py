@@ -1,4 +1,4 @@
-"""What a study may ask for is what the rows of its model hold, no more and no less."""
+"""Measures that a study may request are exactly those in the rows of its model."""
 
 import pytest
 from helpers.studies.small_study import STUDY, study_in

@@ -15,7 +15,7 @@ def persons(n, seed=1):
 
 
 def constant(values, known):
-    """Of a straight line, at zero of what is known."""
+    """Intercept of a straight line through the points."""
     return np.polyfit(known, values, 1)[1]
 
 

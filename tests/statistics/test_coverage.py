@@ -1,4 +1,4 @@
-"""How often 95 % intervals hold, with as many persons and trials as the main study has."""
+"""Coverage of 95 % intervals, with the persons and trials of the main study."""
 
 import numpy as np
 import pytest
@@ -127,7 +127,7 @@ def test_where_slow_runs_are_missing_more_often_no_interval_holds():
 
 
 def levels_of_one_line(persons, n, rng):
-    """Six levels of a skewed measure that share two thirds of their luck; one mostly zero."""
+    """Six levels of a skewed measure with a correlation of two thirds; one mostly zero."""
     common, own = rng.normal(size=(n, persons, 1)), rng.normal(size=(n, persons, 6))
     values = np.exp(0.5 * (0.8 * common + 0.6 * own)) - np.exp(0.125)
     values[:, :, 0] *= rng.random((n, persons)) < 0.5

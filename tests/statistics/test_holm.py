@@ -33,7 +33,7 @@ def test_it_is_the_closure_of_bonferronis_test_over_all_subsets():
 
 
 def test_true_hypotheses_of_a_family_are_rejected_in_one_study_of_twenty():
-    """Of five, three are true; the others are always found, so three share the 5 %: 4.9 %."""
+    """Three of five are true; the others are always found, so three share the 5 %: 4.9 %."""
     rng = np.random.default_rng(2)
     p = np.column_stack([rng.random((4000, 3)), np.full((4000, 2), 1e-6)])
     alarms = np.mean([(holm(own)[:3] <= 0.05).any() for own in p])

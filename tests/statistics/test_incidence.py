@@ -8,7 +8,7 @@ from dva_sim.statistics import cumulative_incidence, share_interval
 
 
 def test_a_case_worked_by_hand():
-    """Of 5 at 1 s one is done; of 4 at 2 s one is lost; one leaves at 3 s; of 2 at 4 s one is done.
+    """At 1 s one of 5 is done; at 2 s one of 4 is lost; one leaves at 3 s; at 4 s one of 2 is done.
 
     Done: 1/5 + 3/5 x 1/2 = 0.5; lost: 4/5 x 1/4 = 0.2; the rest 0.3.
     """

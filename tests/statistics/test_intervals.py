@@ -97,7 +97,7 @@ def test_missing_cells_leave_the_other_levels_of_the_band_alone():
 
 
 def test_a_level_that_few_persons_have_does_not_take_the_band_from_the_others():
-    """Of draws of 24 persons one in 100 holds fewer than two of these 6."""
+    """One in 100 draws of 24 persons holds fewer than two of these 6."""
     values = skewed(np.random.default_rng(17), 24, 3)
     values[6:, 1] = np.nan
     band = statistics.band(values)
@@ -108,7 +108,7 @@ def test_a_level_that_few_persons_have_does_not_take_the_band_from_the_others():
 
 
 def test_draws_that_say_nothing_of_a_level_do_not_take_away_its_interval():
-    """Of draws of 60 persons, 1.4 in 100 hold fewer than two of these 6."""
+    """Draws of 60 persons hold fewer than two of these 6 in 1.4 of 100 cases."""
     values = np.random.default_rng(22).normal(size=(60, 2))
     values[6:, 0] = np.nan
     band = statistics.band(values, level=0.99)

@@ -1,4 +1,4 @@
-"""Campaigns: a journal that can be gone on with, and the command."""
+"""Campaigns: a journal that can be resumed, and the command."""
 
 import pytest
 from helpers.wording import unnamed

@@ -168,7 +168,7 @@ def test_a_driver_who_goes_on_though_it_is_refused_breaks_s5(refusals, after, ag
 
 
 def unrecovered(spoil):
-    """What has not recovered in a storm without faults, in which a test spoils something."""
+    """Rules not recovered in a storm without faults, in which a test spoils something."""
     plan = replace(StormPlan(1, SMALL, (), 0.0), calm_s=60.0)
     outcome = play(plan, lambda storm: storm.run.clock.call_at(90.0, spoil, storm))
     return {(breach.rule, breach.who) for breach in outcome.breaches}

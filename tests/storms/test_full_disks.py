@@ -34,7 +34,7 @@ class Disk:
 
 
 class MadeUp(Disk):
-    """As storms have it."""
+    """Full disk as storms simulate it."""
 
     @contextmanager
     def full(self, storm):

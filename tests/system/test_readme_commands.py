@@ -54,7 +54,7 @@ def commands() -> list[str]:
 
 
 def words_of(command: str) -> list[str]:
-    """What the program is told: without the shell's own part, and with `*` as a shell has it."""
+    """Arguments of a command, without redirections and with `*` expanded."""
     words = shlex.split(command)[1:]
     words = words[:-2] if words[-2:-1] in (["<"], [">"]) else words
     spread = [sorted(map(str, Path().glob(word))) if "*" in word else [word] for word in words]
@@ -65,13 +65,13 @@ def words_of(command: str) -> list[str]:
 
 
 class Seen(NamedTuple):
-    """What a command left: its words on the terminal; its files are in the working folder."""
+    """Output of a command on the terminal; its files are in the working folder."""
 
     text: str
     code: int
 
     def time_of(self, what: str) -> float:
-        """When a line of the story was told [s]."""
+        """Time of a line in the story [s]."""
         (time,) = re.findall(rf"([\d.]+) s  .*{what}", self.text)
         return float(time)
 
@@ -91,7 +91,7 @@ def told(*texts: str) -> Look:
 
 
 def planned(question: str) -> Look:
-    """What would run, and for how long."""
+    """Expect the planned runs and their duration."""
     return told(question, " runs in ", " to go with ")
 
 
@@ -255,7 +255,7 @@ def a_message_and_a_study() -> None:
 
 @dataclass(frozen=True)
 class Expected:
-    """What one should see of a command.
+    """Expected output of a command.
 
     Attributes:
         look: Looks for the point that the page makes with it.

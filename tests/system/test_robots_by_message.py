@@ -1,4 +1,4 @@
-"""Robots on the network: what they do when they are told to, by messages alone."""
+"""Robots on the network, driven by messages alone."""
 
 import itertools
 import math
@@ -59,7 +59,7 @@ def say(
 
 
 def heard(run: Run, topic: str) -> list[Any]:
-    """What a robot publishes there, from now on."""
+    """Messages that a robot publishes on a topic from now on."""
     told: list[Any] = []
     run.network.subscribe(DVA, ROBOT, topic, lambda data: told.append(decode(data).body))
     return told

@@ -15,7 +15,7 @@ FEWER = {
 
 @pytest.fixture
 def fewer(monkeypatch):
-    """As many as users get only where much time is given, in `make test-soak`."""
+    """Reduce the number of tries, except in `make test-soak`."""
     for module, numbers in FEWER.items() if LONGER == 1 else ():
         for name, number in numbers.items():
             monkeypatch.setattr(module, name, number)

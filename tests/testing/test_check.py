@@ -53,7 +53,7 @@ def check(here, capsys):
 
 @pytest.mark.parametrize("most", [1, pytest.param(None, marks=pytest.mark.soak)])
 def test_all_that_is_shipped_is_valid(check, most, monkeypatch):
-    """Of each part of a study the first cell is built, or every one of hundreds."""
+    """Builds the first cell of each part of a study, or every one of hundreds."""
     for name in ("levels_of_cells", "_repeats_of", "to_rehearse"):
         every = getattr(cell_grid, name)
         monkeypatch.setattr(cell_grid, name, lambda *of, every=every: [*every(*of)][:most])

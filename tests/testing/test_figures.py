@@ -1,4 +1,4 @@
-"""What every figure promises: kept by those that are shipped, missed by the bad ones."""
+"""Promises of figures: kept by the shipped ones, missed by the bad ones."""
 
 import itertools
 
@@ -170,7 +170,7 @@ def test_a_figure_without_a_way_to_be_drawn_is_refused_in_a_line(tmp_path):
 @pytest.mark.soak
 @pytest.mark.parametrize("figure", SHIPPED, ids=lambda figure: figure.name)
 def test_every_figure_that_is_shipped_keeps_its_promises(figure):
-    """Of every model's results, and of one rare kind each; the long search takes all kinds."""
+    """Takes results of every model, and one rare kind each; the long search takes all kinds."""
     usual = {shape.model: name for name, shape in reversed(SHAPES.items())}
     rare = [name for name in SHAPES if name not in usual.values()]
     taken = rare if LONGER > 1 else [rare[SHIPPED.index(figure) % len(rare)]]

@@ -161,7 +161,7 @@ def recorded(tmp_path_factory):
 
 
 def filtered(recorded, out, *, metadata=True, attachments=True, without=()):
-    """The same file through another program, which leaves some of it out."""
+    """Copy of a recording by another program, which leaves some of it out."""
     with recorded.open("rb") as file, out.open("wb") as target:
         reader, writer = make_reader(file), Writer(target)
         writer.start(profile="", library="filter 1.0")

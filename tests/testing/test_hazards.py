@@ -1,4 +1,4 @@
-"""What every hazard promises: kept by all that are shipped, missed by the bad ones."""
+"""Promises of hazards: kept by the shipped ones, missed by the bad ones."""
 
 import itertools
 import math

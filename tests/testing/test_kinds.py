@@ -1,4 +1,4 @@
-"""What users may bring, tried in test suites of their own: one entry for each kind."""
+"""Checks for users' own test suites: one entry for each kind of plug-in."""
 
 import pytest
 from helpers.wording import unnamed

@@ -1,4 +1,4 @@
-"""What every way of steering promises: kept by those that are shipped, missed by bad ones."""
+"""Promises of operator strategies: kept by the shipped ones, missed by bad ones."""
 
 import itertools
 import math

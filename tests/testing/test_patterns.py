@@ -1,4 +1,4 @@
-"""What every messaging pattern promises: kept by all that are shipped, missed by the bad ones."""
+"""Promises of messaging patterns: kept by the shipped ones, missed by the bad ones."""
 
 import itertools
 from typing import Any

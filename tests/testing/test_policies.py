@@ -1,4 +1,4 @@
-"""What every policy promises: kept by all that are shipped, and missed by the bad ones here."""
+"""Promises of policies: kept by the shipped ones, missed by the bad ones here."""
 
 import random
 import time
@@ -64,7 +64,7 @@ def by_own_luck(self, situation, rng):
 
 
 def every_robot_goes(self, situation, rng):
-    """To the task of its own place in the list, whoever may drive it."""
+    """Sends each robot to the task with its own index, regardless of its driver."""
     robots = [who for who, what in enumerate(situation.responders) if what.kind == "robot"]
     pairs = zip(range(len(situation.tasks)), robots, strict=False)
     return [Assignment(task, who) for task, who in pairs if situation.eta[task, who] < np.inf]

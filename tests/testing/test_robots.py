@@ -1,4 +1,4 @@
-"""What every robot's motors promise: kept by all that are shipped, missed by the bad ones here."""
+"""Promises of robot motors: kept by the shipped ones, missed by the bad ones here."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""What every filter and mapping promises: kept by all that are shipped, missed by the bad ones."""
+"""Promises of filters and mappings: kept by the shipped ones, missed by the bad ones."""
 
 import math
 

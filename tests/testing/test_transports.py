@@ -1,4 +1,4 @@
-"""What every transport promises: kept by those that are shipped, missed by the bad ones."""
+"""Promises of transports: kept by the shipped ones, missed by the bad ones."""
 
 import time
 

@@ -35,12 +35,12 @@ def burning(x, y, radius):
 
 
 def changed(a, b):
-    """Where two pictures differ: rows and columns."""
+    """Rows and columns where two pictures differ."""
     return np.nonzero(np.abs(a.astype(int) - b.astype(int)).max(axis=2) > 12)
 
 
 def air(value):
-    """The same everywhere in the hall."""
+    """Uniform raster over the hall."""
     return Raster(np.full((20, 40), value), (0.0, 20.0, 0.0, 10.0), "")
 
 

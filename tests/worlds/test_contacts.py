@@ -1,4 +1,4 @@
-"""What counts as a contact, when a robot is jammed, and how it gets free."""
+"""Contacts: what counts as one, when a robot is jammed, and how it gets free."""
 
 import math
 

@@ -19,7 +19,7 @@ def sides(walls):
 
 
 def far(a, b):
-    """How far two lists of things of numbers are apart at most [m, rad]."""
+    """Largest difference between two lists of poses [m, rad]."""
     return max(np.abs(np.subtract(x[:3], y[:3])).max() for x, y in zip(a, b, strict=True))
 
 

@@ -31,7 +31,7 @@ def holed(kind, outer=None, **properties):
 
 
 def mistake(tmp_path, *features, **members):
-    """What is told of a plan, which has some members besides its features."""
+    """Error of a plan with these features and members."""
     folder = tmp_path / "mistaken"
     folder.mkdir()
     path = write_site(folder, list(features))
@@ -96,7 +96,7 @@ def test_a_site_with_holes_is_written_as_it_is_read(tmp_path):
 
 
 def multiple(drawn, *others):
-    """The same as one of several parts."""
+    """Geometry made one of several parts."""
     shape = drawn["geometry"]
     parts = [each["geometry"]["coordinates"] for each in (drawn, *others)]
     return drawn | {"geometry": {"type": f"Multi{shape['type']}", "coordinates": parts}}

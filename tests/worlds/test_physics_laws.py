@@ -95,7 +95,7 @@ def test_the_floor_changes_a_velocity_by_no_more_than_mu_g_dt_whatever_is_asked(
 
 
 def ends(spec, grip):
-    """Where a robot gets by hard starts, stops and curves, on a floor of that grip."""
+    """Final poses after hard starts, stops and curves, on a floor of that grip."""
     world, robot = on_floor(grip, spec, dt=0.04)
     rng = np.random.default_rng(3)
     for _ in range(40):

@@ -69,7 +69,7 @@ class PlainWorld:
 
 
 def push_robot(body, wanted, wanted_spin):
-    """What its motors do; whether it is asked to stand, and does."""
+    """Motor force and torque; brakes if the robot is to stand."""
     velocity, spin = body.velocity, body.angular_velocity
     angle = body.angle + spin * DT
     cos, sin = math.cos(angle), math.sin(angle)
@@ -103,7 +103,7 @@ def push_person(body, wanted):
 
 
 def scene():
-    """Where six robots and four people begin."""
+    """Start poses of six robots and four people."""
     across, up = (0.8, 2.0, 3.8, 7.5), (1.1, 3.2, 7.0)
     places = [(across[n % 4], up[n // 4], 0.7 * n) for n in range(10)]
     return places[:6], places[6:]

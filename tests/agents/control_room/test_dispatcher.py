@@ -92,7 +92,7 @@ def test_the_same_seed_makes_the_same_decisions():
 
 
 def test_its_delays_are_no_luck_of_anybody_else():
-    """Whoever is there, everybody else draws the same numbers."""
+    """The other people draw the same numbers with or without a dispatcher."""
     alone = simulate(build({**TEAM, "events": [ALARM], "horizon_s": 60.0}, {}), seed=3)
     room = played("automatic")
     assert alone.events[0].times["assigned"] == room.events[0].times["assigned"]

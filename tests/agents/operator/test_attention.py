@@ -1,4 +1,4 @@
-"""Which of several robots one person looks at."""
+"""Attention: choosing one of several robots to look at."""
 
 from dataclasses import dataclass, field
 from itertools import pairwise, repeat

@@ -1,4 +1,4 @@
-"""How the phone's app sends commands."""
+"""Command sending by the phone's app."""
 
 import math
 
@@ -161,7 +161,7 @@ class Ages(Recorder):
 
 
 def sent_while(pattern: Pattern, **settings: object) -> tuple[list[float], list[float]]:
-    """When an app as printed sends in 20 s to a robot that answers after 1 s, and how old [s]."""
+    """Send times and ages of commands [s], from an app as printed and a robot that takes 1 s."""
     data = {"filter": "median20-copy", "send": "on_change", "values_at": "sample", **settings}
     network, says, recorder = small_network(), Outbox(ROBOT), Ages()
     phone = small_phone(validate(PhoneProfile, data))
@@ -188,7 +188,7 @@ def sent_while(pattern: Pattern, **settings: object) -> tuple[list[float], list[
     [("take", 1.0), ("drop", 1.0 + 17.5 / 34.0), ("queue", 1.0)],
 )
 def test_an_app_that_sends_within_its_callback_sends_after_the_reply(while_open, period):
-    """Dropped, samples begin anew after the reply; queued, the next 20 have come already."""
+    """Dropped samples restart after the reply; queued ones have the next 20 ready."""
     times, ages = sent_while(ReqRep(), while_open=while_open)
     assert np.median(np.diff(times)) == pytest.approx(period, abs=0.06)
     assert (max(ages) > 4.0) == (while_open == "queue")

@@ -1,4 +1,4 @@
-"""What a person comes to know of the delay, from what it did and what it sees alone."""
+"""Delay estimates of a person, from its own actions and from what it sees."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from dva_sim.agents.operator.delay_estimation import DelayEstimate
 def learn(
     guess: DelayEstimate, delay: float, seconds: float, frame: float, size: float = 0.5
 ) -> float:
-    """What is guessed after seeing, `delay` [s] later, something new asked for every second."""
+    """Estimate after a new command every second, each seen `delay` [s] later."""
     asked = np.random.default_rng(1).uniform(0.0, size, round(seconds) + 1)
     for now in np.arange(0.0, seconds, frame).tolist():
         then = now - delay
@@ -59,7 +59,7 @@ def test_a_delay_that_changes_is_learnt_anew_within_half_a_minute():
 
 
 def learns_a_jump_after(frames_per_second: float, luck: int) -> float:
-    """How long until a delay that went from 1 to 3 s is taken to be that, within 0.35 s [s].
+    """Time until a delay that rose from 1 to 3 s is estimated within 0.35 s [s].
 
     New speeds and turn rates are asked for every two seconds on average.
     """

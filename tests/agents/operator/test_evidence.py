@@ -1,4 +1,4 @@
-"""When a person is sure: against what is known in closed form of a sum of evidence.
+"""Decision times of a person, against closed forms for a sum of evidence.
 
 A sum that is never below nothing, with drift m and variance 1 a second, reaches the level a after
     m > 0: a/m - (1 - exp(-2 m a)) / (2 m^2)
@@ -37,7 +37,7 @@ def until_sure(
     sensitivity: float = SENSITIVITY,
     at_most: float = math.inf,
 ) -> float:
-    """How long a person looks until it is sure [s]; infinite if it never is."""
+    """Time that a person looks until it is sure [s]; infinite if it never is."""
     evidence, now = Evidence(sensitivity, look, normals(seed), HABITS), 0.0
     while not evidence.sure:
         now += 1.0 / rate

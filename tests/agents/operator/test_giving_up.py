@@ -1,4 +1,4 @@
-"""When a link counts as lost and when a person gives up, by whatever pattern commands travel."""
+"""Lost links and giving up, with every messaging pattern."""
 
 import pytest
 from helpers.dva.scripted_dva import EAST, ROBOT, PretendedDva, driving
@@ -29,7 +29,7 @@ STRATEGIES = ("pursuit", "move_and_wait")
 
 
 def lost_after(dva: PretendedDva, log: DriveLog) -> tuple[str, float]:
-    """How the drive ends, and how long that takes [s]."""
+    """Outcome of the drive, and the time until then [s]."""
     now = dva.now
     dva.run_until(lambda: log.ended is not None, limit=120.0)
     assert log.ended is not None
@@ -91,7 +91,7 @@ def test_who_gets_no_nearer_gives_up_when_its_patience_ends():
 
 
 def test_a_robot_gets_nearer_whatever_its_strategy_asks_of_the_way(tmp_path):
-    """Who steers by places alone never asks the route where it is on it."""
+    """A strategy that steers by positions alone never asks the route where it is."""
     path = tmp_path / "mine.py"
     path.write_text(BY_PLACES)
     changes = {"operator.strategy": f"{path}:Mine", "operator.traits": {"patience_s": 20.0}}

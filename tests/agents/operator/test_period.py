@@ -1,4 +1,4 @@
-"""What a person learns of how often commands get through, from when its moves take effect."""
+"""Learning how often commands get through, from the times when moves take effect."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ DELAY = 1.0  # [s]
 
 
 def learnt(period, lasts, moves=12, rest=6.0):
-    """What is learnt from some moves, if a command gets through every so often [s]."""
+    """Estimate after some moves, if a command gets through once per period [s]."""
     estimate, step, offset = PeriodEstimate(DelayHabits()), 0.05, 0.37
     for n in range(round(moves * (lasts + rest + offset) / step)):
         now = n * step

@@ -1,4 +1,4 @@
-"""How strategies steer, in closed loops where what is asked for happens exactly, a delay later."""
+"""Strategies in closed loops, where commands take effect exactly, one delay later."""
 
 import math
 from dataclasses import replace

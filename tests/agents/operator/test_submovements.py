@@ -30,7 +30,7 @@ def seen(x, target=0.1, tolerance=0.005):
 
 
 def moved(person, dead, seconds, noise=0.0):
-    """Where the hand is, if the picture shows it so much later [m]."""
+    """Positions of a hand whose picture is late by `dead` [m]."""
     aims, place, speed = Submovements(person, most=2.0), 0.0, 0.0
     shown, late = [0.0] * (round(dead / FRAME) + 1), round(dead / FRAME)
     keep, delay = math.exp(-FRAME / person.hand_lag), dead + person.hand_lag

@@ -21,7 +21,7 @@ def operator(dva: PretendedDva) -> OperatorAgent:
 
 
 def fire(dva: PretendedDva) -> tuple[float, float]:
-    """Where it really burns."""
+    """True position of the fire."""
     return dva.field.incidents[0].hazard.position
 
 

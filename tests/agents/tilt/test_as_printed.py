@@ -24,7 +24,7 @@ def printed(name: str, **changes: object) -> PhoneProfile:
 
 
 def felt(level: float, turn: float) -> tuple[float, float, float]:
-    """What a part measures of a tilt that reads so [m/s^2]."""
+    """Acceleration of a tilt with these readings [m/s^2]."""
     return 0.35 * level, 0.12 * turn, 9.8
 
 
@@ -58,7 +58,7 @@ def by_the_listing(takes: float, queues: bool, max_delay: float = 0.5) -> list[t
 
 
 def by_our_app(profile: PhoneProfile, takes: float) -> list[tuple[float, ...]]:
-    """The same of our app, driven as the sender drives it."""
+    """Commands of our app, driven as the sender drives it."""
     app, sent, free = MeasuredTilt(profile, (0.0, 0.0, 9.8), 1.0 / RATE), [], math.inf
     app.pick_up(0.0)
 

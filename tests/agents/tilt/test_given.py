@@ -65,7 +65,7 @@ def test_an_ideal_phone_passes_it_on_at_once():
 
 
 def test_samples_from_outside_take_the_same_way():
-    """As a real phone would tell them: raw, each with its own time."""
+    """Samples arrive as from a real phone: raw, each with its own time."""
     app = TiltApp(PhoneProfile(), (0.0, 0.0, GRAVITY), 0.02)
     app.pick_up(0.0)
     for n in range(1, 20):

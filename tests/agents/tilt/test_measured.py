@@ -37,7 +37,7 @@ class Recorded(Phone):
 
 
 def commands(app, feed, ask):
-    """What an app says in ten seconds, looked at when it wants to be."""
+    """Commands of an app in ten seconds, read whenever it asks to be."""
     now, said = 0.0, []
     while now < 10.0:
         feed(now)

@@ -21,7 +21,7 @@ def stream(seconds, *, hz=60.0, fast=0.0, jitter=0.02, least=0.003, seed=1):
 
 
 def errors(samples):
-    """By how much each time that is told is after the true one [s]."""
+    """Lateness of each converted time [s]."""
     clock = PhoneClock()
     return [clock.times_of([told], came)[0] - true for true, told, came in samples]
 

@@ -1,4 +1,4 @@
-"""A scenario names the stages of its phones; what it names wrongly is told before anything runs."""
+"""Stages of phones named by a scenario; wrong names are reported before anything runs."""
 
 import pytest
 from helpers.wording import unnamed

@@ -29,7 +29,7 @@ def number(page: AttachedPage, label: str) -> int:
 
 
 def said_by(page: AttachedPage) -> list[bytes]:
-    """What the console's own control room has sent."""
+    """Messages sent by the console's own control room."""
     return [data for source, _, data in page.world.heard if source == OWN]
 
 

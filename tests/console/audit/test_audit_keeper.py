@@ -23,7 +23,7 @@ def keeper(tmp_path: Path) -> Iterator[AuditKeeper]:
 
 
 def told(keeper: AuditKeeper, action: str) -> list[str]:
-    """What one is told of an action: an empty text when it is on the disk."""
+    """Result of keeping an action: an empty text once it is on disk."""
     said: list[str] = []
     keeper.put(keeper.entry(action, "ana"), said.append)
     assert becomes(lambda: keeper.take() or said)

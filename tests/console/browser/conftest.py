@@ -27,7 +27,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 class World(NamedTuple):
-    """Where a world is shown.
+    """Addresses of a running console.
 
     Attributes:
         drive: Address with the token for driving.
@@ -229,7 +229,7 @@ def shared(_tabs: Tabs, request: pytest.FixtureRequest) -> Iterator[Callable[...
 
 @pytest.fixture
 def visits(browser: Browser) -> Iterator[Callable[..., Visit]]:
-    """As many browsers as are asked for; none may have complained in the end."""
+    """Open any number of browsers; in the end none may have logged an error."""
     made: list[Visit] = []
 
     def visit(width: int = 1280, height: int = 800, **options: Any) -> Visit:

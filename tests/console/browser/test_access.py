@@ -1,4 +1,4 @@
-"""Who gets in, what a foreign page reaches, and what is said when the world is gone."""
+"""Access to the page: entry, foreign pages, and the message when the world has ended."""
 
 import http.server
 import threading

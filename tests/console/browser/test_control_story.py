@@ -44,7 +44,7 @@ def fire_in_hand(page: Page) -> None:
 
 
 def in_order(wanted: tuple[str, ...] | tuple[bytes, ...], said: list[str] | list[bytes]) -> None:
-    """What is wanted is said, each after the one before."""
+    """Assert that the wanted texts occur in this order."""
     at = -1
     for one in wanted:
         found = (n for n, text in enumerate(said) if n > at and one in text)

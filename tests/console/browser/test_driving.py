@@ -59,12 +59,12 @@ def dragged(page: Page, slider: Locator) -> tuple[float, float, float]:
 
 
 def inputs(page: Page) -> list[dict[str, object]]:
-    """What was steered so far."""
+    """Steering input sent so far."""
     return [line for line in page.evaluate("window.sent") if line.get("do") == "input"]
 
 
 def actions(page: Page) -> list[str]:
-    """What was asked for so far."""
+    """Actions requested so far."""
     return [line["do"] for line in page.evaluate("window.sent") if line.get("do") != "ping"]
 
 

@@ -78,7 +78,7 @@ def test_of_two_who_decide_at_once_the_second_is_told_and_changes_nothing(fake, 
     deaf: list[bool] = []
 
     def between(ws: WebSocketRoute) -> None:
-        """What the world says does not reach the second page while it is deaf."""
+        """Drop messages to the second page while it is deaf."""
         server = ws.connect_to_server()
         server.on_message(lambda text: None if deaf else ws.send(text))
 

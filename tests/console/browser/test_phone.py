@@ -172,7 +172,7 @@ def test_a_socket_that_is_cut_in_mid_drive_ends_it(hand):
 
 
 def test_a_connection_that_hangs_is_lost_after_three_attempts_and_the_robot_is_kept(hand):
-    """As in a tunnel: nothing comes and nothing goes, and no socket says that it is closed."""
+    """Simulates a tunnel: no data in either direction, and no socket reports a close."""
     hand.drive()
     hand.page.evaluate("window.hangs = true")
     hand.alert("link lost")
@@ -403,7 +403,7 @@ def test_a_hostile_label_is_shown_as_text(fake, visits):
 
 
 def test_by_https_the_page_is_secure_and_its_sensor_works(world, visits):
-    """With a certificate that the browser is told to take; curl and Python verify it elsewhere."""
+    """The browser is made to accept the certificate; curl and Python verify it elsewhere."""
     hand = Hand(visits(**SCREEN, ignore_https_errors=True), world.phones)
     assert hand.page.url.startswith("https://")
     assert "token" not in hand.page.url

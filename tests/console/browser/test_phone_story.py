@@ -27,7 +27,7 @@ def programs(tmp_path: Path, monkeypatch) -> Iterator[Programs]:
 
 
 def mode(hand: Hand) -> str:
-    """Of the robot, as everybody is told."""
+    """Mode of the robot, as published."""
     robots = hand.page.evaluate(STATE)["robots"]
     return str(next(one["mode"] for one in robots if one["label"] == ROBOT))
 

@@ -18,7 +18,7 @@ QUIET = "--set", "guard.count=0", "--set", "bystander.count=0", "--set", "operat
 
 @pytest.fixture(scope="module")
 def addresses(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[str]]:
-    """Of a console on modelled links, for driving and for looking."""
+    """Addresses of a console on modelled links, for driving and for looking."""
     for programs in all_gone_after(tmp_path_factory.mktemp("consoles")):
         console, drive = started(programs, *QUIET)
         console.wait_to_say("Look only:")

@@ -43,7 +43,7 @@ def devices(page):
 
 
 def asked_of(page, device, peer, body):
-    """What came of a request: a reply, or None for a time-out."""
+    """Result of a request: the reply, or None for a time-out."""
     ends = []
     device.ask(peer, body, ends.append, lambda: ends.append(None))
     page.until(lambda: ends, PATIENCE_S, 0.05)

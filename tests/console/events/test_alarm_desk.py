@@ -1,4 +1,4 @@
-"""What in a run becomes an alarm: open events, escalations, robots lost in drive, nobody left."""
+"""Alarms of a run: open events, escalations, robots lost in a drive, nobody left."""
 
 from typing import Any
 

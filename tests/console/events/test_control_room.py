@@ -38,7 +38,7 @@ def fire(one: PhonePage) -> None:
 
 
 def events(one: PhonePage) -> list[dict[str, Any]]:
-    """What a page is told of events."""
+    """Events as a page receives them."""
     told = one.told("events")
     return list(told[-1]["events"]) if told else []
 
@@ -93,7 +93,7 @@ def test_what_is_under_way_is_answered_though_its_person_takes_another_name(room
 
 
 def left(one: PhonePage, label: str) -> bool:
-    """Whether a device has left."""
+    """True if a device has left."""
     return all(d.silent for d in one.world.run.stage.devices if d.label == label)
 
 
@@ -290,7 +290,7 @@ def test_every_message_of_a_control_room_keeps_the_schema(room):
 
 @pytest.fixture
 def logged(room: PhonePage, tmp_path: Path) -> Iterator[PhonePage]:
-    """The same, with an audit log."""
+    """Room with an audit log."""
     keeper = AuditKeeper(tmp_path / "audit.sqlite", lambda: room.world.clock.now, {})
     room.world.keep_audit(keeper)
     room.world.clock.every(0.05, keeper.take)

@@ -21,7 +21,7 @@ def driving(page):
 
 
 def kinds(page, to):
-    """What a phone has said to somebody, in its order, each kind once in a row."""
+    """Kinds of the messages from a phone to one receiver, in order, without repeats."""
     said = [
         data
         for source, there, data in page.heard

@@ -1,4 +1,4 @@
-"""A robot's windows in a run: what they are told, manual control from a page, faults on demand."""
+"""A robot's windows in a run: their messages, manual control from a page, faults on demand."""
 
 import pytest
 from helpers.console.simulated_console import Page
@@ -26,7 +26,7 @@ def window(page):
 
 
 def by_hand(page, speed=0.0, turn=0.0, held=True, seconds=1.0, client="c1"):
-    """What a page that holds on says, as often as it does."""
+    """Send the input of a held page at its usual rate."""
     for n in range(round(seconds / 0.05)):
         line = {"client": client, "do": "manual", "n": n, "speed": speed, "turn": turn}
         page.actions.take({**line, "held": held})

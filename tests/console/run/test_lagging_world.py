@@ -1,4 +1,4 @@
-"""A world in real time whose machine cannot keep up: robots stop, and the page is told why."""
+"""Real-time world on a machine that cannot keep up: robots stop, and the page says why."""
 
 import time
 
@@ -26,7 +26,7 @@ def world():
 
 
 def lets_time_pass(world, until):
-    """Whether something becomes true while the world goes on."""
+    """Run the world until something becomes true; False if it does not."""
 
     def look():
         world.clock.run(world.clock.now + 0.05)

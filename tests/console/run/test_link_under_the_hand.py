@@ -10,7 +10,7 @@ FAST = {"rate_bps": 1e9}
 
 
 def ages(page, seconds):
-    """Of frames and of commands that come in so long a time [ms]."""
+    """Ages of the frames and commands that arrive within some seconds [ms]."""
     page.let(seconds)
     drive = page.drive()
     log = page.world.recorder.newest_drive[page.robot().device.id_tag]

@@ -1,4 +1,4 @@
-"""Who may do what: decided for each request, before anything else looks at it."""
+"""Access rights: decided for each request, before anything else looks at it."""
 
 import ipaddress
 import socket

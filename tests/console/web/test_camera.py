@@ -42,7 +42,7 @@ def console():
 
 @pytest.fixture(autouse=True)
 def somebody_draws(console):
-    """Whoever draws is silent between tests, and heard again before each."""
+    """Announce a renderer before each test; it is silent between tests."""
     ready(console)
 
 
@@ -81,7 +81,7 @@ class Viewer:
         return headers, picture
 
     def ended(self, wait: bool = True) -> bool:
-        """Whether the server has closed the connection, whatever was sent before."""
+        """True if the server has closed the connection, after any data."""
         try:
             if wait:
                 while self.raw.recv(1 << 16):
@@ -101,7 +101,7 @@ class Viewer:
 
 
 def told(served: Served) -> list[int]:
-    """Whom who draws is told to draw, the next time."""
+    """Robots that the renderer is asked to draw next."""
     assert select.select([served.pictures], [], [], PATIENCE_S)[0]
     lines = served.pictures.recv(1 << 16).splitlines()
     return list(json.loads(lines[-1])["watch"])

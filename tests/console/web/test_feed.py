@@ -1,4 +1,4 @@
-"""What a page gets: the newest of what it lacks, however rarely it asks."""
+"""Feed of a page: the newest of what it lacks, at any polling rate."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""What clients say, read with suspicion; and what of it waits for the simulation."""
+"""Validation of client messages, and the queue of those for the simulation."""
 
 import json
 

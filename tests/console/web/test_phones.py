@@ -205,7 +205,7 @@ def test_a_phone_that_is_gone_stops(console):
 
 
 def test_a_page_that_lost_its_connection_unnoticed_keeps_its_name_and_a_copy_gets_another(console):
-    """As on a change of network: the old connection is dead, and nobody has said so here."""
+    """Simulates a change of network: the old connection is dead but not reported closed."""
     with wss(console, "/ws/state?page=one", console.phone) as old:
         you = json.loads(old.recv(PATIENCE_S))
         name, key = you["client"], you["key"]

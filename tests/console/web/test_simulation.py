@@ -1,4 +1,4 @@
-"""What is known of the simulation, and what is asked of it: alive, hung, ended, and who gets in."""
+"""State of the simulation and requests to it: alive, hung, ended, and access."""
 
 import asyncio
 import json
@@ -17,7 +17,7 @@ from dva_sim.console.wire.limits import MOST_PENDING, SILENCE
 
 
 class Clock:
-    """Time that passes when it is told to [s]."""
+    """Clock that advances on demand [s]."""
 
     def __init__(self) -> None:
         self.now = 100.0
@@ -123,7 +123,7 @@ def test_an_answer_goes_to_all_who_asked_the_same():
 
 
 def test_an_emergency_asked_for_again_and_again_is_answered_by_the_world_alone():
-    """Nobody is told that too much is asked, as if the stop had been refused."""
+    """A busy refusal would look as if the stop had been refused."""
 
     async def story(simulation, clock, end):
         told = []

@@ -1,4 +1,4 @@
-"""What people did at a console is a results folder with the tables of any run."""
+"""Results of people at a console: a results folder with the tables of any run."""
 
 import json
 import re

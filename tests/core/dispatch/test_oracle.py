@@ -1,4 +1,4 @@
-"""What could have been done with knowledge of the future."""
+"""Best possible dispatch with knowledge of the future."""
 
 from itertools import permutations, product
 

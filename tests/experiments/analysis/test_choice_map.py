@@ -1,4 +1,4 @@
-"""Which choice is best in which situation, over models of persons whose losses are known."""
+"""Choice maps: the best choice by situation, over models of persons with known losses."""
 
 from dataclasses import replace
 

@@ -18,7 +18,7 @@ HORIZON_S = 100.0
 
 
 def event(person, line, **how):
-    """Of a run with one event: open until the horizon, unless something else is said."""
+    """Event row of a run with one event, open until the horizon by default."""
     row = {"part": "drive", "cell": LEVELS.index(line), "person": person, "trial": 0}
     row |= {"command.timeout_s": line, "is_reference": False, "is_true": True, "outcome": "open"}
     row |= {"confirmation_s": np.nan, "closing_s": np.nan, "watched_s": HORIZON_S}

@@ -80,7 +80,7 @@ def test_what_lies_in_a_range_is_said_to_vary():
 
 
 def special(**link: Any) -> list[str]:
-    """What is told of a link beyond what is told of a plain one."""
+    """Remarks on a link beyond those on a plain one."""
     told = []
     for changes in ({}, {f"link.{key}": value for key, value in link.items()}):
         scenario = scenarios.build(scenarios.load("drive-to-event"), changes)

@@ -185,14 +185,14 @@ def test_what_is_missing_is_told_beside_what_was_found(comparison):
 
 
 def crashes(job):
-    """Whoever is first never comes to an end."""
+    """Run that never ends for the first person."""
     if job.person == 0:
         raise RuntimeError("fell")
     return cheap(job)
 
 
 def never_arrives(job):
-    """Of whoever is first no time is known, and all others take a second more."""
+    """Run without a time for the first person, and a second longer for all others."""
     tables = cheap(job)
     run = tables["runs"][0]
     run["drive_time_s"] = math.nan if job.person == 0 else run["drive_time_s"] + 1.0

@@ -1,4 +1,4 @@
-"""How many robots one person can serve, against cases with a known answer."""
+"""Number of robots per person, against cases with a known answer."""
 
 from pathlib import Path
 from typing import Any

@@ -183,7 +183,7 @@ def test_an_answer_that_is_not_open_counts_in_a_pilot_only():
 
 
 def test_an_answer_and_a_claim_about_the_same_contrast_need_about_as_many():
-    """One law: as many as the interval that is shown must narrow by, whoever asks."""
+    """Both follow one law: the interval shown has to narrow by the same factor."""
     declared = study(hypotheses={"slow": {"direction": "above"}})
     outlier = runs(persons=8, mean_s=0.0)
     outlier["drive_time_s"][0] += 20.0  # one person waits much longer than all others

@@ -1,4 +1,4 @@
-"""What a results folder may have come to, and what is said of it: one line each time."""
+"""Damaged results folders, each reported in one line."""
 
 import functools
 import os

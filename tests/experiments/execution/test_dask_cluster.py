@@ -1,4 +1,4 @@
-"""Runs on a dask cluster of this machine give the same bytes, and what goes wrong is told."""
+"""Runs on a local dask cluster: the same bytes, and clear errors."""
 
 import signal
 import socket

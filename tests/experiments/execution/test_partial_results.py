@@ -1,4 +1,4 @@
-"""What `show` and `report` tell of a study that is still running, or was interrupted."""
+"""`show` and `report` on studies that are running or were interrupted."""
 
 import json
 import sqlite3

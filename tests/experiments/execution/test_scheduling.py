@@ -1,4 +1,4 @@
-"""How runs are handed out."""
+"""Scheduling of runs to workers."""
 
 import gc
 from collections import defaultdict
@@ -58,7 +58,7 @@ def handed_out(folder: Path, persons: int, episode: Any = kit.cheap) -> list[Seq
 
 
 def parted(chunks: list[Sequence[StudyJob]]) -> int:
-    """How many random seeds are in more than one chunk."""
+    """Number of random seeds in more than one chunk."""
     homes = defaultdict(set)
     for number, chunk in enumerate(chunks):
         for job in chunk:

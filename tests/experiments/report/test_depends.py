@@ -1,4 +1,4 @@
-"""What an answer depends on, told beside it."""
+"""Conditions of an answer, stated beside it."""
 
 import re
 

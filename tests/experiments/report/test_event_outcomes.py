@@ -1,4 +1,4 @@
-"""What became of events is a line of every report, and missed ones are warned of."""
+"""Outcomes of events: a line in every report, and a warning if some were missed."""
 
 import numpy as np
 import pytest

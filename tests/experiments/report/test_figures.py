@@ -49,7 +49,7 @@ NOTHING_ELSE = SimpleNamespace(scenario_of=lambda part: {"command": "unknown"})
 
 
 def with_columns(view, **columns):
-    """The same runs, but for some columns, and none of them a reference."""
+    """Replace some columns of the runs, none of which is a reference."""
     plain = {"is_reference": np.zeros(len(view.part.treated["part"]), bool)}
     part = RunGrid(view.part.treated | plain | columns, "drive", view.part.factors)
     return replace(view, part=part)
@@ -303,7 +303,7 @@ def test_the_tradeoff_needs_an_exposure_that_varies():
 
 
 def of_links(view, count):
-    """The same runs, with links that have names where delays were."""
+    """Runs with named links in place of delays."""
     names = ("ideal", "far", "wifi", "lossy", "narrow", "cellular-at-the-edge")[:count]
     runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
     link = np.array([names[DELAY.levels.index(d)] for d in runs["link.delay_s"].tolist()])
@@ -314,7 +314,7 @@ def of_links(view, count):
 
 
 def of_steps(view):
-    """The same runs, at six delays with equal steps."""
+    """Runs at six equally spaced delays."""
     even = Factor("link.delay_s", tuple(n / 5 for n in range(6)))
     delays = np.searchsorted(DELAY.levels, view.part.treated["link.delay_s"]) / 5
     part = RunGrid(view.part.treated | {"link.delay_s": delays}, "drive", [PATTERN, even, PROFILE])
@@ -322,7 +322,7 @@ def of_steps(view):
 
 
 def joined(axes):
-    """What leads from one of six stops to the next."""
+    """Lines that join the six stops."""
     lines = [line for line in axes.lines if len(line.get_xdata()) == 6]
     return [line for line in lines if line.get_linestyle() == "-"]
 
@@ -536,7 +536,7 @@ def answered(means=(0.0, 5.0, 9.0), **changes):
 
 
 def drawn_answer(found, spread=1.0):
-    """Of persons who differ as widely as the band is, or by a share of that."""
+    """Persons whose spread is the band's width, or a share of it."""
     steps = spread * np.linspace(-1.0, 1.0, found.persons)[:, np.newaxis]
     with styled():
         differences = found.mean + steps * (found.high - found.low) / 2

@@ -32,7 +32,7 @@ def found(tmp_path_factory):
 
 @pytest.fixture
 def kept(found, tmp_path):
-    """The same, and a folder to keep it in."""
+    """Results, and a folder for their answer."""
     return *found, tmp_path / "answers"
 
 

@@ -1,4 +1,4 @@
-"""How runs of designs that are no grid are laid out."""
+"""Layout of designs that form no grid."""
 
 import numpy as np
 from helpers.studies import synthetic_results

@@ -8,7 +8,7 @@ PERSONS = 4
 
 
 def reading(tmp_path, study=None, **facts):
-    """Of a study of four persons, though its file may say that there are six."""
+    """Reading of a study with four persons, although its file says six."""
     whole = synthetic_results.manifest(6, 2, **facts)
     whole["study"] |= study or {}
     rows = [r for r in synthetic_results.drive_rows(PERSONS, 2) if r["profile"] != "dissertation"]

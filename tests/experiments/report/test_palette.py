@@ -159,7 +159,7 @@ def test_policies_and_every_pattern_have_looks_that_no_other_of_them_has():
 
 
 def test_figures_bring_no_colour_of_their_own():
-    """What the tests above say of the palette then holds of all of them."""
+    """Otherwise the tests above would not cover all figures."""
     files = [*ROOM.glob("figures/*.py"), ROOM / "transport_page.py"]
     colour = re.compile(r"#[0-9a-fA-F]{6}\b|cmap=\"|color=\"(?!none)[a-z]+\"")
     named = {path.name for path in files if colour.search(path.read_text(encoding="utf-8"))}

@@ -21,7 +21,7 @@ def results(tmp_path):
 
 
 def prints(test):
-    """Of a test that starts a browser."""
+    """Mark a test that starts a browser."""
     return pytest.mark.system(pytest.mark.skipif(not browser(), reason="no Chromium")(test))
 
 

@@ -22,7 +22,7 @@ def older(tmp_path):
 
 @pytest.fixture
 def unfinished(older):
-    """As an interrupted study left them: the runs, and neither tables nor manifest."""
+    """Folder of an interrupted study: runs, but neither tables nor manifest."""
     (older / "manifest.json").unlink()
     shutil.rmtree(older / "tables")
     return older

@@ -1,4 +1,4 @@
-"""What made results: fingerprint of the program, its commit and state, by checkouts made here."""
+"""Identity of a program version: fingerprint, commit and state, in checkouts made here."""
 
 from pathlib import Path
 

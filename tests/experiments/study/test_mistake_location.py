@@ -1,4 +1,4 @@
-"""Where a mistake is told: at the `--set` that makes it, at its key, or in its file."""
+"""Location of mistakes: the `--set` that makes them, their key, or their file."""
 
 import pytest
 from helpers.studies.small_study import STUDY, write_study

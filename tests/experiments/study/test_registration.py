@@ -1,4 +1,4 @@
-"""Registered studies: new luck, nothing changed unseen, and every liberty named."""
+"""Registered studies: new random numbers, no unseen change, and every liberty named."""
 
 import re
 from pathlib import Path

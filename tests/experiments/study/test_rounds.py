@@ -16,7 +16,7 @@ TEXT = kit.STUDY + STOP + "most_persons: 40}\n"
 
 
 def steady(job: StudyJob) -> kit.Tables:
-    """Anything up to a second longer than the reference run, whoever drives."""
+    """Run up to a second longer than the reference run, for any person."""
     return {"runs": [{"drive_time_s": 0.0 if job.is_reference else (job.seed % 1000) / 1000}]}
 
 

@@ -1,4 +1,4 @@
-"""When a study stops: decided on whole batches, in seed order, on what was measured."""
+"""Stopping rule of a study: whole batches, in seed order, on measured values."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Which measures a scenario can have, and what comes of one that its runs do not hold."""
+"""Measures that a scenario can have, and measures that its runs lack."""
 
 from functools import partial
 

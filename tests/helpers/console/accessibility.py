@@ -1,4 +1,4 @@
-"""What axe-core finds wrong with a page for those who see, hear or move otherwise."""
+"""Accessibility faults of a page, found by axe-core."""
 
 import json
 
@@ -10,7 +10,7 @@ RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"
 
 
 def faults(page: Page) -> list[str]:
-    """What axe-core holds to be serious, or worse."""
+    """Faults that axe-core calls serious or worse."""
     page.evaluate(AXE)
     options = json.dumps(
         {"runOnly": {"type": "tag", "values": RULES}, "resultTypes": ["violations"]}

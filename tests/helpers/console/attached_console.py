@@ -78,7 +78,7 @@ class AttachedPage:
         raise AssertionError(f"{what}: no answer within {within} s")
 
     def events(self) -> list[dict[str, Any]]:
-        """As the page is told of them now."""
+        """Events as the page shows them now."""
         told = self.told("events")
         return list(told[-1]["events"]) if told else []
 

@@ -67,7 +67,7 @@ class Hand:
         expect(self.page.get_by_role("heading", name=screen, level=1)).to_be_visible()
 
     def sent(self, what: str) -> list[dict[str, Any]]:
-        """What the page has asked for."""
+        """Requests of one kind that the page has sent."""
         return [line for line in self.page.evaluate("window.sent") if line.get("do") == what]
 
     def status(self, name: str) -> Any:

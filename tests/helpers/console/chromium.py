@@ -25,7 +25,7 @@ MISSING = "tests in a browser need Chromium: make tools (make test leaves them o
 
 
 def installed() -> str:
-    """Where it is.
+    """Path of the browser.
 
     Raises:
         SystemExit: nowhere.

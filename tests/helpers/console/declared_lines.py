@@ -51,7 +51,7 @@ def checked(line: Mapping[str, Any], declared: Any = lines.Told) -> dict[str, An
 
 
 def at_page(told: Iterable[Mapping[str, Any]], client: str) -> list[dict[str, Any]]:
-    """What the web process makes of lines for one page that looks at all there is."""
+    """Messages of the web process to one page that looks at everything."""
     state, messages = RunState(), []
     feed = PageFeed(state, client)
     for line in told:

@@ -43,7 +43,7 @@ class Driver:
         return found
 
     def pose(self) -> tuple[float, float, float]:
-        """Where the robot is, and where it heads for."""
+        """Position and heading of the robot."""
         rows = self.state()["robots"]
         row = next(row for row in rows if row["label"] == self._robot)
         return row["x_m"], row["y_m"], row["heading_rad"]
@@ -77,7 +77,7 @@ class Driver:
             self._press({"ArrowUp"}, min(LONGEST_S, max(0.2, far / 0.5)))
 
     def _is_free(self, here: tuple[float, float], there: tuple[float, float]) -> bool:
-        """Whether one may go straight there, a little off the line as well."""
+        """True if a straight path with some clearance is free."""
         steps = max(2, int(math.dist(here, there) / STEP))
         room = self._planner.room_at(np.linspace(here, there, steps))
         least = min(ROOM, float(room[0]), float(room[-1]))

@@ -34,7 +34,7 @@ OF_THE_WEB = ("you", "pong", "pictures", "bye", "d")  # lines that it makes itse
 
 
 class Answer(NamedTuple):
-    """What came back for a request."""
+    """Response to a request."""
 
     status: int
     headers: dict[str, str]
@@ -132,7 +132,7 @@ class Served:
         return found
 
     def acted(self) -> list[Line]:
-        """The same without what pages look at."""
+        """Lines so far, except those that select views."""
         return [line for line in self.asked_so_far() if line["do"] != "watch"]
 
     def answering(self, kind: str, ask: Callable[..., Answer], *words: Any, **done: Any) -> Any:

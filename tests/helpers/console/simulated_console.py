@@ -34,7 +34,7 @@ class VirtualPace(PacedClock):
 
 
 class Page:
-    """What a page would do, and what it is told.
+    """Actions of a page, and the lines it receives.
 
     Args:
         measured: Whether what happens is kept for tables.

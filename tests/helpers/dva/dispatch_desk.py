@@ -37,7 +37,7 @@ def east(metres: float) -> m.Position:
 
 
 def crow(starts: Sequence[Start], goals: Sequence[m.Position]) -> tuple[Floats, Floats]:
-    """As the crow flies, along the one street there is."""
+    """Straight-line distances along the only street."""
     at = np.array([s.position.longitude for s in starts])
     to = np.array([goal.longitude for goal in goals])
     distance = np.abs(to[:, None] - at[None, :]) * DEGREE_EAST
@@ -219,5 +219,5 @@ class Office:
 
     @property
     def working(self) -> dict[str, int]:
-        """Who works on which event."""
+        """Current event of each busy device."""
         return {name: event.number for name, event in self.desk.orders.engaged.pairs()}

@@ -53,7 +53,7 @@ def cover(eta, reach, demand, bound_for=()):
 
 
 def pairs(policy, seen):
-    """Who is sent where: (task, responder)."""
+    """Assignments as pairs (task, responder)."""
     advice = policy.advise(seen, RNG)
     return [(a.task, a.responder) for a in advice if isinstance(a, Assignment)]
 

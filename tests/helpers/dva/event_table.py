@@ -110,7 +110,7 @@ _FINDINGS = {"CONFIRM": "confirmed", "REFUTE": "refuted", "CONTAIN": "contained"
 
 
 def outcome(state: str, what: str, late: bool, last: bool) -> tuple[str, ...]:
-    """What becomes of an event, in the words of the model; empty: nothing changes."""
+    """Transition of an event, in the words of the model; empty if nothing changes."""
     case = Case()
     case.into(state)
     assert case.state == state, (case.state, state)

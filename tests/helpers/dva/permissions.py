@@ -7,7 +7,7 @@ from dva_sim.protocol import messages as m
 
 
 def confirmation(grant: m.PermissionGrant | None) -> m.Reply:
-    """What the DVA answers a robot that asks who holds it."""
+    """Reply of the DVA to a robot's inquiry about its holder."""
     if grant is None:
         return m.Reply(1, m.NOT_PERMITTED, "nobody holds it")
     told = m.Permission(grant.holder, grant.level, grant.session, grant.address, grant.sensors)

@@ -359,7 +359,7 @@ class Walk:
     # --- when all is well again --------------------------------------------------------
 
     def recover(self) -> float:
-        """Everybody does what it is told from now on; how long until no event is open [s]."""
+        """Let everybody obey; returns the time until no event is open [s]."""
         began, left = self.now, len(self.desk.book.open)
         self.in_flight.clear()
         for device in DEVICES:

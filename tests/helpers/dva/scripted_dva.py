@@ -1,4 +1,4 @@
-"""A DVA that says what a test wants it to say, and notes what it is told, in virtual time."""
+"""Scripted DVA in virtual time: sends what a test wants, and notes what it receives."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -45,7 +45,7 @@ Point = tuple[float, float]
 
 
 class Told(NamedTuple):
-    """What the DVA was told: when [s], by whom, and what."""
+    """Message received by the DVA: time [s], sender and body."""
 
     time: float
     source: str
@@ -175,7 +175,7 @@ class PretendedDva:
         return m.Position(*self.stage.site.frame.to_latlon(*place))
 
     def progress(self, event: int) -> list[str]:
-        """What was told of an event: states of the order, and findings, in this order."""
+        """States of the order and findings reported for an event, in order."""
         return [
             told.body.state if isinstance(told.body, m.OrderProgress) else told.body.finding
             for told in self.told
@@ -184,7 +184,7 @@ class PretendedDva:
         ]
 
     def when(self, event: int, word: str) -> float:
-        """When a state or finding of an event was told first [s]."""
+        """Time of the first report of a state or finding of an event [s]."""
         return next(
             told.time
             for told in self.told
@@ -214,7 +214,7 @@ class PretendedDva:
         return m.Reply(message.message_id, m.OK, "")
 
     def _permit(self, holder: str, body: m.PermissionRequest) -> m.Permission:
-        """As the real one: who asks again for what it holds gets the same session."""
+        """Grant as the real DVA does: a repeated request gets the same session."""
         held = self.sessions.get(body.device)
         if held is None:
             self._last_session += 1

@@ -95,7 +95,7 @@ def _deliver(robot: RobotController, kind: str, facts: Facts) -> tuple[int, bool
 
 
 def outcome(state: str, kind: str, facts: Facts) -> tuple[str, ...]:
-    """What the controller does with a message, in the words of the model; empty: nothing."""
+    """Reaction of the controller, in the words of the model; empty if none."""
     robot = robot_in(state)
     drove, grant = robot.owner, robot.grant
     code, moves = _deliver(robot, kind, facts)

@@ -67,7 +67,7 @@ def nasty_value(data: bytes, rng: Random) -> bytes:
 
 
 def value_rewritten(data: bytes, rng: Random) -> bytes:
-    """The same value, or nearly: zeros, signs, exponents, space, references."""
+    """Rewrite a value to an equal or similar one: zeros, signs, exponents, space, references."""
     start, end = _a_value(data, rng)
     old = data[start:end]
     at = rng.randrange(len(old) + 1)

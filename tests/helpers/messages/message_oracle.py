@@ -1,4 +1,4 @@
-"""What the specification says about bytes, read without the codec: tree, rules, schema, values."""
+"""Independent reading of messages by the specification: tree, rules, schema, values."""
 
 import math
 import re
@@ -94,7 +94,7 @@ def _plain(root: etree._Element) -> bool:
 
 
 def says(root: etree._Element, message: m.Message) -> bool:
-    """Whether the tree says exactly what the message holds: names, order, values."""
+    """True if the tree holds exactly the message's names and values, in order."""
     kind, body = root[0], message.body
     header = [(name, getattr(message, name)) for name in ("destination", "message_id", "source")]
     header = [(NAMES[name], value) for name, value in header]
@@ -143,7 +143,7 @@ def _has_parts(value: Any) -> bool:
 
 
 def _names(value: Any) -> tuple[str, ...]:
-    """Of the parts of a message, or of a part of one."""
+    """Field names of a message or of a part."""
     return tuple(f.name for f in fields(value)) if is_dataclass(value) else value._fields
 
 
@@ -156,7 +156,7 @@ def _tag(name: str, value: Any) -> str:
 
 
 def same_value(text: str, value: str | int | float) -> bool:
-    """Whether the text is this value, by exact arithmetic; signs of zeros count."""
+    """True if the text is this value, by exact arithmetic; signs of zeros count."""
     if isinstance(value, str):
         return text == value
     text = text.strip(XML_SPACE)
@@ -167,7 +167,7 @@ def same_value(text: str, value: str | int | float) -> bool:
 
 
 def decode_or_refuse(data: bytes) -> m.Message | None:
-    """What `decode` gives; fails where the specification says anything else."""
+    """Decode, or return None; fails where the specification disagrees."""
     tree = judged(data)
     try:
         decoded = decode(data)

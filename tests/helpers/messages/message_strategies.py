@@ -71,7 +71,7 @@ SIZES = {"waypoints": (1, 40), "values": (1, 40), "events": (0, 2)}
 
 
 def held(hint: Any, name: str) -> st.SearchStrategy[Any]:
-    """What a field may hold."""
+    """Strategy for the values of a field."""
     if get_origin(hint) is tuple:
         least, most = SIZES.get(name, (0, 3))
         part = held(get_args(hint)[0], name)

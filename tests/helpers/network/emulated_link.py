@@ -1,4 +1,4 @@
-"""What tests of the emulated link need: whether there is one, and who lives because of it."""
+"""Support for tests of the emulated link: availability, and processes it starts."""
 
 import os
 import select
@@ -15,7 +15,7 @@ from dva_sim.validation.network.real_side.cell import EmulatedJob, run_job
 
 @cache
 def missing(rootless: bool = False) -> str:
-    """Why there is no emulated link here; empty where there is one."""
+    """Reason why the emulated link is not available; empty if it is."""
     try:
         run_job(EmulatedJob("nothing", rootless=rootless))
     except EmulatorError as error:
@@ -49,7 +49,7 @@ def networks(*processes: int) -> set[str]:
 
 
 def all_end(handles: list[int]) -> bool:
-    """Whether the processes behind pidfds end before patience does; closes these."""
+    """True if the processes of these pidfds end within patience; closes the pidfds."""
     waiting = set(handles)
     while waiting and (ended := select.select(list(waiting), [], [], PATIENCE_S)[0]):
         waiting -= set(ended)

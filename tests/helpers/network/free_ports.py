@@ -1,4 +1,4 @@
-"""A port for a program that must have the same one again when it is started anew."""
+"""Ports for programs that need the same port again after a restart."""
 
 import random
 import socket

@@ -16,7 +16,7 @@ from dva_sim.simulation.scenario import Scenario
 
 
 class Tape:
-    """What a phone and its person did in a run with one drive, in order."""
+    """Actions of a phone and its person in a run with one drive, in order."""
 
     def __init__(self) -> None:
         self.looks: list[TiltCommand | None] = []
@@ -54,7 +54,7 @@ def taped(scenario: Scenario, seed: int) -> tuple[Tape, Recording]:
 
 
 def replay(scenario: Scenario, seed: int, tape: Tape) -> Recording:
-    """The same run with somebody who neither looks nor tilts, but sends the same."""
+    """Repeat a run with an operator who neither looks nor tilts, but sends the same."""
 
     class TapePhone:
         """Says what was said."""

@@ -40,7 +40,7 @@ SILENT_AFTER = 600.0  # the same for the DVA [s]
 
 
 class Decided(NamedTuple):
-    """What a robot made of a message; a set point's time is left out, as no two clocks agree."""
+    """Decision of a robot on a message; a set point's time is left out, as clocks differ."""
 
     message: str
     code: int
@@ -158,12 +158,12 @@ def _next(steps: Script, reply: m.Reply | None) -> Ask | Pause | None:
 
 
 def in_virtual_time(way: Way = one_by_one, **changes: object) -> list[Decided]:
-    """What the robot decided in a session that took no time."""
+    """Decisions of the robot in a session in virtual time."""
     return _act_out(_stage(_quick_network(), changes), way)
 
 
 def told_in_virtual_time(**changes: object) -> list[str]:
-    """What the operator told of such a session."""
+    """Timeline of the operator in such a session."""
     stage = _stage(_quick_network(), changes)
     _act_out(stage, one_by_one)
     return [moment.what for moment in stage.recorder.timeline if moment.who == "operator-1"]
@@ -181,7 +181,7 @@ def _quick_network() -> VirtualNetwork:
 def over_sockets(
     way: Way = one_by_one, trace: Path | None = None, **changes: object
 ) -> list[Decided]:
-    """What the robot decided in a session of some seconds, which it may write down, too."""
+    """Decisions of the robot in a session of some seconds, optionally traced."""
     network = SocketNetwork(LiveClock())
     join = lambda kind, number: network.join(id_of(kind, number))  # noqa: E731
     try:
@@ -196,7 +196,7 @@ def _stage(network: Transport, changes: dict[str, object], **address: object) ->
 
 
 class Scene:
-    """The DVA, a robot in a building, what it decides, and whoever is added."""
+    """The DVA, a robot in a building, its decisions, and added devices."""
 
     def __init__(self, stage: Stage, trace: Path | None = None) -> None:
         self.stage, self.dva = stage, add_dva(stage)

@@ -31,7 +31,7 @@ class ScriptedLink:
         self.lost |= {len(self.carried) + number for number in ahead}
 
     def since(self, start: float) -> list[tuple[float, int]]:
-        """What was sent from `start` [s] on: when, and how many bytes."""
+        """Segments sent from `start` [s] on: time and size in bytes."""
         return [(at, size) for at, size in self.carried if at >= start]
 
 
@@ -67,7 +67,7 @@ class Pair:
             self.clock.call_at(time, self.opener.write, size)
 
     def sent(self, start: float, longer: int = 60) -> list[float]:
-        """When the opener sent segments with data from `start` [s] on."""
+        """Times of the opener's data segments from `start` [s] on."""
         return [at for at, size in self.out.since(start) if size > longer]
 
 

@@ -1,4 +1,4 @@
-"""The same small world over every transport, and a meddler that troubles its messages.
+"""A small world that is equal over every transport, and a meddler with its messages.
 
 What a test says about a `World` it says about virtual time, about sockets, and about sockets
 with keys alike. Nothing here waits for a fixed time where it can wait for a condition.
@@ -134,7 +134,7 @@ class SocketWorld(World):
         self.run_until(lambda: self._joined(node))
 
     def come_back_soon(self, node: str) -> None:
-        """As soon as its port is free, while the nodes go on with their work."""
+        """Rejoin once the port is free, while the nodes keep working."""
         if not self._joined(node):
             self.clock.call_after(STEP, self.come_back_soon, node)
 
@@ -182,7 +182,7 @@ class SocketWorld(World):
         return socket
 
     def receive(self, socket: zmq.Socket[bytes]) -> list[bytes]:
-        """What another program gets, while the nodes go on with their work."""
+        """Receive as another program, while the nodes keep working."""
         self.run_until(lambda: socket.poll(0))
         return socket.recv_multipart()
 
@@ -211,7 +211,7 @@ class MqttWorld(World):
 
 @dataclass(frozen=True)
 class Plan:
-    """How often a message is lost, or doubled, and how long it may be held back [s]."""
+    """Chances of loss and duplication, and maximum hold time of a message [s]."""
 
     lose: float = 0.0
     double: float = 0.0
@@ -219,7 +219,7 @@ class Plan:
 
 
 class Meddler:
-    """Stands between the transport and whoever takes a message; luck comes from a seed.
+    """Disturbs messages between a transport and their receivers, by a seeded generator.
 
     Messages that are held back are overtaken by others, copies too.
     """
@@ -229,7 +229,7 @@ class Meddler:
         self.done: Counter[str] = Counter()
 
     def service(self, service: Service) -> Service:
-        """The same service, whose requests and replies are meddled with."""
+        """Wrap a service so that its requests and replies are disturbed."""
 
         def troubled(request: Request) -> None:
             def answer(reply: bytes) -> None:
@@ -240,7 +240,7 @@ class Meddler:
         return troubled
 
     def handler(self, handler: Callable[[Any], object]) -> Callable[[Any], None]:
-        """The same handler of publications, but these are meddled with."""
+        """Wrap a handler of publications so that they are disturbed."""
         return lambda payload: self.pass_on(handler, payload)
 
     def pass_on(self, take: Callable[[Any], object], what: object) -> None:
@@ -304,7 +304,7 @@ class Asker:
         return all(self.ends.values())
 
     def replies(self) -> list[bytes | None]:
-        """How all requests have ended; each exactly once, or it is no list of them."""
+        """Replies to all requests; fails unless each has ended exactly once."""
         assert [len(ends) for ends in self.ends.values()] == [1] * len(self.ends)
         return [ends[0] for ends in self.ends.values()]
 

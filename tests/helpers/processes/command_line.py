@@ -18,7 +18,7 @@ WIDE = "200"  # columns, so that no line is broken
 
 
 def call(*words: str | Path, cwd: Path | None = None, said: str = "") -> CompletedProcess[str]:
-    """What becomes of `dva-sim WORDS` in a folder, with `said` on its standard input."""
+    """Run `dva-sim WORDS` in a folder, with `said` on its standard input."""
     out, errors = _written(), _written()
     with _terminal(out, errors, said), contextlib.chdir(cwd or Path.cwd()):
         code = cli.call([str(word) for word in words])

@@ -1,4 +1,4 @@
-"""How much memory this process holds, as only Linux tells."""
+"""Memory of this process, on Linux only."""
 
 import os
 import sys

@@ -29,7 +29,7 @@ def version(commit: str) -> Iterator[Path]:
 
 
 def output(words: Sequence[str], **options: Any) -> str:
-    """What a program prints; it ends with this one, and so do those that it started.
+    """Output of a program, which ends with this one, children included.
 
     Raises:
         subprocess.CalledProcessError: it failed.

@@ -1,4 +1,4 @@
-"""How long tests wait for what should take a moment: nothing fails because a machine is busy."""
+"""Time limits of tests, generous enough that no test fails on a busy machine."""
 
 import functools
 import subprocess
@@ -15,7 +15,7 @@ run = functools.partial(subprocess.run, timeout=PATIENCE_S)
 
 
 def becomes(true: Callable[[], object]) -> bool:
-    """Whether something becomes true before patience ends."""
+    """True if something becomes true before patience ends."""
     end = time.monotonic() + PATIENCE_S
     while not true():
         if time.monotonic() > end:

@@ -44,7 +44,7 @@ class Program:
 
     @property
     def said(self) -> str:
-        """What it has printed so far."""
+        """Output so far."""
         return self._out.read_text()
 
     @property

@@ -1,4 +1,4 @@
-"""How long tests look for a case that breaks a rule: briefly and always the same, or long and anew.
+"""Search effort for rule-breaking cases: short and deterministic, or long and random.
 
 `make test-soak` sets DVA_SIM_SEARCH to how many times as many cases it tries, new ones each time.
 """

@@ -1,4 +1,4 @@
-"""The same program run twice: in this process, and in one that hashes words otherwise."""
+"""Running a program twice: in this process, and in one with another hash seed."""
 
 import io
 import sys
@@ -11,7 +11,7 @@ PATHS = [str(TESTS), str(ROOT)]
 
 
 def told_here_and_elsewhere(program: str) -> tuple[str, str]:
-    """What a program prints in each of the two; it finds the helpers of the tests."""
+    """Outputs of a program in both processes; it can import the test helpers."""
     here = io.StringIO()
     with redirect_stdout(here):
         exec(program, {"__name__": "__main__"})

@@ -1,4 +1,4 @@
-"""What a run of the tests left out, and how to run it; and how many tests may be skipped."""
+"""Summary of the tests left out, how to run them, and a limit on skipped ones."""
 
 import sys
 from collections import Counter

@@ -44,7 +44,7 @@ class DaskCluster:
             )
 
     def _text_of(self, file: Path) -> str:
-        """As soon as it is there: it is written when the scheduler listens."""
+        """Content of a file that the scheduler writes once it listens."""
         try:
             assert becomes(lambda: self.scheduler.poll() is not None or _is_whole(file))
             assert self.scheduler.poll() is None, "the scheduler has ended"

@@ -50,7 +50,7 @@ def run_after(out: Path, study: Any) -> None:
 
 
 def reportable(job: StudyJob) -> kit.Tables:
-    """What a report is made of: ways of nobody cannot be drawn."""
+    """Tables of a run that a report can use: tracks of nobody cannot be drawn."""
     return {"runs": kit.cheap(job)["runs"]}
 
 
@@ -71,7 +71,7 @@ def forked(work: Callable[[], None]) -> int:
 
 
 def ended(pid: int) -> bool:
-    """Whether a child came to its end; False if it was killed."""
+    """True if a child exited; False if it was killed."""
     _, status = os.waitpid(pid, 0)
     assert os.WIFSIGNALED(status) or os.WEXITSTATUS(status) == 0, "a runner has failed"
     return not os.WIFSIGNALED(status)
@@ -150,7 +150,7 @@ def calls_of(out: Path, study: Any) -> int:
 
 
 def doubled(out: Path) -> bool:
-    """Whether the journal has more than one row for a run."""
+    """True if the journal has more than one row for a run."""
     if not (out / "journal.sqlite").exists():
         return False
     journal = sqlite3.connect(out / "journal.sqlite")

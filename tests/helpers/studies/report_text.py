@@ -1,4 +1,4 @@
-"""What a reader sees of a report."""
+"""Visible text of a report."""
 
 import html
 import re

@@ -87,7 +87,7 @@ def study_in(folder: Path, *settings: str, text: str = STUDY) -> Study:
 
 
 def complaint(folder: Path, text: str, *settings: str, version: str | None = None) -> str:
-    """What a study that cannot be is refused with, but for its folder."""
+    """Error of an invalid study, without its folder."""
     path = write_study(folder, text)
     try:
         cell_grid.jobs(load_study(path, settings, version=version))
@@ -111,13 +111,13 @@ def cheap(job: StudyJob) -> Tables:
 
 
 def slower(job: StudyJob) -> Tables:
-    """The same at a cost that leaves time to be interrupted."""
+    """Run that is slow enough to be interrupted."""
     sum(math.sin(i) for i in range(200_000))
     return cheap(job)
 
 
 def busy(job: StudyJob) -> Tables:
-    """The same after a tenth of a second of CPU time."""
+    """Run that takes a tenth of a second of CPU time."""
     end = time.thread_time() + BUSY_S
     while time.thread_time() < end:
         math.sin(1.0)

@@ -64,7 +64,7 @@ _CELLS = {cell: i for i, cell in enumerate(itertools.product(PATTERNS, DELAYS, P
 
 
 def manifest(persons: int, trials: int, **changes: Any) -> dict[str, Any]:
-    """What a runner would write beside the tables."""
+    """Manifest that a runner would write beside the tables."""
     study = {
         "question": "REQ/REP or PUB/SUB for driving a robot by tilt, as delay grows?",
         "seed": 1,
@@ -235,12 +235,12 @@ def write(folder: Path, tables: dict[str, Rows], facts: dict[str, Any]) -> Path:
 
 
 def reading(folder: Path, rows: Rows, facts: dict[str, Any], **tables: Rows) -> Reading:
-    """What a report reads of these runs."""
+    """Reading of these runs."""
     return Reading(Results.load(write(folder, {"runs": rows, **tables}, facts)))
 
 
 def write_shifts(folder: Path, shifts: int) -> Path:
-    """Of shifts of an hour, which ARE simulated: three policies at two loads."""
+    """Results of hour-long shifts, which ARE simulated: three policies at two loads."""
     from dva_sim.simulation.timed import build, shift_measures, simulate_timed
 
     tables: dict[str, Rows] = {"runs": [], "events": []}

@@ -41,7 +41,7 @@ def person(**traits: float) -> Person:
 
 
 def normals(seed: int) -> Iterator[float]:
-    """Standard normal numbers without end, which is what luck is to a person."""
+    """Endless standard normal numbers, the random source of a person."""
     rng = np.random.default_rng(seed)
     while True:
         yield from rng.normal(size=1000).tolist()
@@ -144,6 +144,6 @@ def follow(
 
 
 def offsets(route: Route, track: list[At]) -> list[float]:
-    """How far a drive was from its way [m], by places on the way 1 cm apart."""
+    """Distances of a drive from its path [m], by points 1 cm apart."""
     ways = np.array([route.point_at(s) for s in np.arange(0.0, route.length, 0.01)])
     return [float(np.hypot(*(ways - (at.x, at.y)).T).min()) for at in track]

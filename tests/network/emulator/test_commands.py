@@ -135,7 +135,7 @@ def test_a_published_port_leads_to_the_near_end_past_the_link(programs, tmp_path
 
 
 def answer(page: str) -> bytes:
-    """What a page says; nothing where nobody answers yet."""
+    """Content of a page; empty while nobody answers."""
     with suppress(OSError), urlopen(page, timeout=PATIENCE_S) as reply:
         return bytes(reply.read())
     return b""

@@ -13,7 +13,7 @@ MANY = 2000
 
 
 def fates(times: list[float], seed: int = 1, way: int = 0, **config: Any) -> list[float | None]:
-    """How long each packet takes that enters one direction; None is a lost one."""
+    """Transit times of packets in one direction; None for a lost one."""
     given = {"rate_bps": UNLIMITED_BPS} | config
     link = links_of(LinkConfig.model_validate(given), seed)[way]
     arrivals = [link.carry(now, 100) for now in times]

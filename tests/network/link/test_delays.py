@@ -22,7 +22,7 @@ link = partial(links.link, rate_bps=links.FAST)
 
 
 def delays(law: Any, every: float = 0.01, count: int = N, **config: Any) -> NDArray[np.float64]:
-    """Of packets sent at a steady rate over a link that lets them overtake."""
+    """Delays of packets sent at a steady rate over a link with reordering."""
     line = link(**{"delay_s": 0.1, "delay_law": law, "reorder": True, **config})
     times = np.arange(count) * round(every * 1000) / 1000  # the same number for the same time
     return np.array([line.carry(now, 100) for now in times.tolist()], dtype=float) - times

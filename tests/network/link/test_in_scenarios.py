@@ -1,4 +1,4 @@
-"""What a scenario says of its link, felt by who drives over it."""
+"""Link settings of a scenario, and their effect on a drive."""
 
 import itertools
 from typing import Any
@@ -17,7 +17,7 @@ def run(**link: Any) -> Recording:
 
 
 def applied(recording: Recording) -> list[float]:
-    """When the robot followed a command of its operator [s]."""
+    """Times at which the robot applied its operator's commands [s]."""
     return [a.time for drive in recording.recorder.drives for a in drive.applied]
 
 

@@ -12,7 +12,7 @@ link = partial(links.link, rate_bps=links.FAST)
 
 
 def fates(count: int, every: float, **config: Any) -> list[bool]:
-    """Whether each of so many packets, sent at a steady rate, is lost."""
+    """Losses among packets sent at a steady rate."""
     line = link(**config)
     return [line.carry(n * every, 100) is None for n in range(count)]
 

@@ -1,4 +1,4 @@
-"""When nothing gets through, and to whom."""
+"""Outages: when nothing gets through, and to whom."""
 
 import pytest
 from helpers.network.links import link

@@ -53,7 +53,7 @@ def packets() -> Iterator[tuple[float, int]]:
 
 
 def digest(link: Link) -> str:
-    """Of all that the link answers."""
+    """Hash of all answers of the link."""
     answers: list[float | None] = []
     for number, (now, size) in enumerate(packets()):
         train = link.carry_train(now, 2, size) if number % 3 == 0 else None

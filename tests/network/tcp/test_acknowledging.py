@@ -1,4 +1,4 @@
-"""When acknowledgements leave. One way takes 50 ms."""
+"""Times of acknowledgements. One way takes 50 ms."""
 
 import pytest
 from helpers.network.scripted_tcp import Pair, options
@@ -9,7 +9,7 @@ from dva_sim.network.tcp.retransmission_timer import RoundTrip
 
 
 def acknowledged_at(pair, start):
-    """When the peer sent acknowledgements without data."""
+    """Times at which the peer sent acknowledgements without data."""
     return [at for at, size in pair.back.since(start) if size == 52]
 
 
@@ -73,7 +73,7 @@ def test_two_full_segments_are_acknowledged_at_once_though_nobody_reads():
 
 @pytest.mark.parametrize(("pushes", "waits"), [(False, 0.04), (True, 0.0)])
 def test_a_full_segment_with_more_to_come_waits_for_it_though_the_program_reads(pushes, waits):
-    """As measured on Linux 6.18: only what is small or has PSH is acknowledged when it is read."""
+    """Measured on Linux 6.18: only small segments or those with PSH are acknowledged on reading."""
     clock, told = Clock(), []
     receiver = Receiver(clock, options(), RoundTrip(options()), lambda: acknowledge())
 

@@ -48,7 +48,7 @@ def test_a_tuned_send_buffer_grows_with_the_congestion_window():
 
 @pytest.mark.parametrize("is_told", [True, False])
 def test_a_program_that_does_not_read_closes_the_window_and_what_it_reads_opens_it(is_told):
-    """Where the news of it is lost, a probe asks."""
+    """If the window update is lost, a probe asks for it."""
     pair = Pair(peer=options(receive_buffer=4096), reads=False)
     pair.write_at([1.0 + number / 100 for number in range(20)], 1000)
     pair.clock.run(5.0)

@@ -9,7 +9,7 @@ from dva_sim.network.tcp import TcpConnection, TcpOptions
 
 
 def opened(delay=0.05, lose_out=(), lose_back=(), until=200.0, dead=False, opener=EXACT):
-    """When the two ends may write, and the links."""
+    """Times at which the two ends may write, and the links."""
     clock, out, back = Clock(), ScriptedLink(delay), ScriptedLink(delay)
     out.lost, back.lost, out.dead = set(lose_out), set(lose_back), dead
     times = {}
@@ -24,7 +24,7 @@ def opened(delay=0.05, lose_out=(), lose_back=(), until=200.0, dead=False, opene
 
 
 def ends(pair, end):
-    """When an end is told that it is over."""
+    """Times at which an end learns that the connection is over."""
     told = []
     end.on_end = lambda: told.append(round(pair.clock.now, 6))
     return told

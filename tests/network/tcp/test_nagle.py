@@ -7,7 +7,7 @@ GATHERS = options(nodelay=False)
 
 
 def sent(opener, writes, loses=0):
-    """When each segment with data leaves and how long it is, of writes of so many bytes."""
+    """Time and size of each data segment, for writes of these sizes."""
     pair = Pair(opener=opener)
     if loses:
         pair.out.lose(loses)

@@ -1,4 +1,4 @@
-"""What happens to lost segments. Round trip 100 ms, so the time-out is 300 ms.
+"""Recovery of lost segments. The round trip is 100 ms, so the time-out is 300 ms.
 
 Waits for a probe and for a segment in doubt are 2 ms longer than RFC 8985 has them, as in Linux.
 """

@@ -1,4 +1,4 @@
-"""What a sender learns from acknowledgements."""
+"""Feedback of acknowledgements to a sender."""
 
 import math
 
@@ -68,7 +68,7 @@ def test_without_any_answer_everything_is_given_up_after_the_first_second():
 
 
 class Told:
-    """A law that writes down what it is told."""
+    """Congestion law that records its input."""
 
     gap = 0.5
 

@@ -143,7 +143,7 @@ def test_a_crucial_command_sent_twice_is_delivered_once():
 
 
 def behind_a_queue(transport: Any, place: str) -> float:
-    """When a command arrives that finds ten packets of 1500 bytes before it."""
+    """Arrival time of a command behind ten packets of 1500 bytes."""
     bench = Bench(transport, place=place)
     other = bench.line.link("other", "up")
 

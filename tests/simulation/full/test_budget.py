@@ -49,7 +49,7 @@ CELLS: dict[str, dict[str, Any]] = {
 
 @cache
 def drives(cell: str) -> tuple[Driven, ...]:
-    """What was driven in a cell."""
+    """Drives of a cell."""
     recording: Recording = simulate(
         scenarios.build(scenarios.load("drive-to-event"), {"horizon_s": 60, **CELLS[cell]}), 1
     )

@@ -1,4 +1,4 @@
-"""Control rooms in a run: what they are told, who wins, and a robot in their own hands."""
+"""Control rooms in a run: their messages, priority, and driving a robot themselves."""
 
 import json
 from collections.abc import Callable
@@ -39,7 +39,7 @@ class Staffed:
         self.run.clock.run(time)
 
     def ask(self, room: int, *bodies: m.Body) -> list[m.Reply]:
-        """What these are answered, one after the other."""
+        """Replies to these requests, one after the other."""
         replies: list[m.Reply] = []
         for body in bodies:
             self.rooms[room].ask(body, replies.append)

@@ -1,4 +1,4 @@
-"""A DVA that is killed while events are open, and started anew from its memory."""
+"""A DVA killed while events are open, and restarted from its memory."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What somebody says in the DVA's name, without keys, gives nobody a robot."""
+"""Messages forged in the DVA's name, without keys, give nobody a robot."""
 
 import itertools
 from collections.abc import Callable, Iterator

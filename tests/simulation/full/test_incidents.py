@@ -1,4 +1,4 @@
-"""What is reported and not there, reported twice, or dealt with."""
+"""Incidents: false reports, duplicate reports, and containment."""
 
 import math
 from typing import Any
@@ -23,7 +23,7 @@ LATE = 400.0  # by then the fire of these tests burns well [s]
 
 
 def in_danger(field: Field, x: float, y: float, now: float) -> bool:
-    """Whether somebody there is exposed [m, s], as a run counts it."""
+    """True if somebody there is exposed [m, s], as a run counts it."""
     near = field.is_near(field.dangers(now), x, y)
     return near or is_dangerous(field.surroundings.at(x, y, now))
 

@@ -1,4 +1,4 @@
-"""What keeps a robot going, or not: power, its drive, a wet floor."""
+"""Machine limits of a robot: power, drive, wet floor."""
 
 from typing import Any
 
@@ -31,7 +31,7 @@ def scenario(changes: dict[str, Any] | None = None) -> scenarios.Scenario:
 
 
 def asked(run: Run) -> list[m.Body]:
-    """What a robot answers within half a second when it is asked what it can measure."""
+    """Sensors that a robot reports within half a second."""
     replies: list[m.Body] = []
     number = 900 + round(10 * run.clock.now)
     question = m.Message(DVA, number, ROBOT, "12:00:00", 0, m.GetSensorInfo())

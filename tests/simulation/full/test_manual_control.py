@@ -142,7 +142,7 @@ def obeys_any_hand(self: RobotController, who: str, speed: float, turn: float, n
 
 
 def does_not_begin(self: RobotController, arrived: float, moving: bool) -> None:
-    """Whatever is asked for begins, whoever has the robot in hand."""
+    """Faulty robot: starts any drive, even while another driver has it."""
 
 
 def falls_silent(bench: InHand) -> None:

@@ -1,4 +1,4 @@
-"""Who repeats what an operator did sends the same, so that the difference is what one costs."""
+"""An operator's recorded actions send the same again, so the difference is its cost."""
 
 import pytest
 from helpers.network.replaying_operator import replay, taped

@@ -1,4 +1,4 @@
-"""What is measured of a run is found again in its journal, though the run forgets what it told."""
+"""Measures of a run recomputed from its journal, though the run forgets its reports."""
 
 import json
 

@@ -84,7 +84,7 @@ def stranger(run: Run) -> Any:
 
 
 def broken(run: Run) -> set[str]:
-    """The rules that were broken, by the run's own audit and by whoever judges its recording."""
+    """Rules broken by the run's own audit, and by the judge of its recording."""
     assert run.recorder.facts is not None
     facts, terms = map(recorded, run.recorder.facts), terms_of(run.scenario)
     found = {verdict.rule for verdict in judged(facts, terms) if verdict.is_broken}
@@ -131,7 +131,7 @@ def driven(until: float, *plans: Plan, **changes: object) -> Run:
 
 
 def sent(word: m.Body) -> Run:
-    """It is sent to a place 12 s after the start, and is told something 2 s later."""
+    """Send the robot to a place 12 s after the start, and another message 2 s later."""
     goal = m.Position(*made(EARLY).stage.site.frame.to_latlon(30.0, 12.0))
     begins = (10.0, m.PermissionGrant(DVA, "missions", 5)), (12.0, m.GoTo((goal,)))
     return asked(20.0, *begins, (14.0, word))

@@ -1,4 +1,4 @@
-"""What is known of a run beforehand is the same whatever the treatment, and zero on the average."""
+"""Covariates known beforehand: equal for all treatments, and zero on average."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""How busy operators are and how they steer: each measure by a case one can work out by hand."""
+"""Workload and steering measures of operators, each by a case computed by hand."""
 
 import math
 

@@ -14,7 +14,7 @@ WINDOW = Window(0.0, 2.0, 6.0)
 
 @st.composite
 def arrivals(draw):
-    """When commands were made and applied, in the order of both; some before the window."""
+    """Times at which commands were made and applied, in order; some before the window."""
     steps = st.lists(st.floats(0.01, 2.0), min_size=0, max_size=12)
     made = np.cumsum(draw(steps))
     late = np.array(draw(st.lists(st.floats(0.01, 3.0), min_size=len(made), max_size=len(made))))

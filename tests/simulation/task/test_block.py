@@ -120,7 +120,7 @@ def test_the_person_comes_to_feel_the_delay_that_there_is():
 
 @pytest.mark.parametrize("strategy", ["pursuit", "move_and_wait", "adaptive"])
 def test_a_target_that_takes_the_place_of_another_is_not_seen_to_fly_there(strategy):
-    """Who led it would aim far beyond: 8 m in a thirtieth of a second are 240 m/s."""
+    """Leading it would aim far beyond: 8 m in a thirtieth of a second are 240 m/s."""
     stops = [{"swing_m": 2.0, "reach_m": 0.0}, {"swing_m": -6.0, "reach_m": 0.0}]
     arm = {"kind": "reach", "stops": stops, "tolerance_m": 0.3}
     plant = {"speed_mps": 1.0, "lag_s": 0.3}
@@ -152,7 +152,7 @@ def test_who_is_surprised_begins_after_its_reaction():
 
 
 def first_move(scenario, changes):
-    """When the person of the first trial wants to move [s], and whose reaction that follows."""
+    """First move of the person in the first trial [s], and the person's reaction time."""
     built = build(scenario, changes)
     seat, condition = seat_of(built), next(iter(built.task.conditions()))
     trial = block._trial(built, seat, condition, 0, Streams(3))

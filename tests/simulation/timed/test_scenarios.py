@@ -1,4 +1,4 @@
-"""Mistakes in a timed scenario are told where they are, with what would be right."""
+"""Mistakes in a timed scenario are reported at their place, with the correct form."""
 
 from typing import Any
 

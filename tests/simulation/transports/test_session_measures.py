@@ -1,4 +1,4 @@
-"""What is measured of a session, by hand."""
+"""Measures of a session, computed by hand."""
 
 import math
 

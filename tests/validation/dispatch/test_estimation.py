@@ -94,7 +94,7 @@ def test_controls_that_do_not_vary_or_that_there_are_too_few_batches_for_are_lef
 
 
 def an_estimate(value, error, plain=None, plain_error=None, batches=100):
-    """Of which the controls changed nothing, unless something else is said."""
+    """Estimate on which control variates had no effect by default."""
     plain, plain_error = plain or value, plain_error or error
     return Estimate(value, error, plain, plain_error, batches)
 

@@ -263,7 +263,7 @@ def test_a_load_beyond_the_servers_is_refused():
 
 
 def test_the_formulas_give_the_published_numbers():
-    """Of the hypercube: R. C. Larson, A. R. Odoni, Urban Operations Research (1981), 5.4.4."""
+    """Hypercube: R. C. Larson, A. R. Odoni, Urban Operations Research (1981), 5.4.4."""
     m = exact.mmc(2.4, 1.0, 3)
     assert [m["delayed"], m["wait_s"]] == pytest.approx([0.647191, 1.078652], abs=1e-6)
     assert erlang_b(3, 1.5) == pytest.approx(0.134328, abs=1e-6)

@@ -1,4 +1,4 @@
-"""What is said of conditions that miss."""
+"""Causes stated for conditions that miss their bands."""
 
 import numpy as np
 

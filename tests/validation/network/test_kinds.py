@@ -1,4 +1,4 @@
-"""How a condition is judged follows from what was set, never from what was found."""
+"""Rules of judgement depend on the settings of a condition, never on its results."""
 
 from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.reference import SocketRun

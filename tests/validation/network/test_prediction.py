@@ -44,7 +44,7 @@ def test_a_slow_robot_falls_behind_without_bound_unless_the_latest_wins():
 
 
 def test_a_robot_slower_than_the_timeout_executes_the_same_command_again():
-    """Of 13 applications in 40 s only five are of different commands."""
+    """Only five of 13 applications in 40 s are of different commands."""
     found = predict(asks(proc_ms=3000, timeout_ms=2500, dur_s=40), 1)
     assert (found["n_applied"], found["n_distinct"]) == (13, 5)
     assert (found["timeouts"], found["alerts"]) == (16, 5)
@@ -58,7 +58,7 @@ def test_a_timeout_below_the_handshake_ends_all_control_after_one_failure():
 
 
 def test_a_run_ends_with_the_last_command_sent():
-    """Of 120 published commands, that of the last period is never applied."""
+    """The last of 120 published commands is never applied."""
     assert predict(Condition("pub", 10, dur_s=12), 1)["n_applied"] == 119
 
 

@@ -27,7 +27,7 @@ def bowl(traits):
 
 
 def noisy(own, shared):
-    """A bowl, with luck that all sets share in a group of persons, and luck of their own."""
+    """Quadratic loss with noise, some shared by all sets in a group of persons."""
 
     def loss(traits, seed):
         group = np.random.default_rng(seed).normal()

@@ -22,7 +22,7 @@ Play = Callable[[Condition, int], None]
 
 @pytest.fixture
 def played(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
-    """What was measured, by a machine that answers at once."""
+    """Conditions measured, on a fake machine that answers at once."""
     return pretend(monkeypatch, lambda condition, seed: None)
 
 

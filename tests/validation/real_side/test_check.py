@@ -51,7 +51,7 @@ def test_a_link_that_is_two_milliseconds_late_is_found_out():
 
 
 def told(other: LinkConfig, by: Crossing) -> Crossing:
-    """The same datagrams, had the link been told something else."""
+    """Same datagrams under different settings of the link."""
     return Crossing(other, by.size, by.sent, by.numbers, by.arrived)
 
 

@@ -1,4 +1,4 @@
-"""When detectors sound, and which one first."""
+"""Detectors: when each sounds, and which sounds first."""
 
 import math
 
@@ -119,7 +119,7 @@ def test_a_hazard_that_starts_later_is_noticed_as_much_later():
 
 
 def test_gas_is_noticed_where_a_tenth_of_the_explosive_limit_arrives():
-    """What comes to the detector is what `Surroundings` has there."""
+    """The detector's input is the value of `Surroundings` at its place."""
     from dva_sim.worlds.hazards import Surroundings
 
     site = load_site("caparica")

@@ -1,4 +1,4 @@
-"""What heat, smoke, gas and water do to people, by the numbers of the standards."""
+"""Effects of heat, smoke, gas and water on people, by the numbers of the standards."""
 
 import math
 

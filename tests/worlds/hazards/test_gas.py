@@ -24,7 +24,7 @@ def floor(width: float, height: float, walls: tuple[tuple[slice, slice], ...] = 
 
 
 def middles(mesh: Mesh) -> NDArray[np.float64]:
-    """Where the nodes are, shape `(n, 2)` [m]."""
+    """Positions of the nodes, shape `(n, 2)` [m]."""
     rows, columns = np.nonzero(mesh.nodes >= 0)
     node, points = mesh.nodes[rows, columns], mesh.grid.to_xy(rows + 0.5, columns + 0.5)
     count = np.bincount(node)

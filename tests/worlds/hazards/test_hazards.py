@@ -1,4 +1,4 @@
-"""What every kind of hazard promises, and what a fire is in the open."""
+"""Promises of every hazard, and the course of a fire in the open."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What it is like anywhere on a site while something burns, leaks or flows."""
+"""Conditions anywhere on a site during a fire, leak or flood."""
 
 import math
 
