@@ -13,9 +13,9 @@ class Stepwise(Strategy):
     Under delay the person drives no faster than it trusts. Pointing is as people do it.
 
     Args:
-        person: Whose gain, caution and pace it has.
+        person: Person with gain, caution and pace.
         reach: Limits of the robot.
-        look_m: How far ahead the point is [m].
+        look_m: Distance of the point ahead [m].
     """
 
     def __init__(self, person: Person, reach: Reach, look_m: float = 1.0) -> None:

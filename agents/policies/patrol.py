@@ -15,7 +15,7 @@ class Patrol(MinEta):
     """The earliest arrival goes; guards with nothing to do walk from station to station.
 
     Args:
-        step: How many stations further each walk leads.
+        step: Number of stations that each walk advances by.
     """
 
     relocates = True  # asks for `situation.cover`: the stations, and how far it is to them

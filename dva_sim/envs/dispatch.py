@@ -362,7 +362,6 @@ def play(env: gymnasium.Env[Observations, int], policy: Policy, seed: int) -> In
     Args:
         env: Made as the policy wants it (`preempts`, `auctions`, `relocates`).
         policy: A shipped one, or your own.
-        seed: Of the shift.
 
     Returns:
         The last `info`, with the measures, and `return`, the sum of all rewards.

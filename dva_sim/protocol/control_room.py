@@ -50,8 +50,8 @@ class Assign:
     Attributes:
         event_id: The event.
         device: Id of the guard or robot.
-        operator: Id of the device that shall drive the robot; None: the DVA chooses.
-        task: As in `Order`; None: `confirm`.
+        operator: Id of the device that is to drive the robot; None: the DVA chooses.
+        task: Task as in `Order`; None: `confirm`.
         reason: In words.
         decisions: `EventStatus.decisions` as the sender has seen it; who has not, cannot take
             an event out of somebody's hands. Where it is not the newest, nothing is done.
@@ -73,7 +73,7 @@ class TakeOff:
         event_id: The event.
         device: Id of the guard or robot.
         reason: In words.
-        decisions: As in `Assign`.
+        decisions: Expected decision count, as in `Assign`.
     """
 
     event_id: int
@@ -88,8 +88,8 @@ class FalseAlarm:
 
     Attributes:
         event_id: The event.
-        reason: How that is known, in words.
-        decisions: As in `Assign`.
+        reason: Reason in words.
+        decisions: Expected decision count, as in `Assign`.
     """
 
     event_id: int
@@ -104,7 +104,7 @@ class Escalate:
     Attributes:
         event_id: The event.
         reason: In words.
-        decisions: As in `Assign`.
+        decisions: Expected decision count, as in `Assign`.
     """
 
     event_id: int
@@ -154,10 +154,10 @@ class LastDecision:
     """The last decision on an event.
 
     Attributes:
-        device: Who took it: a control room, or the DVA for its policy and its rules.
-        label: What that is called.
+        device: Id of the author: a control room, or the DVA for its policy and its rules.
+        label: Label of the author.
         action: `assign`, `take_off`, `false_alarm`, `escalate` or `expire`.
-        ago: How long ago that was [s], up to 1e6.
+        ago: Age of the decision [s], up to 1e6.
         reason: In words, if any were given.
     """
 
@@ -175,7 +175,7 @@ class Proposed:
     Attributes:
         device: Id of the guard or robot that it would send.
         task: To do what, as in `Order`.
-        arrival_in: When that would be there, as expected [s from now].
+        arrival_in: Expected arrival [s from now].
         decide_within: It is sent by itself if nobody has decided by then [s from now].
     """
 
@@ -192,22 +192,22 @@ class EventStatus:
     Attributes:
         event_id: The DVA's number of the event.
         kind: `fire`, `gas_leak` or `flood`.
-        position: Where it is.
+        position: Position of the event.
         severity: 0 (harmless) to 1, the highest reported.
-        confidence: That there is something at all, 0 to 1.
+        confidence: Confidence that the event is real, 0 to 1.
         event_state: `pending`, `assigned`, `on_scene`, `confirmed`, `contained`, `refuted`,
             `escalated` or `expired`.
         age: Since it was first reported [s], up to 1e6.
         state_for: Since when it is in that state [s], up to 1e6.
-        decisions: How many decisions on it there have been: who was sent, taken off, and so on.
+        decisions: Number of decisions on the event so far: assignments, recalls, and so on.
         closed_for: Since when it is over [s], up to 1e6; None: it is not.
-        waits_for: What somebody should do who is not found yet: `confirm` or `contain`.
+        waits_for: Task that still needs a responder: `confirm` or `contain`.
         responder: Id of the guard or robot that goes to look, or is there.
         operator: Id of the device that drives that robot.
         actor: Id of the guard that deals with it, or stands by to.
-        acknowledged: Who has acknowledged it.
+        acknowledged: Person who acknowledged it.
         last_decision: The last decision.
-        proposed: What the policy asks.
+        proposed: Open proposal of the policy.
         note: The newest note.
     """
 
@@ -244,9 +244,9 @@ class DispatchStatus:
 
     Attributes:
         dispatch_mode: `automatic` or `ask_first`.
-        decide_within: How long a proposal waits for a person [s].
-        switched: Who has last changed the mode.
-        role: What the asker may do: `look`, `drive`, `dispatch` or `supervise`; not published.
+        decide_within: Time that a proposal waits for a person [s].
+        switched: Person who last changed the mode.
+        role: Role of the requester: `look`, `drive`, `dispatch` or `supervise`; not published.
     """
 
     dispatch_mode: str
@@ -261,9 +261,9 @@ class Candidate:
 
     Attributes:
         device: Id of a guard or robot.
-        label: What that is called.
-        reason: Why it can go, or not, in words.
-        arrival_in: When it would be there, as expected [s from now]; None: that is not known.
+        label: Label of the device.
+        reason: Reason why it can or cannot go, in words.
+        arrival_in: Expected arrival [s from now]; None if unknown.
     """
 
     device: str
@@ -279,10 +279,10 @@ class Proposal:
     Attributes:
         event_id: The event.
         policy: Name of the policy.
-        reason: Why so, in words.
-        task: What it would have done, as in `Order`; None: nothing is to be done.
+        reason: Reason in words.
+        task: Proposed task, as in `Order`; None: nothing is to be done.
         device: Id of the guard or robot that it would send; None: nobody.
-        arrival_in: When that would be there, as expected [s from now].
+        arrival_in: Expected arrival [s from now].
         decide_within: It is sent by itself if nobody has decided by then [s from now]; None:
             nobody is asked.
         candidates: Everybody, the earliest there first; at most 32, and as many as fit.
@@ -304,18 +304,18 @@ class AuditRecord:
 
     Attributes:
         author: Id of the device that decided; the DVA's for its policy and its rules.
-        label: What that is called.
-        action: What was decided, such as `assign`.
-        reason: Why, in words; may be empty.
+        label: Label of the author.
+        action: Kind of decision, such as `assign`.
+        reason: Reason in words; may be empty.
         code: `OK`, or why it was refused.
-        text: What came of it, in words; may be empty.
-        role: Of the author, if it is a control room.
+        text: Result in words; may be empty.
+        role: Role of the author, if it is a control room.
         event_id: On which event.
         device: About which guard or robot.
         task: To do what.
-        arrival_in: When that would be there, as expected [s from then].
+        arrival_in: Expected arrival of the device [s from then].
         advised: Id of the guard or robot that the policy would have sent; None: nobody.
-        advised_in: When that one would be there, as expected [s from then].
+        advised_in: Expected arrival of the advised device [s from then].
     """
 
     author: str

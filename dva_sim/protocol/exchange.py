@@ -81,10 +81,10 @@ class ReplyCache:
     again, and must not be given the answers of its former life.
 
     Args:
-        each: How many replies are kept for each source; the oldest are forgotten first, so
-            that no other source can make one's own be forgotten.
+        each: Maximum number of replies kept per source. The oldest are forgotten first, so that no
+            source can make another's be forgotten.
         sources: For how many sources; those longest unheard of are forgotten first.
-        room: How much is kept for each source, of which the last reply is more at most [B].
+        room: Maximum size of the replies kept per source, without the last one [B].
     """
 
     def __init__(self, each: int = 64, sources: int = 1024, room: int = 65_536) -> None:

@@ -126,7 +126,7 @@ class RobotStatus:
 
     Attributes:
         mode: `Idle`, `Mission` or `Teleoperation`.
-        position: Where it is.
+        position: Position of the robot.
         heading: Counter-clockwise from east [rad], any number of turns.
         speed: Forward speed [m/s].
         turn_rate: Turn rate [rad/s].
@@ -147,9 +147,9 @@ class RobotHolder:
 
     Attributes:
         holder: Id of the device that holds it; None: nobody.
-        label: What that device calls itself, if the robot knows it.
-        held_for: How long that has been so [s], up to 1e6.
-        code: How its newest command fared, or would fare now; None: as it should.
+        label: Label of that device, if the robot knows it.
+        held_for: Time for which it has had control [s], up to 1e6.
+        code: Reply code that its newest command got, or would get now; None: success.
     """
 
     holder: str | None
@@ -201,7 +201,7 @@ class DevSub:
 
     Attributes:
         sensor: Its name, up to 64 characters.
-        frequency: How often a value is wanted [Hz], up to 1000; 0 ends the subscription.
+        frequency: Desired rate of values [Hz], up to 1000; 0 ends the subscription.
     """
 
     sensor: str
@@ -216,8 +216,8 @@ class PermissionRequest:
         device: Id of the device.
         level: `teleoperation`, `missions`, `both`, or `sensors` for nothing but these.
         sensors: Names of the sensors to subscribe to; at most 16.
-        takeover: If somebody holds it: `no`, be told who; `ask` the holder to give it up; `force`
-            it. None: `no`, from a device that may not know these words.
+        takeover: Request when somebody holds it: `no` names the holder, `ask` asks the holder to
+            give it up, `force` takes it. None: `no`, from a device that may not know these words.
     """
 
     device: str
@@ -256,7 +256,7 @@ class PermissionGrant:
         holder: Id of the device that may act.
         level: `teleoperation`, `missions`, `both`, or `sensors`, which ends nobody's session.
         session: The fencing token, at least 1.
-        address: Where the holder publishes, if the DVA knows it.
+        address: Address at which the holder publishes, if the DVA knows it.
         sensors: Names of the sensors that the holder may subscribe to; at most 16.
     """
 
@@ -289,9 +289,9 @@ class EventReport:
     Attributes:
         event_id: The DVA's number of the event; None while it has none.
         kind: `fire`, `gas_leak` or `flood`.
-        position: Where it is.
+        position: Position of the event.
         severity: 0 (harmless) to 1.
-        confidence: Of the sender in its finding, 0 to 1.
+        confidence: Confidence of the sender, 0 to 1.
         finding: `detected`, `confirmed`, `refuted` or `contained`.
     """
 
@@ -310,8 +310,8 @@ class Order:
     Attributes:
         event_id: The event.
         kind: `fire`, `gas_leak` or `flood`.
-        position: Where it is.
-        device: Id of the robot that an operator shall drive there; None: a guard walks.
+        position: Position of the event.
+        device: Id of the robot that an operator is to drive there; None: a guard walks.
         task: `confirm`: look what is there. `contain`: deal with it. `stand_by`: wait near it,
             out of danger, for the order to deal with it.
     """
@@ -343,7 +343,7 @@ class TaskAnnouncement:
     Attributes:
         event_id: The event.
         kind: `fire`, `gas_leak` or `flood`.
-        position: Where it is.
+        position: Position of the event.
         severity: 0 (harmless) to 1.
         bid_within: Bids are taken for so long after this was sent [s].
     """
@@ -407,8 +407,8 @@ class SensorInfo:
     """Sensor that a robot offers.
 
     Attributes:
-        camera_url: Where its camera is found; printable ASCII, up to 256 characters.
-        sensors: What may be subscribed to; at most 16.
+        camera_url: URL of its camera; printable ASCII, up to 256 characters.
+        sensors: Sensors to subscribe to; at most 16.
     """
 
     camera_url: str
@@ -453,9 +453,9 @@ class Permission:
 
     Attributes:
         device: Id of the robot.
-        level: As in `PermissionGrant`.
+        level: Level as in `PermissionGrant`.
         session: The fencing token, at least 1.
-        address: Where the robot takes requests, if the DVA knows it.
+        address: Address at which the robot takes requests, if the DVA knows it.
         sensors: Names of the sensors to which one may subscribe; at most 16.
     """
 
@@ -486,7 +486,7 @@ class Reply:
         answers: MessageID of the request; 0 if the request could not be read.
         code: `OK`, or why not.
         text: The reason for people, up to 256 characters; may be empty.
-        content: What was asked for.
+        content: Requested content.
     """
 
     answers: int
@@ -542,7 +542,6 @@ class Message(NamedTuple):
         source: Id of the sender.
         timestamp: `HH:MM:SS`, with an optional fraction; for people, never for ages.
         session: 0 before a session is granted; None for heartbeats, and only for them.
-        body: What is said.
     """
 
     destination: str

@@ -20,7 +20,7 @@ class Patrol:
 
     Attributes:
         waypoints: The places of one lap.
-        laps: How many laps, up to 1000; 0: until the mission is cancelled.
+        laps: Number of laps, up to 1000; 0: until the mission is cancelled.
     """
 
     waypoints: tuple[Position, ...]
@@ -34,7 +34,7 @@ class Inspect:
     Attributes:
         event_id: The event.
         kind: `fire`, `gas_leak` or `flood`.
-        position: Where it is.
+        position: Position of the event.
     """
 
     event_id: int
@@ -65,7 +65,7 @@ class MissionStatus:
         mission_id: MessageID of the message that began it; 0 if there was none.
         mission_state: `none`, `under_way`, `waiting`, `replanning`, `done` or `failed`.
         waypoints_left: Places still to be visited, of the present lap; at most 64.
-        reason: Why, in words, up to 256 characters; may be empty.
+        reason: Reason in words, up to 256 characters; may be empty.
     """
 
     mission_id: int

@@ -243,7 +243,7 @@ class Problem:
     Attributes:
         line: Line in the file, from 1.
         column: Column in that line, from 1, in characters.
-        text: What is wrong; what would be right.
+        text: Mistake, and the correct form.
         file: The file that holds it, if not the one that was checked.
     """
 

@@ -67,7 +67,7 @@ def check_figure(
         figure: By name, as in a study, or its class.
         options: Keyword arguments of its constructor.
         slow: A figure that takes longer earns a warning [s].
-        shapes: Of the results, by what is special about them.
+        shapes: Shapes of the results, by name.
 
     Raises:
         BrokenPromises: it does not; a line for each promise.

@@ -79,7 +79,7 @@ class _Trial:
     """All that is tried with one hazard.
 
     Attributes:
-        asked: How often the air was asked for.
+        asked: Number of queries to the field.
         mean: Mean time of an answer [s].
     """
 

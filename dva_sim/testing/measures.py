@@ -70,8 +70,8 @@ class _Trial:
     """All that is tried with one measure.
 
     Attributes:
-        took: How long each answer took [s].
-        answers: What it said of each run, nan for nothing.
+        took: Duration of each answer [s].
+        answers: Answer for each run, nan for None.
     """
 
     def __init__(self, make: Callable[[], RunMeasure], models: list[str]) -> None:

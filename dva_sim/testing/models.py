@@ -27,7 +27,7 @@ def check_model(
     It is tried with the scenario that its defaults and some keys make.
 
     Args:
-        name: Of the model, as in a scenario.
+        name: Name of the model, as in a scenario.
         options: Keys of its scenario; those that have no default must be there.
         slow: A run that takes longer earns a warning [s].
 
@@ -55,8 +55,8 @@ class _Trial:
     """All that is tried with one model.
 
     Attributes:
-        took: How long each run took [s].
-        seen: What runs with several seeds came to.
+        took: Duration of each run [s].
+        seen: Results of runs with several seeds.
     """
 
     def __init__(

@@ -83,9 +83,9 @@ class TriedDrive:
     """One drive by a pattern over any transport; see `Line`, which it is to the pattern.
 
     Attributes:
-        network: What carries the messages.
+        network: Transport of the messages.
         pattern: This drive's.
-        service: Of a command at the robot [s].
+        service: Processing time of a command at the robot [s].
         refuses: With which code the robot answers whatever comes; 0: it obeys. None: with
             bytes that are no message.
         node: Id of the phone.
@@ -93,10 +93,10 @@ class TriedDrive:
         rate_hz: See `Line`, as the next three.
         sent: Numbers of commands in the order in which they were sent, and when [s].
         applied: Numbers of commands that the robot obeyed, and when [s].
-        ages: Of those when it did [s].
+        ages: Ages of the applied commands [s].
         superseded: Numbers of commands that a newer one took the place of.
-        told: When the pattern said that nobody obeys, and why.
-        wrong: What it did that it may not do.
+        told: Times and reasons at which the pattern reported that nobody obeys.
+        wrong: Broken promises.
         spent: Time that its decisions took [s].
     """
 
@@ -274,7 +274,7 @@ class _Trial:
     Attributes:
         count: Drives so far.
         took: Mean time of a command, for each drive [s].
-        doubts: What it may do, but its users should know.
+        doubts: Allowed behaviour that its users should know.
     """
 
     def __init__(self, make: Callable[[], Pattern]) -> None:

@@ -40,14 +40,14 @@ class _Draw:
     """Parameters of a kind of situation; the rest is random.
 
     Attributes:
-        tasks: How many, from and to; so of guards, robots and operators.
+        tasks: Range of the number of tasks; the same form for guards, robots and operators.
         cut_off: Share of ways that do not exist.
         contain: Share of tasks that are for people, some of them not due yet.
         under_way: Share of responders that are shown as engaged to a policy that preempts.
         tied: All ways and waiting times are equal.
-        auction: How far the auctions are, for a policy that auctions.
+        auction: State of the auctions, for a policy that auctions.
         bids: Share of responders that have bid.
-        listed: Whether there are lists of preference.
+        listed: True if there are lists of preference.
     """
 
     tasks: tuple[int, int] = (1, 6)
@@ -255,7 +255,7 @@ def check_policy(
     Args:
         policy: By name, as in a scenario, or its class.
         options: Keyword arguments of its constructor.
-        count: How many situations.
+        count: Number of situations.
         slow: A decision that takes longer earns a warning [s].
 
     Raises:

@@ -25,8 +25,8 @@ class Outcome:
 
     Attributes:
         broken: One line for each promise that it broke, with the first case.
-        warnings: The same of what is made good when it runs, or what is only slow.
-        tries: How often it was tried.
+        warnings: Faults that are corrected at run time, and slowness.
+        tries: Number of tries.
         slowest: Its longest answer [s].
     """
 
@@ -120,8 +120,8 @@ class CheckedKind:
         kind: The word for one: `dva-sim check KIND NAME`.
         room: The module whose `PLUGINS` tells what there is of it, below `dva_sim`.
         module: The one here whose `check_KIND` tries one.
-        told: How it was tried, in words, with `{tries}`, and `{ms}` or `{us}` of the slowest.
-        folder: Of the files that are named, where it is not the class itself that is.
+        told: Description of the check, with `{tries}`, and `{ms}` or `{us}` of the slowest.
+        folder: Folder of the named files, for kinds that are not classes.
         class_word: The word for a class of it, where that is another.
         worded: The module whose `WORDS` describe the shipped ones, where loading these takes long.
     """

@@ -34,11 +34,11 @@ class Shape:
     Attributes:
         factors: Levels of what is varied.
         answer: The declared contrast, as a study's file has it; none where it is empty.
-        model: Of its runs.
+        model: Model of the runs.
         persons: Simulated persons.
-        trials: Of each.
+        trials: Trials per person.
         missing: Share of the values that are not there.
-        is_constant: Whether all values of a column are the same.
+        is_constant: True if all values of a column are equal.
         models: Factor of models of persons over which the study declares a map; none if empty.
     """
 
@@ -110,8 +110,8 @@ def make_up(folder: Path, shape: Shape, columns: Iterable[str] = ()) -> Path:
 
     Args:
         folder: It must not be there yet.
-        shape: Of the study.
-        columns: Of the runs, beside all measures of the model.
+        shape: Shape of the study.
+        columns: Columns of the runs, besides all measures of the model.
     """
     rng = np.random.default_rng(7)
     names = dict.fromkeys([*MODELS[shape.model].measures(), *columns])

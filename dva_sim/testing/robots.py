@@ -40,7 +40,7 @@ def check_robot(
     Args:
         robot: A profile, by name or path; or motors, as a profile names them or as a class,
             in the body of a profile that says nothing else.
-        options: Of the motors.
+        options: Options of the motors.
         slow: An answer that takes longer earns a warning [s].
 
     Raises:

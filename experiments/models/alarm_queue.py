@@ -20,10 +20,10 @@ class AlarmScenario(OwnScenario):
     """Keys of a run.
 
     Attributes:
-        guards: How many there are.
+        guards: Number of guards.
         between_s: Mean time from one alarm to the next.
         service_s: Mean time that a guard needs for one.
-        alarms: How many there are in a run.
+        alarms: Number of alarms in a run.
     """
 
     guards: Annotated[int, Field(ge=1, le=100), Key("guards")] = 2

@@ -18,8 +18,8 @@ class AcknowledgedPubSub(Pattern):
     it is refused as soon as the first answer says so.
 
     Args:
-        every: Which command is a request; 1 asks whenever the last answer is there.
-        timeout_s: How long to wait for an answer; left out: as `command.timeout_s`.
+        every: Interval of requests, in commands; 1 sends one whenever the last reply has arrived.
+        timeout_s: Time to wait for a reply [s]; `command.timeout_s` by default.
     """
 
     title, label = "acknowledged PUB/SUB", "acknowledged"

@@ -40,16 +40,16 @@ class Finding:
         mean: First minus second, at each level `(k,)`; nan where there is no pair.
         low: Lower edge of the simultaneous 95 % band `(k,)`; nan if none can be given.
         high: Its upper edge `(k,)`.
-        persons: How many persons (clusters) the band rests on.
+        persons: Number of persons (clusters) behind the band.
         smallest_effect: Smallest difference declared to matter, in the measure's unit.
         usual: Median of the measure itself under the second level `(k,)`: what the difference is
             held against where none was declared to matter.
         missed: Runs without confirmation at the last level, per level of `factor`.
-        horizon: What such a run counts with [s], if all count with the same.
-        cluster: What the band rests on: persons, or shifts.
+        horizon: Value that such a run counts with [s], if the same for all.
+        cluster: Unit of resampling: person or shift.
         widest: The greatest difference that is possible; a band of that size says nothing.
-        all_confirmed: Whether no run of any cell was missed.
-        everywhere: Where a contrast holds that runs over nothing.
+        all_confirmed: True if no run of any cell was missed.
+        everywhere: Place of a contrast that has no x axis.
         failed: Runs that are missing because they failed.
         part: Part of the study that was looked at.
     """
@@ -123,8 +123,8 @@ class Answer:
 
     Attributes:
         lead: The answer in two sentences.
-        depends: What it depends on, by what each sentence is about: `Persons`, `Measured` ...
-        notes: What else was found or must be known to read it fairly.
+        depends: Conditions of the answer, by subject: `Persons`, `Measured` ...
+        notes: Other findings, and facts needed to read it fairly.
     """
 
     lead: str

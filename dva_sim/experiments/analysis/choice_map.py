@@ -37,12 +37,12 @@ class ChoiceMap:
         models: Factor of the models of persons, `m` levels.
         mean: Mean loss, `(g, c, m)`; nan where nothing was run.
         regret: Mean loss beyond the least one, `(g, c, m)`; 0 for the best choice.
-        is_clear: Whether the 95 % interval of the regret, paired by person and trial, lies above 0
-            and the regret above `smallest`, `(g, c, m)`.
+        is_clear: True where the 95 % interval of the regret, paired by person and trial, lies above
+            0 and the regret above `smallest`, `(g, c, m)`.
         smallest: Smallest difference that matters; 0 where none was declared.
-        most: What runs that never ended count with; infinite where nothing bounds the measure.
-        outside: Whether a cell is beyond what people were watched at, `(g, c, m)`.
-        notes: What else rests on an assumption, by situation.
+        most: Value of runs that never ended; infinite if the measure is unbounded.
+        outside: True for cells beyond the delays at which people were watched, `(g, c, m)`.
+        notes: Further assumptions, by situation.
     """
 
     measure: str
@@ -115,8 +115,7 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
     """Read the map of a study; None where it declares none, or a cell has no run yet.
 
     Args:
-        study: As the manifest holds it.
-        view: How the study is read.
+        study: Study as the manifest holds it.
     """
     declared = study.get("map")
     if not declared or view.line is None or view.over is None:

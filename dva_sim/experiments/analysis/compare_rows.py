@@ -21,11 +21,11 @@ class Rows:
     """A column of a table, with what tells whose rows they are.
 
     Attributes:
-        values: Of the measure `(n,)`.
+        values: Values of the measure `(n,)`.
         cell: Number of the cell in the first folder `(n,)`.
-        person: Who `(n,)`.
-        trial: Which `(n,)`.
-        seed: Of the run `(n,)`.
+        person: Person of each row `(n,)`.
+        trial: Trial of each row `(n,)`.
+        seed: Seed of each run `(n,)`.
     """
 
     values: Array
@@ -69,12 +69,12 @@ class Difference:
 
     Attributes:
         part: Name of the part.
-        levels: What the cells have in common.
+        levels: Levels that the cells have in common.
         runs: Runs of each folder that have a value.
         medians: Over these runs, of each folder.
         interval: Mean over persons of second minus first, with its 95 % interval.
-        is_paired: Whether it rests on pairs of runs with the same luck.
-        same: How many pairs have the very same value.
+        is_paired: True if it rests on pairs of runs with the same random numbers.
+        same: Number of pairs with exactly equal values.
     """
 
     part: str
@@ -115,7 +115,7 @@ def difference(part: str, levels: Levels, first: Rows, second: Rows) -> Differen
 
     Args:
         part: Name of the part.
-        levels: What the cells have in common.
+        levels: Levels that the cells have in common.
         first: Rows of the first folder, as numbers.
         second: Those of the second.
     """

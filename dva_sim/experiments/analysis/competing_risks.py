@@ -41,7 +41,7 @@ class Ended:
     Attributes:
         line: Level of the factor that is compared.
         stop: Level of the factor along which it is followed.
-        events: How many events it rests on.
+        events: Number of events.
         shares: Share of each way by the horizon, in the order of `Endings.ways`.
     """
 

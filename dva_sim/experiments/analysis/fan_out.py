@@ -36,7 +36,7 @@ class Need(NamedTuple):
 
     Attributes:
         neglect: By itself [s].
-        interaction: Of its operator [s].
+        interaction: Operator's time per event [s].
     """
 
     neglect: float
@@ -65,10 +65,9 @@ def settled_per_person(results: Results, part: str, where: Levels, since: float)
     What is before is left out: at the start every robot sets out, and nobody has anything to judge.
 
     Args:
-        results: Of a study of the full model.
-        part: Of the study.
+        results: Results of a study of the full model.
         where: Levels of factors.
-        since: What is closed later counts [s].
+        since: Start of the time in which closed events count [s].
     """
     events, runs = (_rows(results.table(name), part, where) for name in ("events", "runs"))
     counts = np.isin(events["outcome"], SETTLED) & (events["t_closed_s"] >= since)
@@ -86,10 +85,9 @@ def need_of(results: Results, part: str, where: Levels, since: float) -> Need:
     that the operator reads the order and the robot is started.
 
     Args:
-        results: Of a study of the full model.
-        part: Of the study.
+        results: Results of a study of the full model.
         where: Levels of factors.
-        since: What is closed later counts [s].
+        since: Start of the time in which closed events count [s].
 
     Raises:
         ConfigError: no event was settled there.

@@ -24,10 +24,10 @@ class GateVerdict:
     Attributes:
         gate: The condition.
         part: Name of the part.
-        levels: What the cells have in common.
+        levels: Levels that the cells have in common.
         first: The statistic in the first folder.
-        second: The same in the second.
-        bound: What the second is held against.
+        second: Value of the second folder.
+        bound: Limit for the second folder's value.
         missing: Share of the rows without a value, in both.
     """
 

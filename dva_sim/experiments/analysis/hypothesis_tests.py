@@ -47,14 +47,14 @@ class Compared:
     """One contrast at one place.
 
     Attributes:
-        name: Of the comparison.
-        contrast: What was declared.
+        name: Name of the comparison.
+        contrast: Declared contrast.
         at: Levels at which it was taken.
         difference: First minus second, with its own 95 % interval; None if not run.
-        size: The same in standard deviations.
-        correlation: Of the two sides, run by run.
-        p: Of the test that labels could be swapped.
-        adjusted: The same by Holm within the family.
+        size: Difference in standard deviations.
+        correlation: Correlation of the two sides over runs.
+        p: p-value of the permutation test.
+        adjusted: p-value after Holm's correction within the family.
     """
 
     name: str
@@ -72,16 +72,14 @@ class Tested:
     """A hypothesis beside what came out.
 
     Attributes:
-        name: Of the hypothesis.
-        hypothesis: As declared.
-        contrast: What it is about.
-        at: Where.
-        difference: As measured, with its 95 % interval; None if not run.
-        p: Of its own test: one-sided, or of equivalence within the margin.
-        adjusted: The same by Holm within the family.
-        p_against: Of the test that it is the other way round, or beyond the margin.
-        against: The same by Holm among these of the family.
-        verdict: Whether it held.
+        name: Name of the hypothesis.
+        contrast: Contrast that the hypothesis is about.
+        at: Place of the contrast.
+        difference: Measured difference with its 95 % interval; None if not run.
+        p: p-value of the hypothesis: one-sided, or of equivalence within the margin.
+        adjusted: `p` after Holm's correction within the family.
+        p_against: p-value of the opposite: the other direction, or beyond the margin.
+        against: `p_against` after Holm's correction within the family.
     """
 
     name: str

@@ -21,9 +21,9 @@ class Tables(NamedTuple):
 
     Attributes:
         runs: All of them.
-        tracks: Who was where, of some.
+        tracks: Positions of agents over time, in some of the runs.
         names: Columns that name a cell: its factors.
-        events: When each happened, was found and was dealt with, and in which room.
+        events: Times of each event (occurred, found, dealt with), and its room.
     """
 
     runs: Table
@@ -56,14 +56,14 @@ class KeptEpisode:
 
     Attributes:
         setting: Levels of its cell.
-        person: Who drove.
-        trial: Which trial of that person.
+        person: Person who drove.
+        trial: Trial of that person.
         value: Its measure.
         moments: Columns `agent`, `t_s`, `x_m`, `y_m`, `heading_rad`, `mode`: who was where, when.
         incidents: Kind, start [s] and place [m] of each, where a recording tells them.
-        kept: How many runs were kept, of which it is one.
-        rank: What share of all runs had a smaller value.
-        span: What of the run the measure is the length of; None where it is none, or never ended.
+        kept: Number of kept runs to choose from.
+        rank: Share of all runs with a smaller value.
+        span: Part of the run that the measure spans; None if it is no duration, or never ended.
     """
 
     setting: Setting
@@ -86,8 +86,7 @@ def typical_and_worst(
     None where nothing was kept.
 
     Args:
-        folder: Of the results.
-        part: Whose runs.
+        folder: Results folder.
         measure: By which they are judged.
         tables: The runs, their tracks, and the columns that name a cell.
     """

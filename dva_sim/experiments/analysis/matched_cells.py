@@ -26,10 +26,10 @@ class Pair:
 
     Attributes:
         part: Name of the part.
-        levels: What both have in common.
+        levels: Levels that both cells have in common.
         first: Number of the cell in the first folder.
         second: Number of the cell in the second.
-        is_same: Whether both ran the very same configuration.
+        is_same: True if both ran exactly the same configuration.
     """
 
     part: str

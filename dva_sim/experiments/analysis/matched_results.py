@@ -24,7 +24,7 @@ class GateGroup:
 
     Attributes:
         part: Name of the part.
-        levels: What they have in common; nothing for all cells of the part.
+        levels: Levels that they have in common; empty for all cells of the part.
         pairs: The cells of both folders.
     """
 
@@ -37,8 +37,8 @@ class MatchedResults:
     """Two results folders, matched.
 
     Args:
-        first: What is compared with.
-        second: What is compared.
+        first: Results to compare with.
+        second: Results to compare.
 
     Raises:
         ConfigError: they have no cell in common.

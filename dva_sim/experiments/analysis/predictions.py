@@ -36,11 +36,10 @@ class Judged:
     """One prediction and what became of it.
 
     Attributes:
-        text: As it was written down.
-        expected: What it says of a contrast; empty if it does not.
-        found: The same as measured; empty if not run.
-        verdict: Whether it held.
-        persons: How many that rests on.
+        text: Text as it was written down.
+        expected: Predicted contrast; empty if there is none.
+        found: Measured contrast; empty if not run.
+        persons: Number of persons behind the finding.
     """
 
     text: str

@@ -33,13 +33,13 @@ class Repeat:
     """The contrast under one model of the persons, at one stop.
 
     Attributes:
-        strategy: Of the operators; empty where it was not varied.
-        parameters: Which set; 0 is the usual one.
+        strategy: Strategy of the operators; empty if it was not varied.
+        parameters: Number of the parameter set; 0 is the usual one.
         mean: First minus second.
         low: Lower end of its own 95 % interval.
         high: Upper end.
-        is_own: Whether it is the study's own model, and so no evidence for or against it.
-        is_beyond: Whether people were not watched with that strategy at the delays it was run at.
+        is_own: True for the study's own model, which is no independent evidence.
+        is_beyond: True if people were never watched with that strategy at these delays.
     """
 
     strategy: str
@@ -56,7 +56,6 @@ class RepeatedStop:
     """All repeats at one level of the factor that the answer runs over.
 
     Attributes:
-        level: That level.
         found: The study's own result there.
         low: Lower edge of its band.
         high: Upper edge.
@@ -105,12 +104,11 @@ class RepeatedAnswer:
 
     Attributes:
         stops: By level of the factor that the answer runs over.
-        over: That factor.
-        measure: What is compared.
+        over: Factor along which the repeats run.
         strategies: Tried; none where the scenario's own was kept.
-        sets: How many sets of parameters besides the usual one.
+        sets: Number of parameter sets besides the usual one.
         persons: In each repeat.
-        trials: Of each.
+        trials: Trials per person.
     """
 
     stops: tuple[RepeatedStop, ...]
@@ -137,11 +135,11 @@ def robustness_of(
     """Read the table of repeats; None where none were declared.
 
     Args:
-        study: As the manifest holds it.
-        table: Of the repeats.
-        view: How the study is read.
+        study: Study as the manifest holds it.
+        table: Table of the repeats.
         finding: The study's own result.
-        scenario: Of the answer's part before any factor changed it, for the study's own strategy.
+        scenario: Scenario of the answer's part before any factor changed it, for the study's own
+            strategy.
     """
     declared = study.get("robustness")
     if not declared or view.over is None or view.line is None or view.contrast is None:

@@ -42,8 +42,8 @@ class RunGrid:
 
     Args:
         table: Columns of the table `runs`, or of another with the same leading columns.
-        name: Which part.
-        factors: What the study varies; those that the table does not know are left out.
+        name: Name of the part.
+        factors: Factors of the study; those missing from the table are left out.
     """
 
     def __init__(self, table: Table, name: str, factors: Sequence[Factor]) -> None:

@@ -54,7 +54,7 @@ class IntervalLaw:
         spread: Standard deviation of persons' means.
         persons: From how many it is known.
         level: Two-sided confidence level whose quantile of Student's shrinks with more persons.
-        stretch: How many times as far as Student's the interval reaches.
+        stretch: Half-width of the interval relative to Student's.
     """
 
     spread: float
@@ -93,10 +93,11 @@ def law_of(
     Args:
         values: One value per run `(n,)`, nan where missing: of a comparison, the difference of
             the pair of runs.
-        person: Whose run it was `(n,)`.
-        reach: How far the study's interval or band reaches from its mean, towards the side that
-            counts; as far as Student's if left out.
-        level: Of that interval; of a band, that of each of its levels alone (Bonferroni).
+        person: Person of each run `(n,)`.
+        reach: Half-width of the study's interval or band, towards the side that counts; Student's
+            by default.
+        level: Level of that interval; for a band, the level of each of its intervals alone
+            (Bonferroni).
     """
     means = person_means(values, person)[1]
     if len(means) < 2 or not np.ptp(means) > 0:
@@ -121,8 +122,8 @@ class SizePlan:
     """Study size needed to show one thing.
 
     Attributes:
-        name: Of the hypothesis or comparison.
-        what: Which claim, in words.
+        name: Name of the hypothesis or comparison.
+        what: The claim in words.
         assumed: The true difference that is counted on, in words.
         known_from: Persons from whom the spread is known.
         counts: For each of `POWERS`; none where the claim is not true under what is assumed.
@@ -153,7 +154,7 @@ def plans(
     """Plan sizes for each hypothesis and other comparison, and for an open answer.
 
     Args:
-        study: As the manifest has it.
+        study: Study as the manifest has it.
         runs: The table of runs.
         decided: Names of hypotheses and comparisons that are left out because they need no more.
             None for a pilot, where nothing is left out; without any claim not even an answer

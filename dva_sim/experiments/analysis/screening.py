@@ -32,7 +32,7 @@ class Screening:
         numbers: Each assumed number with its effects on the answer over its whole band, in the
             measure's unit; the one that moves it most first.
         usual: The answer over all points, mean of the persons' differences.
-        points: How many points were run.
+        points: Number of points run.
         persons: Simulated persons at each.
     """
 
@@ -73,7 +73,6 @@ def screen(
     """Run what the folder does not hold yet, and judge all of it.
 
     Args:
-        study: What is screened.
         out: Results folder.
         jobs: Processes; by default one for each core.
         episode: Makes the tables of one run; by default a simulation.

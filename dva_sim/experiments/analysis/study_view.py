@@ -45,11 +45,11 @@ class StudyView:
         contrast: The two levels of `line` compared, the first minus the second; or None.
         within: The panel that the answer speaks of.
         smallest_effect: Smallest difference declared to matter, in the measure's unit.
-        outside: Whether each cell `(levels of factor 1, ...)` is an extrapolation, beyond the
-            delays at which people were watched; None where nothing is known of that.
+        outside: True for cells `(levels of factor 1, ...)` that are extrapolations, beyond the
+            delays at which people were watched; None if unknown.
         possible: The least and the greatest value that the measure can take at all.
-        averages_points: Whether the trials are points in ranges, over which means are taken.
-        covariates: What differences are adjusted for, each a product of columns.
+        averages_points: True if the trials are points in ranges, over which means are taken.
+        covariates: Covariates that differences are adjusted for, each a product of columns.
     """
 
     part: RunGrid
@@ -189,7 +189,7 @@ def layout_of(
     empty are one factor, unless the answer needs the others.
 
     Args:
-        study: As the manifest has it.
+        study: Study as the manifest has it.
         runs: The table of runs.
         are_points_trials: Otherwise the point is a factor of its own.
     """

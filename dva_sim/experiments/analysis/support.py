@@ -35,10 +35,10 @@ class Support:
     """The delays of a part's cells, and which of them no published data cover.
 
     Attributes:
-        delays: Of the loop without the person, for each cell `(levels of factor 1, ...)` [s]; nan
+        delays: Delay of the loop without the person, by cell `(levels of factor 1, ...)` [s]; nan
             where nobody drives.
-        outside: Which of them lie outside.
-        words: What is covered, for each strategy.
+        outside: True for delays that are not covered.
+        words: Description of the range covered, for each strategy.
     """
 
     delays: Floats

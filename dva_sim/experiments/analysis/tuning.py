@@ -40,7 +40,6 @@ def tune(
     """Try every value, or go on with trying, and choose by the rule.
 
     Args:
-        study: What is asked.
         out: Results folder of the trials.
         jobs: Processes; by default one for each core.
         episode: Makes the tables of one run; by default a simulation.

@@ -51,8 +51,8 @@ class RunOutcome:
     Attributes:
         key: The run: hash of its configuration, and seed.
         tables: Its tables as JSON; None if it failed.
-        cost_s: What it cost [CPU s].
-        error: Why it failed; None if it did not.
+        cost_s: Cost of the run [CPU s].
+        error: Error message; None if it did not fail.
     """
 
     key: RunKey
@@ -68,7 +68,7 @@ class Checkpoint:
 
     Args:
         folder: Results folder, which must exist.
-        identity: Hash of the study; a checkpoint belongs to one study. None: whoever's it is.
+        identity: Hash of the study; a checkpoint belongs to one study. None accepts any.
         must_exist: It is to be read only, not begun.
 
     Attributes:

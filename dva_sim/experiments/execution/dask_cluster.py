@@ -48,7 +48,7 @@ class DaskCluster(Workers):
     """The workers of a scheduler.
 
     Args:
-        address: Of the scheduler, as in `tcp://10.0.0.1:8786`.
+        address: Address of the scheduler, as in `tcp://10.0.0.1:8786`.
 
     Raises:
         ConfigError: dask.distributed is not installed, or nobody answers at the address.

@@ -37,15 +37,15 @@ class DryRun:
 
     Attributes:
         runs: Different runs in all.
-        done: How many of them the results folder already holds.
+        done: Number of runs that the results folder already holds.
         cells: Configurations, with the reference runs' own.
         rounds: After how many batches it may stop; 1 if nothing can stop it early.
         workers: Processes that the estimate is for.
         estimate_s: Time for the rest [s], if any run tells its cost.
         tried: Runs that were tried for the estimate and thrown away; 0 if it rests on runs kept.
-        remark: What is doubtful about tuned values; empty if nothing is.
-        is_least: Whether it will take longer, since a run that was tried did not end in time.
-        failed: What went wrong with a run that was tried; empty if nothing did.
+        remark: Doubt about tuned values; empty if there is none.
+        is_least: True if it will take longer, since a trial run did not end in time.
+        failed: Error of a trial run; empty if it did not fail.
     """
 
     runs: int

@@ -33,8 +33,8 @@ class Workers(ABC):
     """Interface of everything that makes runs.
 
     Attributes:
-        is_here: Whether runs are made in this process, one by one.
-        deaths: What a future raises whose worker has died.
+        is_here: True if runs are made in this process, one by one.
+        deaths: Exceptions raised by a future whose worker has died.
     """
 
     is_here = False
@@ -59,8 +59,8 @@ class Workers(ABC):
         """Workers that are gone, or have nothing more to do, when the block ends.
 
         Args:
-            width: How many.
-            task: What they will do, so that they can prepare for it.
+            width: Number of workers.
+            task: Task that they will run, so that they can prepare for it.
         """
 
     def guarded(self, task: Callable[P, R]) -> Callable[P, R]:
@@ -71,7 +71,7 @@ class Workers(ABC):
         """Called now and then; nothing has to be done.
 
         Args:
-            is_idle: Whether nothing has come for some seconds.
+            is_idle: True if no result has come for some seconds.
 
         Raises:
             WorkersLost: nobody is left.

@@ -124,7 +124,7 @@ def chosen(plan: StudyPlan, rows: Mapping[RunPosition, Row]) -> list[StudyJob]:
     """The runs to record, in the order of the design.
 
     Args:
-        plan: Of a study that asks for all, for the worst of each cell, or for a sample of each.
+        plan: Plan of a study that records all runs, the worst of each cell, or a sample of each.
         rows: The runs that were carried out and did not fail.
     """
     study = plan.study
@@ -199,7 +199,7 @@ class Rerun:
     """An episode that is kept as a file, and has no tables of its own.
 
     Args:
-        folder: Of the files.
+        folder: Folder for the files.
         prints: Fingerprint of what each run came to in the study, by name of file.
     """
 

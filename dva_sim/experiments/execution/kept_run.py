@@ -56,7 +56,7 @@ class KeptRun:
         seed: Seed of the run.
 
     Attributes:
-        problem: Why nothing can be written now; empty if all is well.
+        problem: Reason why nothing can be written now; empty if it can.
 
     Raises:
         DvaSimError: the folder cannot be written.

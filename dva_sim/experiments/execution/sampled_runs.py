@@ -45,7 +45,7 @@ def sampled_digests(studies: Mapping[str, Study], processes: int) -> Iterator[tu
 
     Args:
         studies: The studies.
-        processes: How many runs at a time.
+        processes: Number of runs at a time.
     """
     with ProcessPoolExecutor(processes, mp_context=get_context("forkserver")) as pool:
         asked = {

@@ -56,7 +56,6 @@ def run_all(
     Args:
         jobs: The runs.
         episode: Makes the tables of one run; must be importable by name unless it is run here.
-        workers: Where they are run.
         limit_s: A run that takes longer by the wall clock has failed.
 
     Raises:

@@ -34,7 +34,7 @@ class Words:
 
     Attributes:
         text: In words.
-        kind: How loud it is said; a banner stands above all else.
+        kind: Emphasis; a banner precedes everything else.
     """
 
     text: str
@@ -47,8 +47,8 @@ class First:
 
     Attributes:
         lead: The answer.
-        figure: That answers it.
-        depends: What it depends on: what each sentence is about, and the sentence.
+        figure: Figure that shows the answer.
+        depends: Conditions of the answer: pairs of subject and sentence.
     """
 
     lead: str
@@ -69,7 +69,7 @@ class Printed:
 
     Attributes:
         table: Its heads and rows.
-        is_words: Whether its cells are sentences rather than numbers.
+        is_words: True if its cells are sentences rather than numbers.
     """
 
     table: CellTable

@@ -24,10 +24,10 @@ class CellTable:
     Attributes:
         part: Part of the study.
         heads: Column heads.
-        labels: How many leading columns name the cell.
+        labels: Number of leading columns that name the cell.
         rows: Printed values.
-        empty: How many cells have no run.
-        note: What a mark in it means.
+        empty: Number of cells without a run.
+        note: Meaning of a mark in the table.
     """
 
     part: str
@@ -74,10 +74,10 @@ def cell_table(
     Args:
         part: The runs.
         measure: Column that is shown with its interval.
-        summaries: What else is shown.
-        support: Which cells are extrapolations.
+        summaries: Further columns.
+        support: Coverage by published data, which marks extrapolations.
         possible: Least and greatest value of the measure.
-        is_listed: Whether the design names its cells, so that those without a run are none.
+        is_listed: True if the design lists its cells, so that those without a run do not exist.
         points: Factors that are no axes, whose values are shown for each cell.
     """
     settings = list(part.settings())

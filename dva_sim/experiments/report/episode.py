@@ -31,9 +31,7 @@ class Played:
     """One run.
 
     Attributes:
-        scenario: As it was run.
-        seed: Of the run.
-        kept: What its model has left of it.
+        kept: Whatever its model keeps of the run.
         took_s: By the clock [s].
     """
 
@@ -58,10 +56,9 @@ class EpisodeRequest:
 
     Attributes:
         scenario: By name or path.
-        seed: Of the run.
         set: Keys to change.
         side_by_side: Two patterns to play the same seed under, separated by a comma.
-        pictures: What to draw.
+        pictures: Pictures to draw.
         record: File to keep the run in, `.mcap`.
         overwrite: It may be there, and is replaced.
 

@@ -28,7 +28,7 @@ class EventOutcomes(NamedTuple):
         confirmed: Real ones that were confirmed.
         missed: Real ones that were refuted, by kind and by who looked.
         left: Other real ones, by what became of them.
-        false_alarms: How many there were.
+        false_alarms: Number of false alarms.
         believed: False alarms that were confirmed.
     """
 

@@ -20,7 +20,7 @@ class Term:
     """A word or phrase.
 
     Attributes:
-        name: As the list has it.
+        name: Term as the list has it.
         means: In one sentence, without its full stop.
         said: Pattern of how it is said in a text, if otherwise than its name.
     """
@@ -67,7 +67,7 @@ class Marker:
     """Finds each term where it is said for the first time.
 
     Args:
-        terms: To be found.
+        terms: Terms to find.
     """
 
     def __init__(self, terms: Iterable[Term]) -> None:

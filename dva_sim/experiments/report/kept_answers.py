@@ -43,22 +43,22 @@ class KeptAnswer:
 
     Attributes:
         study: Name of the study.
-        question: As the study asks it.
+        question: Question of the study.
         answer: The answer in words.
         measure: Column that was compared; empty without a contrast.
         contrast: Its two levels in words.
         over: Factor that the rows run over.
         rows: The contrast at each level.
-        predictions: What was expected before, with what became of it.
+        predictions: Predictions, each with its verdict.
         hypotheses: Names of hypotheses with their verdicts.
         status: `declared`, `confirmatory` or `exploratory`.
         version: Version of the program.
         commit: Its commit.
-        date: When the run began, as `YYYY-MM-DD`.
+        date: Start of the run, as `YYYY-MM-DD`.
         seed: The study's.
-        persons: How many were simulated.
-        runs: How many runs were made.
-        cpu_s: What they cost [CPU s].
+        persons: Number of simulated persons.
+        runs: Number of runs.
+        cpu_s: Cost of the runs [CPU s].
         tables: SHA-256 of each table of results.
         sampled: Digests of a few runs; empty where runs are measured in real time.
         stale_since: Version that first gave something else; empty while it is still given.
@@ -140,8 +140,8 @@ def keep(answer: KeptAnswer, manifest: Mapping[str, Any], folder: Path) -> Path:
 
     Args:
         answer: The answer.
-        manifest: Of its results.
-        folder: Where answers are kept.
+        manifest: Manifest of the results.
+        folder: Folder of the kept answers.
 
     Returns:
         The answer's file.

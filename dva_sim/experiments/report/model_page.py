@@ -22,16 +22,16 @@ class ModelPage:
     """The usual page.
 
     Args:
-        view: How the study is looked at.
         events: Columns of the table `events`, if there is one.
 
     Attributes:
         name: Figures say by it which pages they belong to.
-        cluster: What is drawn anew for intervals: persons, or shifts.
-        summaries: What the table of every cell shows beside the measure.
-        has_support: Whether published data tell which delays are covered.
-        assumed: Keys that an answer depends on most, to be told where a study does not vary them.
-        ends_by_event: Whether a run is as its events ended, where the answer is about them.
+        cluster: Unit of resampling: person or shift.
+        summaries: Columns of the cell table besides the measure.
+        has_support: True if published data tell which delays are covered.
+        assumed: Keys that an answer depends on most, reported where a study does not vary them.
+        ends_by_event: True if a run's outcome is that of its events, where the answer is about
+            them.
     """
 
     name: ClassVar[str] = "driving"
@@ -79,7 +79,8 @@ class ModelPage:
         """Remarks on method; None for the default ones.
 
         Args:
-            correlation: Of the two sides of the contrast at the last level, where it is known.
+            correlation: Correlation between the two sides of the contrast at the last level, if
+                known.
         """
         return None
 

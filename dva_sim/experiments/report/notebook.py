@@ -25,8 +25,7 @@ class Episode:
     """One run of one scenario.
 
     Attributes:
-        scenario: As it was run.
-        seed: Of its luck.
+        seed: Random seed.
         tables: Its rows as columns, by table: `runs`, `events`, ...
     """
 

@@ -37,7 +37,6 @@ class PeoplePage(ModelPage):
     """The page of a run in which people drove.
 
     Args:
-        view: How the study is looked at.
         drives: Columns of the table `drives`.
     """
 

@@ -33,9 +33,9 @@ def registration_table(manifest: Mapping[str, Any], runs: Table, persons: int) -
     The claims are those registered, also where the study as run has others.
 
     Args:
-        manifest: Of the results, with a registration in its status.
+        manifest: Manifest of the results, with a registration in its status.
         runs: The table of runs.
-        persons: How many were simulated.
+        persons: Number of persons simulated.
     """
     found, study = manifest["status"]["registration"], manifest["study"]
     plan, versions = found.get("plan") or {}, manifest.get("versions") or {}

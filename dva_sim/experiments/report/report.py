@@ -339,7 +339,7 @@ def write_report(folder: Path, pdf: bool = False, *, figures: Sequence[ReportFig
     Of a study that is not finished, the page says what is known so far.
 
     Args:
-        folder: Of the results.
+        folder: Results folder.
         pdf: Print `report.pdf` too. One that is there already is printed again in any case, so
             that it never says something else than the page.
         figures: Those of users, of `load_figures`; they come last.

@@ -115,10 +115,10 @@ def print_table(
     """Columns side by side as far as there is room; the names of the others in a line.
 
     Args:
-        heads: Of the columns.
-        rows: As text.
-        console: Where to; what is no terminal has room for all.
-        labels: How many leading columns name a row.
+        heads: Column headings.
+        rows: Cells as text.
+        console: Output; a file that is not a terminal has room for all columns.
+        labels: Number of leading columns that name a row.
     """
     widths = [_width(head, [row[n] for row in rows]) for n, head in enumerate(heads)]
     if not console.is_terminal:

@@ -33,7 +33,6 @@ def export(
     values are empty in CSV. The same results give the same bytes.
 
     Args:
-        results: Where from.
         out: File or folder.
         tables: Names of tables.
         form: `csv` (the default of folders) or `parquet`.

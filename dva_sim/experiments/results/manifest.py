@@ -97,7 +97,7 @@ def machine(todo: Sequence[StudyRun], costs: Mapping[RunKey, float]) -> dict[str
 
     Args:
         todo: The runs of the study.
-        costs: What each run that is done has cost [CPU s].
+        costs: Cost of each completed run [CPU s].
     """
     spent: dict[str, list[float]] = defaultdict(list)
     for job in {job.key: job for job in todo}.values():

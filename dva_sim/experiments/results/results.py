@@ -42,8 +42,7 @@ class Column(NamedTuple):
 
     Attributes:
         table: Name of the table.
-        name: Of the column.
-        unit: As printed; empty for what has none.
+        unit: Unit as printed; empty for none.
         meaning: In words; empty if nothing is known of it.
     """
 
@@ -67,7 +66,7 @@ def describe(
         columns: Their names.
         models: Those of the study's parts; where meanings differ, all are given.
         factors: Names of the study's factors.
-        told: What the results tell of columns that users have added.
+        told: Descriptions of user-defined columns, from the results.
     """
     table_of = "runs" if table == REPEATS else table
     added = (told or {}).get(table_of, {})
@@ -225,10 +224,10 @@ class Results:
     its dotted key, `is_reference`, `person`, `trial` and `seed`; the measures follow.
 
     Attributes:
-        folder: Where it lies.
+        folder: Results folder.
         manifest: The study as resolved, its base scenarios, `--set` list, versions, failures;
             `partial` where the study is not finished.
-        aside: Where its tables lie for now, if the study is not finished.
+        aside: Temporary folder of its tables, if the study is not finished.
     """
 
     folder: Path

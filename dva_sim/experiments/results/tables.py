@@ -38,7 +38,7 @@ def write_tables(folder: Path, jobs: Sequence[StudyRun], tables_of: TablesOf) ->
     all the others hold.
 
     Args:
-        folder: Of the results.
+        folder: Results folder.
         jobs: The runs.
         tables_of: The tables of a run, by its key; None of one that is not done.
 
@@ -120,9 +120,9 @@ class _Table:
     not depend on the machine's mood.
 
     Args:
-        folder: Where its file goes, and meanwhile its database.
+        folder: Folder of its file, and meanwhile of its database.
         name: Its name.
-        seen: What its columns are known to hold, in their order; others are met in rows.
+        seen: Columns already known, in order; further ones are found in rows.
     """
 
     def __init__(self, folder: Path, name: str, seen: Columns) -> None:

@@ -45,9 +45,9 @@ class DesignCell:
         part: Name of the part.
         index: Position in the design, or `REFERENCE`.
         levels: Level of each factor; none for the reference.
-        scenario: As it will be run, but for the person.
+        scenario: Scenario to be run, except for the person.
         config: Hash of that scenario.
-        changes: What makes it of the scenario's file, by dotted key.
+        changes: Changes to the scenario's file, by dotted key.
     """
 
     part: str
@@ -113,8 +113,7 @@ def cells(study: Study, inputs: StudyInputs | None = None) -> list[DesignCell]:
     The repeats of the answer come last, as if they were a part of their own.
 
     Args:
-        study: What is asked.
-        inputs: What its files say, if they have been read already.
+        inputs: Contents of its files, if already read.
 
     Raises:
         ConfigError: a scenario that cannot be read, or is not valid with some change, or a
@@ -189,7 +188,6 @@ def jobs(study: Study, grid: Sequence[DesignCell] | None = None) -> list[StudyJo
     """All runs in a fixed order: part, cell, person, trial; the repeats last.
 
     Args:
-        study: What is asked.
         grid: Its cells, if they have been made already.
 
     Raises:
@@ -205,7 +203,7 @@ def runs_in(manifest: Mapping[str, Any]) -> list[StudyRun]:
     """The runs that a manifest tells of, in the order of `jobs`.
 
     Args:
-        manifest: Of a study that may be under way; only its study and cells are read.
+        manifest: Manifest of a study that may be running; only its study and cells are read.
     """
     study, rows = Study.model_validate(manifest["study"]), manifest["cells"]
     return [

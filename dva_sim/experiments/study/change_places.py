@@ -15,8 +15,7 @@ def located(study: Study, part: str, error: ConfigError, changes: Mapping[str, A
     """The mistake at what makes it; as it is if a file has been named.
 
     Args:
-        study: Whose scenario it is.
-        part: Which one.
+        study: Study that runs the scenario.
         error: With the keys at fault, if changes of the scenario are.
         changes: All changes of the scenario.
     """

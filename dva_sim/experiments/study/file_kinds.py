@@ -39,10 +39,10 @@ class FileKind(NamedTuple):
     """One kind of YAML file.
 
     Attributes:
-        name: As it is called in messages.
+        name: Name as used in messages.
         model: Its keys.
-        folder: Where files of this kind lie.
-        command: What does something with it, if a command does.
+        folder: Folder of such files.
+        command: Command that takes such files, if any.
         borrowed: Keys that are those of another kind, so that they alone tell nothing.
     """
 
@@ -138,8 +138,8 @@ def of_other_kind(document: Document, command: str, wanted: str) -> ConfigError 
 
     Args:
         document: The file.
-        command: Which files of the right kind have.
-        wanted: What these are called.
+        command: Command that takes files of the right kind.
+        wanted: Name of the right kind.
     """
     folder = document.file.resolve().parent
     if folder.as_posix().endswith(EVIDENCE):

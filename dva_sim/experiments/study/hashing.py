@@ -37,7 +37,7 @@ def inputs(scenarios: Iterable[Config], others: Iterable[str] = ()) -> dict[str,
 
     Args:
         scenarios: All that are run.
-        others: What else the runs depend on, as `file.py:Class`.
+        others: Other files that the runs depend on, as `file.py:Class`.
     """
     dumps = (scenario.model_dump(mode="json") for scenario in scenarios)
     names = sorted({*others, *(text for dump in dumps for text in _texts(dump) if "." in text)})

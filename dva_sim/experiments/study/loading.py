@@ -38,9 +38,9 @@ class Changed:
     """A study's data with some keys changed.
 
     Attributes:
-        data: As a file would hold it.
+        data: Data as a file would hold it.
         changes: Keys of the scenarios, which hold in every part.
-        touched: Where the data was changed.
+        touched: Paths of the changed keys.
     """
 
     data: dict[str, Any]
@@ -64,7 +64,7 @@ def change(
     scenario; if it is a factor, its value or list of values takes the place of its levels.
 
     Args:
-        before: What is changed.
+        before: Data to change.
         pairs: New values by dotted key.
         model: The keys of a study.
         scenarios: The keys of the scenarios that there are.
@@ -322,7 +322,7 @@ def _built(data: Changed, document: Document, may_lose: bool = False) -> Study:
     Args:
         data: Its keys.
         document: Its file.
-        may_lose: Whether claims about what is not there are lost, instead of being mistakes.
+        may_lose: True if claims about missing factors or levels are dropped instead of rejected.
     """
     study = validate(Study, data.data, document.error)
     study._document = dataclasses.replace(

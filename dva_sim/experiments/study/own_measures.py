@@ -41,7 +41,7 @@ def columns_told(
 
     Args:
         measures: Those of the study itself.
-        scenarios: What is run.
+        scenarios: Scenarios of the runs.
     """
     told: dict[str, list[Measure]] = {}
     named = {scenario.model: scenario for scenario in scenarios if scenario.model not in MODELS}

@@ -81,7 +81,7 @@ class StudyPart(Config):
 
     Attributes:
         scenario: By name or path, also relative to the study's file.
-        changes: What this study has otherwise than the scenario, in every cell of the part.
+        changes: Changes to the scenario, in every cell of the part.
         reference: Changes that make the reference run, one for each person and trial.
         replications: Trials per person, if not those of the study.
     """
@@ -104,7 +104,7 @@ class Contrast(Config):
         within: Levels of the other factors.
         family: Tests of one family share their chance of a false alarm.
         smallest_effect: Smallest difference that matters, in the measure's own unit.
-        smallest_effect_s: The same for a measure in seconds [s].
+        smallest_effect_s: The smallest effect for a measure in seconds [s].
     """
 
     part: str
@@ -130,8 +130,9 @@ class Hypothesis(Config):
 
     Attributes:
         text: In words.
-        comparison: Which contrast: `answer`, or the name of a comparison.
-        direction: Of the first level minus the second: `above` zero, `below` it, or the `same`.
+        comparison: Contrast to test: `answer`, or the name of a comparison.
+        direction: Sign of the first level minus the second: `above` zero, `below` it, or the
+            `same`.
         margin: By how much at least it is above or below; or within how much it is the same.
             In the measure's unit.
         at: Levels of other factors than the contrast's. By default those that the contrast is
@@ -172,7 +173,7 @@ class StopRule(Config):
         measure: Column of the table `runs`, in excess of the reference run where there is one.
         part: Part it is measured in.
         comparison: Instead of a measure: `answer`, or the name of a comparison.
-        batch_persons: How many persons each further batch has.
+        batch_persons: Number of persons in each further batch.
         most_persons: After so many it ends in any case.
 
     References:
@@ -204,14 +205,14 @@ class Prediction(Config):
 
     Attributes:
         text: In words.
-        direction: Of the first level minus the second: `above` zero, `below` it, or the `same`
+        direction: Sign of the first level minus the second: `above` zero, `below` it, or the `same`
             but for less than the smallest effect that matters. Without it nothing is judged.
-        factor: Whose levels are compared; by default the answer's.
+        factor: Factor whose levels are compared; by default the answer's.
         contrast: The two levels; by default the answer's.
         at: Levels of other factors. By default those the answer is `within`, the last level of
             the factor it runs `over`, and the second of its contrast.
         expects: Range in which the mean difference is expected, in the measure's unit.
-        expects_s: The same for a measure in seconds [s].
+        expects_s: The expected range for a measure in seconds [s].
     """
 
     text: Annotated[str, Field(min_length=1)]
@@ -244,7 +245,7 @@ class Tuning(Config):
     the nearest to 1.
 
     Attributes:
-        key: What is tuned.
+        key: Key to tune.
         levels: Its values tried, the same for all.
         by: Factors for each of whose levels it is tuned on its own.
         at: Levels of the other factors while it is tuned.
@@ -252,7 +253,7 @@ class Tuning(Config):
         measure: Column of the table `runs` that should be small.
         persons: Simulated persons, others than the study's.
         replications: Trials of each.
-        seed: Of the tuning; not that of the study.
+        seed: Random seed of the tuning; independent of the study's.
     """
 
     key: str
@@ -275,8 +276,8 @@ class RobustnessRule(Config):
     which fill the bands of calibration evenly (Latin hypercube, on a logarithmic scale).
 
     Attributes:
-        strategies: Of the operators; by default the scenario's alone.
-        sets: How many other sets of parameters.
+        strategies: Strategies of the operators; by default only the scenario's.
+        sets: Number of other parameter sets.
         bands: File of the bands, in `agents/people` or by path: `[low, high]` for each trait.
         at: Levels of the factor that the answer runs `over`; by default its last.
         persons: Simulated persons in each repeat: the first of the study's.
@@ -295,9 +296,9 @@ class MapRule(Config):
     """Map of costs: each level of the answer's factor at each level that it runs over.
 
     Attributes:
-        models: Factor whose levels are the models of persons that the data leave open; what is
-            found is told as a range over them.
-        notes: What else rests on an assumption, by level of the factor that the answer runs over.
+        models: Factor whose levels are the models of persons that the data leave open; findings are
+            given as a range over them.
+        notes: Further assumptions, by level of the factor that the answer runs over.
     """
 
     models: str
@@ -313,10 +314,10 @@ class ScreeningRule(Config):
     Attributes:
         over: Keys of assumed numbers, `*` for any part of them; `dva-sim assumed` lists them.
         at: Level of the factor that the answer runs `over`; by default its last.
-        trajectories: How many.
+        trajectories: Number of trajectories.
         persons: Simulated persons at each point, others than the study's.
         replications: Trials of each.
-        seed: Of the screening; not that of the study.
+        seed: Random seed of the screening; independent of the study's.
     """
 
     over: Annotated[tuple[str, ...], Field(min_length=1), AfterValidator(_distinct)] = (

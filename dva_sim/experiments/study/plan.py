@@ -21,7 +21,7 @@ class StudyPlan:
     """Plan of a study's runs, made before anything is run.
 
     Attributes:
-        study: As it was loaded; with the seed of its registration, if it is run as registered.
+        study: Study as loaded; if run as registered, with the seed of its registration.
         scenarios: The scenario of each part before any factor has changed it.
         cells: Its configurations, in order.
         rehearsed: The configurations in which a mistake would show: of ranges, their ends.

@@ -39,15 +39,15 @@ class Preregistration(Config):
 
     Attributes:
         study: Name of the study.
-        question: As it was worded then.
+        question: Question as worded at registration.
         made_with: Version of the program, and the fingerprint of what simulates.
         judged_with: The fingerprint of what will judge the hypotheses.
-        full: Whether it is the larger version.
+        full: True for the larger version.
         earlier: Hashes of the registrations that this one replaces, the oldest first.
         plan: All that is fixed: the keys of the study, and hashes of its rows, its scenarios
             as resolved, and the files these name.
-        hash: Of the plan and the earlier ones; a name or a program fixes nothing of the run, and
-            to change one must not buy another seed.
+        hash: Hash of the plan and the earlier registrations. Names and program versions are left
+            out, so that changing one does not give another seed.
     """
 
     study: str
@@ -93,8 +93,8 @@ def register(study: Study, again: bool = False) -> str:
     """Write down what the confirmatory run of a study will be, and say so.
 
     Args:
-        study: As its file says, in one of its versions.
-        again: Whether an earlier registration is replaced; that is told ever after.
+        study: Study as in its file, in one of its versions.
+        again: True to replace an earlier registration; the report will always mention it.
 
     Raises:
         ConfigError: nothing to register, a size left open, or a registration that is there.

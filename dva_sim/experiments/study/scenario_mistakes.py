@@ -18,7 +18,6 @@ def mistakes_of(name: str, pairs: Sequence[str], seed: int) -> Iterator[None]:
     Args:
         name: The scenario, by name or path.
         pairs: `key=value` for each key that is changed.
-        seed: Of the run.
 
     Raises:
         ConfigError: what was raised inside, with its place.

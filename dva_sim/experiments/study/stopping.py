@@ -37,8 +37,7 @@ def is_enough(study: Study, rows: Sequence[Row]) -> bool:
     """True if every interval of the stopping rule is narrow enough.
 
     Args:
-        study: What is asked.
-        rows: Of the table `runs` so far, in the order of the design.
+        rows: Rows of the table `runs` so far, in the order of the design.
     """
     stop = study.stop
     if stop is None:

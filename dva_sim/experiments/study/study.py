@@ -46,8 +46,8 @@ class Status(Config):
             changed, tried or left open. `confirmatory`: run as registered, on seeds that nobody
             could know before.
         why: Reasons and remarks, each a sentence without its full stop.
-        reproducible: Whether the same command gives the same bytes on any machine.
-        registration: What was registered, whether or not this is it; None if nothing was.
+        reproducible: True if the same command gives the same bytes on any machine.
+        registration: The registration, even if this result departs from it; None if there is none.
     """
 
     kind: Literal["declared", "exploratory", "confirmatory"] = "declared"
@@ -61,29 +61,29 @@ class Study(Config):
 
     Attributes:
         question: In words.
-        predictions: What was expected before anything was run.
-        seed: Of the whole study; the population of persons is drawn from it too.
+        predictions: Predictions written down before anything was run.
+        seed: Random seed of the whole study; the population of persons is drawn from it too.
         persons: Simulated persons: the blocks of the design and clusters of the statistics.
         replications: Paired trials per person.
         factors: Levels of each scenario key that is varied; the cells are their full grid.
-        design: Which levels are run together, if not every one with every other.
+        design: Combination of levels, if not every one with every other.
         treatments: Factors whose levels are names of several changes at once.
         parts: Scenarios by name, each run in every cell.
         answer: The declared contrast.
         comparisons: Further contrasts by name.
         hypotheses: Claims about contrasts, by name; `dva-sim register` fixes them.
-        tuning: How the level `tuned` of the factor `tuning` comes by its value.
+        tuning: Rule that chooses the value for level `tuned` of the factor `tuning`.
         robustness: The answer again under other models of the persons.
-        map: Which level of the answer's factor to choose at each level it runs over.
-        screening: Which assumed numbers `dva-sim screen` varies; the study's own runs do not.
-        stop: When enough persons were simulated.
+        map: Map: the best level of the answer's factor at each level that it runs over.
+        screening: Assumed numbers that `dva-sim screen` varies; the study's own runs do not.
+        stop: Rule that ends the study early.
         budget_s: Time by the clock [s] after which no further persons are begun.
         measures: Further columns of the runs: covariates of ours, such as `way_off_m`, and
             measures of the user's own, `mine.py:Mine`.
         covariates: Columns of the runs, or products of some, that no treatment changes and whose
             mean over all persons and trials is zero: the answer is adjusted for what they happen
             to be.
-        record: Which episodes are kept as recordings.
+        record: Episodes to keep as recordings.
         figures: Figures of one's own that its report has, such as `mine.py:Mine`.
         quick: Keys that are otherwise in the small version, which `--quick` runs.
         full: Keys that are otherwise in the larger version, which `--full` runs.

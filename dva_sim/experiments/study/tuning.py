@@ -31,7 +31,7 @@ class ChosenValue(Config):
 
     Attributes:
         when: Those levels.
-        value: Of the key that was tuned.
+        value: Value of the tuned key.
     """
 
     when: dict[str, Level]
@@ -43,8 +43,8 @@ class TriedValue(Config):
 
     Attributes:
         when: Levels it was tried under.
-        value: Of the key that is tuned.
-        mean: Of the measure over persons.
+        value: Value of the tuned key.
+        mean: Mean of the measure over persons.
         low: Lower end of its 95 % interval.
         high: Upper end.
     """
@@ -60,8 +60,8 @@ class TuningBasis(Config):
     """Hashes of the user-editable files that tuned values depend on.
 
     Attributes:
-        persons: Of the population.
-        phones: Of all phones.
+        persons: Hash of the population.
+        phones: Hash of all phones.
     """
 
     persons: str
@@ -201,7 +201,7 @@ def trials_of(
 
     Args:
         study: It keeps everything but what `LEFT` names.
-        key: Where `rule` stands in the study, for errors.
+        key: Key of `rule` in the study, for errors.
         rule: Its seed and its size.
         part: Part that is run, without reference runs.
         **changes: Further keys of the trials.

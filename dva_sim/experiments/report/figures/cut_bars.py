@@ -52,9 +52,9 @@ class Bars:
     Attributes:
         axes: In which they are drawn.
         at: Place of each, across it.
-        low: Where it begins.
-        high: Where it ends.
-        colour: Of all of them.
+        low: Low end of each bar.
+        high: High end of each bar.
+        colour: Colour of all bars.
         along: The axis along which they lie.
     """
 

@@ -83,10 +83,9 @@ def _curves(
     """A panel for each setting, in it a line with its band for each level, and where it ends.
 
     Args:
-        view: How the part is looked at.
         lines: Levels drawn.
         baseline: The level that they are compared with.
-        ylabel: Of what.
+        ylabel: Label of the y axis.
 
     Returns:
         The figure, its axes, the end of each line, the bars, what a caption must say of those

@@ -35,7 +35,7 @@ class Cloud(NamedTuple):
     """Runs of one kind at every point.
 
     Attributes:
-        name: What it is: a level, a difference, or nothing.
+        name: Label of the runs: a level, a difference, or empty.
         values: `(points, persons, trials)`.
         level: The level, for its colour; None for a difference.
     """

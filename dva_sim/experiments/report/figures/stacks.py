@@ -47,12 +47,11 @@ class Stacks:
     """Bars lie, so that names of any length stand beside them.
 
     Args:
-        view: What is shown.
-        label: Of the axis along the bars.
-        parts: What the bars consist of, and any other mark: names and handles of the key.
+        label: Label of the axis along the bars.
+        parts: Names and handles of the legend: parts of the bars, and other marks.
 
     Attributes:
-        figure: To be finished.
+        figure: Figure to be finished.
         axes: One for each setting shown and line, in that order.
     """
 

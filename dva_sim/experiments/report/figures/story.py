@@ -61,7 +61,6 @@ class Events:
 
     Args:
         table: Columns of the table `events`.
-        part: Which part.
         view: Names the factors and their levels.
     """
 

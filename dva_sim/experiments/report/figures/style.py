@@ -76,11 +76,11 @@ class Drawn:
 
     Attributes:
         name: Its file name without an ending.
-        title: What is seen.
-        caption: How to read it.
-        reads: What else must be known to read it, in sentences that other figures share.
+        title: Title above the figure.
+        caption: Explanation of how to read it.
+        reads: Further reading notes, in sentences that several figures share.
         svg: The figure as vectors.
-        png: The same as pixels.
+        png: The figure as pixels.
         csv: The numbers behind it; empty where none were written down.
         figure: The figure itself, laid out, to be put on a page.
     """
@@ -366,15 +366,15 @@ class ReportFigure(ABC):
     open and nothing is changed.
 
     Attributes:
-        name: Of its files, in small letters, digits and underscores.
-        title: What is seen, in a line; a drawing may have a title that tells more.
+        name: Base name of its files: lower-case letters, digits and underscores.
+        title: Title in one line; a drawing may have a more specific title.
         tables: Tables that the results must hold.
         columns: Columns of the table `runs` of which some run of the answer's part must have a
             number.
         pages: Kinds of reports that it belongs to, `driving`, `shift` or `transport`; all of them
             where none is named.
-        has_panels: Whether it has a panel for each setting of the factors that are neither lines
-            nor along x; the report then says which factors those are.
+        has_panels: True if it has a panel for each setting of the factors that are neither lines
+            nor along x; the report then names these factors.
     """
 
     name: ClassVar[str]
@@ -415,10 +415,10 @@ class ReportFigure(ABC):
         """The finished figure, as vectors and pixels, with nothing that changes day by day.
 
         Args:
-            figure: As drawn, of `panels`.
-            caption: How to read it.
-            numbers: What was drawn, for the CSV.
-            title: What is seen, if more can be said than the figure's own title does.
-            reads: What else must be known to read it, in sentences that other figures share.
+            figure: Figure made by `panels`.
+            caption: Explanation of how to read it.
+            numbers: Numbers drawn, for the CSV file.
+            title: More specific title than the figure's own, if any.
+            reads: Further reading notes, in sentences that several figures share.
         """
         return finish(figure, self.name, title or self.title, caption, numbers=numbers, reads=reads)

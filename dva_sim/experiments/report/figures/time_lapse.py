@@ -61,7 +61,7 @@ class _TimeLapse(ReportFigure):
     """Positions and paths of all agents at some moments of one run.
 
     Attributes:
-        which: Of the runs that were kept.
+        which: Choice among the kept runs.
     """
 
     pages = ("driving",)
@@ -83,7 +83,7 @@ class _TimeLapse(ReportFigure):
         Args:
             view: Names the measure.
             episode: The run.
-            scenario: Of its part, for the site.
+            scenario: Scenario of its part, which names the site.
         """
         names = agents_of(episode.moments)
         ways = {name: way_of(episode.moments, name) for name in names}

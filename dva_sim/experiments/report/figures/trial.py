@@ -38,9 +38,9 @@ def draw_trial(scenario: TaskScenario, seed: int, path: Path, number: int = 0) -
 
     Args:
         scenario: The task.
-        seed: Of the block.
-        path: Where to; its ending says in which form.
-        number: Which of the trials that are kept.
+        seed: Seed of the block.
+        path: Output file; its suffix decides the format.
+        number: Number of the trial among those kept.
     """
     with styled():
         trial_figure(scenario, *trace_of(scenario, seed, number)).savefig(path)
@@ -51,8 +51,8 @@ def trial_figure(scenario: TaskScenario, row: Row, trace: Trace) -> Figure:
 
     Args:
         scenario: The task.
-        row: What was measured.
-        trace: What was kept of it.
+        row: Measures of the trial.
+        trace: Recorded motion of the trial.
     """
     unit = _unit_of(trace)
     with styled():
