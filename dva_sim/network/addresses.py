@@ -14,7 +14,7 @@ def check_address(text: str, where: str = "") -> None:
     """Refuse what is no address.
 
     Args:
-        text: As given.
+        text: Address as given.
         where: Option that it was given to, with a space behind it.
 
     Raises:

@@ -83,7 +83,7 @@ class RunCarrier:
             tell: Takes one line about each connection that could not be made.
             zeromq: Set on ZeroMQ's sockets.
             broker: Address of MQTT's broker, `HOST:PORT`.
-            tells_loss: Whether this process tells that the broker is lost.
+            tells_loss: True if this process reports a lost broker.
             crossing: Leads ZeroMQ's connections across a link.
             ways: Lead MQTT's connections across it; see `MqttNetwork`.
         """
@@ -96,7 +96,7 @@ class RunCarrier:
 
         Args:
             hosts: Addresses at which devices, or the broker, would listen.
-            has_keys: Whether keys are wanted.
+            has_keys: True if keys are wanted.
 
         Raises:
             ConfigError: in one line.

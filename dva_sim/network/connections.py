@@ -58,7 +58,7 @@ class Stream:
         deliver: Takes each payload, once and in order.
 
     Attributes:
-        deliver: The same; may be replaced at any time.
+        deliver: Callback for each message; may be replaced at any time.
     """
 
     def __init__(self, clock: Clock, forward: Link, backward: Link, deliver: Deliver) -> None:
@@ -171,7 +171,7 @@ class StreamEnd(_PlainEnd):
 
     Args:
         out: Carries what is sent.
-        link: What that goes over.
+        link: Link that carries this direction.
 
     Attributes:
         send: Sends a message of a size on the wire [B]; see `Stream`.
@@ -264,7 +264,7 @@ class DatagramEnd(_PlainEnd):
     """One end: what it sends travels over `link` and is taken by `deliver` there.
 
     Attributes:
-        closed: Whether what arrives here is thrown away, and nothing is sent.
+        closed: True once incoming data is discarded and nothing is sent.
     """
 
     other: DatagramEnd
@@ -345,10 +345,9 @@ class ZeromqConfig(Config):
 
     Attributes:
         high_water_mark: Messages that a pipe holds, at both ends.
-        send_buffer_bytes: Of TCP (`ZMQ_SNDBUF`); left out: as large as the kernel finds fit.
-        receive_buffer_bytes: Of TCP (`ZMQ_RCVBUF`); left out: likewise.
-        conflate: Which end keeps only the newest of what is published and waits there
-            (`ZMQ_CONFLATE`).
+        send_buffer_bytes: TCP send buffer (`ZMQ_SNDBUF`); by default the kernel's size.
+        receive_buffer_bytes: TCP receive buffer (`ZMQ_RCVBUF`); by default the kernel's size.
+        conflate: Ends that keep only the newest published message in their queue (`ZMQ_CONFLATE`).
     """
 
     high_water_mark: Annotated[
@@ -402,7 +401,7 @@ class Connector:
         transport: `zeromq` or `datagrams`.
         depth: `message`, `segment`, or `auto`; datagrams have but one.
         zeromq: Options of the sockets.
-        load: What a link is offered.
+        load: Load offered to a link.
 
     Attributes:
         deepest: The depth of the connections so far: `message`, `segment` as soon as one needed
@@ -435,7 +434,7 @@ class Connector:
             links: From the opener, and to it.
             at_peer: Takes what the opener sends.
             at_opener: Takes what the peer sends.
-            publishes: Whether the peer publishes to the opener.
+            publishes: True if the peer publishes to the opener.
         """
         ends = clock, *links, at_peer, at_opener
         depth = self.depth(*links)

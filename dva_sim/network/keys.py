@@ -33,7 +33,7 @@ class KeyRing:
     that those of others may be missing.
 
     Args:
-        folder: Where `create_keys` has put them.
+        folder: Folder written by `create_keys`.
 
     Raises:
         ConfigError: there are none, or a file is broken or contradicts another.
@@ -162,7 +162,7 @@ def create_keys(folder: str | Path, ids: Iterable[str]) -> list[str]:
     is on another machine.
 
     Args:
-        folder: Where to put them; made if need be.
+        folder: Folder for the keys; created if missing.
         ids: The devices, by their ids on the wire.
 
     Raises:

@@ -29,7 +29,7 @@ class Request(NamedTuple):
         data: Its bytes.
         answer: Takes the bytes of the reply; once, now or later.
         sender: Id of the device whose key opened the connection; None without keys.
-        peer: What the connection it came by is known by here; nobody else can use that.
+        peer: Local identity of the connection that it came by; meaningless elsewhere.
     """
 
     data: bytes
@@ -83,7 +83,7 @@ class Transport(Protocol):
     """Transport of messages between nodes; a node is named by the id of its device.
 
     Attributes:
-        taps: Who looks at what reaches a node, by the id of the node.
+        taps: Taps on the requests that reach a node, by the id of the node.
     """
 
     taps: dict[str, RequestTap]
@@ -141,11 +141,11 @@ class Requester:
 
     Args:
         transport: Carries the messages.
-        node: Who asks.
-        peer: Who answers.
-        timeout: How long to wait for a reply [s].
-        attempts: How often a request is sent before it has failed.
-        window: How many requests may be unanswered at once.
+        node: Node that sends the requests.
+        peer: Node that replies.
+        timeout: Time to wait for a reply [s].
+        attempts: Number of times a request is sent before it fails.
+        window: Maximum number of unanswered requests.
     """
 
     def __init__(

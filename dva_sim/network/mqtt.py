@@ -95,7 +95,7 @@ class MqttNetwork(RealNetwork):
         broker: Its address, `HOST:PORT`, which is that of every node.
         tell: Takes one line when the broker is lost, or found again.
         qos: 0: messages are sent once. 1: until the broker has acknowledged them.
-        tells_loss: Whether to tell that the broker is lost; else another process of the run does.
+        tells_loss: True to report a lost broker; otherwise another process of the run does.
         ways: Gives the socket of the file system that leads a node to the broker across a link;
             None: the node connects to its address.
     """

@@ -39,7 +39,7 @@ class Broker:
     Args:
         address: IPv4 address of this machine.
         port: Port.
-        nodelay: Whether it sends small messages at once (TCP_NODELAY).
+        nodelay: True to send small messages at once (TCP_NODELAY).
         settings: More lines of its configuration.
         rules: Its access control list; empty: anybody may send and read everything.
 
@@ -126,8 +126,8 @@ def new_client(name: str, nodelay: bool, kind: Literal["tcp", "unix"] = "tcp") -
 
     Args:
         name: Client id; empty: the broker gives one.
-        nodelay: Whether it sends small messages at once (TCP_NODELAY).
-        kind: What it connects by; `unix`: a socket of the file system, whose path is its host.
+        nodelay: True to send small messages at once (TCP_NODELAY).
+        kind: Kind of connection; `unix` is a socket of the file system, with its path as host.
     """
     from paho.mqtt.client import Client, MQTTv5  # late: an extra
     from paho.mqtt.enums import CallbackAPIVersion

@@ -71,7 +71,7 @@ class Condition:
         proc_ms: The robot's service time.
         timeout_ms: REQ: after it the socket is closed and the same command goes over a new one.
         attempts: REQ: so many times in all, then an alert and the next command.
-        conflate: Which end keeps only the last message.
+        conflate: End that keeps only the last message.
         hwm: High-water marks of both ends.
         sndbuf: Send buffer of the operator [B]; None is the kernel's own choice.
         rcvbuf: Receive buffer of the robot [B]; None is the kernel's own choice.
@@ -265,14 +265,14 @@ class RunLog:
     """Log of one run; times [s] on one clock.
 
     Attributes:
-        start: When the first command was due.
-        issued: When each command was sent first; its place is its number.
+        start: Time at which the first command was due.
+        issued: Time at which each command was first sent; its index is its number.
         applied: Number of each command whose processing ended, and when; repetitions count.
         replied: Number of each command whose reply arrived, and when.
-        timeouts: When the operator gave up waiting for a reply.
-        alerts: When it gave up a command after the last attempt.
+        timeouts: Times at which the operator gave up waiting for a reply.
+        alerts: Times at which the operator gave up a command after the last attempt.
         connected_s: From opening the first socket to TCP's connection [s].
-        handshake_s: The same to the end of ZeroMQ's handshake.
+        handshake_s: From opening the first socket to the end of ZeroMQ's handshake [s].
     """
 
     start: float = 0.0
@@ -303,9 +303,8 @@ def measure_log(log: RunLog, warm_s: float, dur_s: float) -> Measures:
     - `t_conn_ms`, `t_hs_ms`: connecting, and the whole handshake.
 
     Args:
-        log: What happened.
-        warm_s: When the window begins, after the start [s].
-        dur_s: How long it is [s].
+        warm_s: Start of the window, after the start of the run [s].
+        dur_s: Length of the window [s].
     """
     issued = np.array(log.issued) - log.start
     numbers = np.array([number for number, _ in log.applied], dtype=int)

@@ -33,9 +33,9 @@ class Line(Protocol):
     Attributes:
         clock: The run's.
         rate_hz: Wanted commands per second.
-        timeout: How long to wait for an answer [s].
-        attempts: How often a request is sent before it has failed.
-        window: How many requests may be unanswered at once, where a pattern allows more than one.
+        timeout: Time to wait for a reply [s].
+        attempts: Number of times a request is sent before it fails.
+        window: Maximum number of unanswered requests, where a pattern allows more than one.
     """
 
     clock: Clock
@@ -50,9 +50,9 @@ class Line(Protocol):
         """Connect to the robot's service: a REQ socket, or a DEALER for a window above 1.
 
         Args:
-            window: How many requests may be unanswered at once.
-            timeout: Of a request [s]; None: as configured.
-            attempts: Of a request; None: as configured.
+            window: Maximum number of unanswered requests.
+            timeout: Time-out of a request [s]; None: as configured.
+            attempts: Number of attempts per request; None: as configured.
         """
 
     @property
@@ -89,18 +89,18 @@ class Pattern(ABC):
     An emergency and all other requests never pass through here.
 
     Attributes:
-        title: What it is called in reports; one without is called by its name.
-        label: The same where there is little room.
-        colour: Of its lines in figures, as `report/figures/palette.py` calls it.
-        sockets: That carry the commands, the app's first. In virtual time the same connections
-            are modelled.
-        when_slow: What becomes of commands when the robot, or the link, cannot keep up.
-        answered: Whether the app learns that nobody obeys: it alerts when the time-outs of all
-            attempts have passed, and the time in which it asks for an answer.
-        in_step: Whether a command waits for the answer to the one before.
-        published: Whether commands are published, so that the robot subscribes to them when a
-            drive begins. It takes requests in any case.
-        newest_wins: Whether the robot obeys only the newest published command that waits.
+        title: Name in reports; the pattern's own name if empty.
+        label: Short name, for narrow places.
+        colour: Colour of its lines in figures, by its name in `report/figures/palette.py`.
+        sockets: Sockets that carry the commands, the app's first. In virtual time the same
+            connections are modelled.
+        when_slow: Fate of commands when the robot or the link cannot keep up.
+        answered: True if the app learns that nobody obeys: it alerts when the time-outs of all
+            attempts have passed, and the time in which it asks for a reply.
+        in_step: True if a command waits for the reply to the one before.
+        published: True if commands are published, so that the robot subscribes to them when a drive
+            begins. It takes requests in any case.
+        newest_wins: True if the robot obeys only the newest published command in its queue.
     """
 
     title: str = ""

@@ -36,8 +36,9 @@ class RealNetwork(ABC):
         tell: Takes one line about each connection that could not be made.
 
     Attributes:
-        counters: What was refused or could not be sent, by reason.
-        watcher: Told of each message: a node here, the content, whether that node sends it.
+        counters: Messages refused or not sent, counted by reason.
+        watcher: Callback for each message: a node here, the content, and True if that node sends
+            it.
         taps: See `Transport`.
     """
 
@@ -72,7 +73,7 @@ class RealNetwork(ABC):
         Args:
             node: The node.
             host: Address to listen on.
-            port: Of requests; 0 for any that is free.
+            port: Port for requests; 0 for any free one.
 
         Returns:
             Its address, as for a registration.

@@ -207,10 +207,10 @@ class PacedClock(LiveClock):
     and in order, and what it lags by more than `MOST_BEHIND` is given up for good.
 
     Args:
-        factor: How many virtual seconds go by in a real one.
+        factor: Virtual seconds per real second.
 
     Attributes:
-        on_late: Told by how much real time an event comes too late [s], if more than `HEEDED`.
+        on_late: Callback with the lateness of an event in real time [s], if more than `HEEDED`.
         given_up: Real time that was never made up for, in all [s].
     """
 

@@ -40,8 +40,8 @@ class RequestWindow:
         rate_hz: Wanted commands per second.
 
     Attributes:
-        size: How many requests may be unanswered now.
-        unanswered: How many are.
+        size: Number of requests that may be unanswered now.
+        unanswered: Number of unanswered requests.
     """
 
     def __init__(self, rate_hz: float) -> None:

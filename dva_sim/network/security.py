@@ -39,14 +39,14 @@ class Greeting:
     """A greeting under way.
 
     Args:
-        context: Where its socket lives.
-        endpoint: Whom to greet.
-        mechanism: What this end speaks: `NULL` or `CURVE`.
+        context: Context of its socket.
+        endpoint: Address to greet.
+        mechanism: Mechanism of this end: `NULL` or `CURVE`.
 
     Attributes:
-        socket: To be polled; `read` takes what has arrived.
-        theirs: What the other end speaks, once it is known.
-        done: Whether there is nothing more to wait for.
+        socket: Socket to be polled; `read` takes incoming data.
+        theirs: Mechanism of the other end, once known.
+        done: True once nothing more is expected.
     """
 
     def __init__(
@@ -117,11 +117,11 @@ class Refusal:
     """Two ends that did not come together, as seen from one.
 
     Attributes:
-        device: Whose socket has noticed.
+        device: Device that noticed the failure.
         peer: The device it wanted to reach; None at a server, which cannot know.
-        endpoint: Where the server is bound; empty where that is not known.
-        reason: Why.
-        why: The same for people.
+        endpoint: Address of the server; empty if unknown.
+        reason: Reason code.
+        why: Reason in words.
     """
 
     device: str
@@ -233,14 +233,14 @@ class Security:
     """The keys of all sockets in one context, and what goes wrong with them.
 
     Args:
-        context: Whose sockets; a context can have one `Security` with keys.
+        context: Context of the sockets; it can have one `Security` with keys.
         poller: The loop's; monitors come and go in it with the sockets that they watch.
         ring: The keys; None to run without.
         tell: Called with what there is to say: once for each cause until both ends have come
             together, so it cannot become a flood.
 
     Attributes:
-        refused: How often a handshake of a device failed, by reason, whether told or not.
+        refused: Failed handshakes of each device by reason, reported or not.
     """
 
     def __init__(

@@ -510,7 +510,7 @@ class SocketNetwork(RealNetwork):
 
         Args:
             socket: Nothing more is read from it.
-            peer: Whom it connects to.
+            peer: Peer that it connects to.
             soon: A few at a time: when many devices vanish together, the others are not to wait.
         """
         sockets = self._clients.get(peer, {})

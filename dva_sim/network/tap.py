@@ -30,11 +30,11 @@ class Exchange:
 
     Attributes:
         number: In the order of arrival, from 1.
-        arrived: When, by the run's clock [s].
-        data: What was said.
-        peer: What the connection is known by; of a publication, the id of who published it.
-        published: Whether it is a publication, to which nobody answers.
-        reply: What was answered; None as long as nothing was.
+        arrived: Arrival time by the run's clock [s].
+        data: Content of the message.
+        peer: Identity of the connection; for a publication, the id of its publisher.
+        published: True for a publication, which has no reply.
+        reply: Reply; None until there is one.
         service_s: From arrival to answer [s]: by the run's clock or, where the answer came within
             the handling of the request, the real time which that took; None without an answer.
     """
@@ -55,7 +55,7 @@ class Tap:
         clock: The run's clock.
         on_exchange: Takes each exchange once the message has been handled, and a request that is
             answered later a second time, with its reply: the same object, by the same number.
-        publications: Whether publications are wanted, too.
+        publications: True to include publications.
     """
 
     def __init__(

@@ -33,14 +33,14 @@ class VirtualNetwork:
     Args:
         clock: The run's clock.
         links: Gives the link from one node to another, and the one back.
-        traffic: Told of each message sent: time [s], from, to, size [B], what.
+        traffic: Callback for each message sent: time [s], sender, receiver, size [B], content.
         connector: Makes the connections.
-        delivered: Told of each message that arrives: time [s], from, to, what.
+        delivered: Callback for each message that arrives: time [s], sender, receiver, content.
 
     Attributes:
         dropped: Publications that found the pipe of a subscriber full.
         taps: See `Transport`.
-        interference: Decides whether, when and as what each payload arrives; None: as it was sent.
+        interference: Filter that may drop, delay or replace each payload; None: no interference.
     """
 
     def __init__(

@@ -42,7 +42,7 @@ class Pipe(Generic[T]):
 
     Args:
         mark: High-water mark, in messages.
-        conflate: Whether only the newest message is kept; there is no mark then.
+        conflate: True to keep only the newest message; there is no high-water mark then.
 
     Attributes:
         on_room: Called when there is room again after a refusal.
@@ -108,7 +108,7 @@ class ReceivePipe(Pipe[T]):
 
     Args:
         mark: High-water mark, in messages.
-        conflate: Whether only the newest message is kept.
+        conflate: True to keep only the newest message.
 
     Attributes:
         flow: The end of the connection that delivers into it.
@@ -159,8 +159,8 @@ class ZmtpOptions:
 
     Attributes:
         mark: High-water mark of its send pipe, in messages.
-        conflate: Whether that pipe keeps only the newest message.
-        tcp: Of the connection below.
+        conflate: True if that pipe keeps only the newest message.
+        tcp: Options of the connection below.
     """
 
     mark: int = HIGH_WATER_MARK
@@ -174,13 +174,13 @@ class ZmtpEnd:
     Args:
         tcp: The end of the connection below.
         link: Carries what is sent.
-        options: Of the socket.
+        options: Options of the socket.
         deliver: Takes each message that arrives, whole and in order.
 
     Attributes:
-        pipe: What waits for the encoder.
-        ready: Whether the handshake is over at this end.
-        closed: Whether nothing more is sent and delivered here.
+        pipe: Messages waiting for the encoder.
+        ready: True once the handshake is over at this end.
+        closed: True once nothing more is sent or delivered here.
         on_ready: Called when the handshake is over.
         on_end: Called when the other end has gone.
     """
@@ -334,8 +334,8 @@ class ZmtpConnection:
         back: The link to the opener.
         at_peer: Takes what the opener sends.
         at_opener: Takes what the peer sends.
-        opener: Of the opener's socket.
-        peer: Of the peer's socket.
+        opener: Options of the opener's socket.
+        peer: Options of the peer's socket.
     """
 
     depth: Final = "segment"

@@ -181,8 +181,8 @@ class End:
     """One end of the link.
 
     Attributes:
-        address: Of this end.
-        peer: Of the other one.
+        address: Address of this end.
+        peer: Address of the other end.
     """
 
     address: str

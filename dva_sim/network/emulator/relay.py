@@ -30,8 +30,8 @@ class RelayedStream:
     """One direction of one connection.
 
     Attributes:
-        source: Where bytes come from.
-        sink: Where they go.
+        source: Socket that bytes come from.
+        sink: Socket that bytes go to.
         flow: Its link decides when.
         waiting: Bytes that are due and not yet taken.
         open: More may come from the source.

@@ -44,7 +44,7 @@ class LinkFlow:
     """One direction of an emulated link while it runs.
 
     Attributes:
-        link: Decides the fate of each packet.
+        link: Link model that decides the fate of each packet.
         passed: Packets that came out.
         passed_bytes: Bytes of these [B].
         waits: Their times inside.

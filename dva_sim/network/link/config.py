@@ -48,19 +48,19 @@ class LinkConfig(Config):
             `empirical`, each with its own keys; with `correlation_s` it is correlated in time.
         delay_log: File of delays over time, in two columns or as printed by `ping -D`; they
             come on top of `delay_s`. Its lost probes are losses.
-        delay_log_share: Of each logged delay that one direction takes: half of a round trip.
-        reorder: Whether packets may overtake each other; if not, a later one waits.
+        delay_log_share: Share of each logged round trip that one direction takes; 0.5 is half.
+        reorder: True if packets may overtake each other; otherwise a later one waits.
         loss: Probability that a packet is lost, each way.
-        bursts: How losses come in bursts; left out, each comes by itself.
+        bursts: Model of bursts of losses; by default each loss is independent.
         rate_bps: Serialisation rate; without effect where a trace gives it.
         queue_bytes: Room in the drop-tail queue before the link.
         queue_packets: Room in packets, the one being sent among them, in place of bytes.
         trace_up: Recorded packet opportunities towards the robot (Mahimahi form).
-        trace_down: The same from the robot.
+        trace_down: Recorded packet opportunities from the robot (Mahimahi form).
         outages: Times at which what would cross the link is lost.
         partitions: Times at which some nodes do not hear others.
-        up: What is otherwise towards the robot.
-        down: What is otherwise from the robot.
+        up: Settings that differ towards the robot.
+        down: Settings that differ from the robot.
     """
 
     delay_s: Annotated[

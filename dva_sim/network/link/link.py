@@ -34,11 +34,11 @@ class Link:
     """One direction of a link.
 
     Args:
-        config: What the link is like.
-        serialiser: What gives the rate.
-        streams: The run's luck.
-        name: Name of this direction, for its luck; `x/up` and `x/down` are one link's.
-        direction: Which it is; `up` is towards the robot.
+        serialiser: Model of the line's rate.
+        streams: Random streams of the run.
+        name: Name of this direction, which selects its random stream; `x/up` and `x/down` are one
+            link's.
+        direction: Direction; `up` is towards the robot.
         by_packet: Loss and jitter depend on the number of a packet, not on the time: for real
             packets, which never leave at the same moment twice.
 
@@ -49,8 +49,8 @@ class Link:
         dropped: Those that found the queue full.
         bytes: Those that entered the line [B].
         delay: Mean one-way delay without waiting [s].
-        rate_bps: Of the line [bit/s]; None where it varies.
-        room: Of the queue [B]; where packets are counted, what it holds of the smallest.
+        rate_bps: Rate of the line [bit/s]; None where it varies.
+        room: Size of the queue [B]; if it counts packets, its capacity in the smallest ones.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Link:
         """Send one packet.
 
         Args:
-            now: When it is offered [s]; never before an earlier one.
+            now: Time at which it is offered [s]; never before an earlier one.
             size: Its size with all headers [B].
 
         Returns:
@@ -153,9 +153,9 @@ class Link:
         """Send packets back to back as one, where that makes no difference.
 
         Args:
-            now: When they are offered [s].
-            packets: How many.
-            size: Of all together, with all headers [B].
+            now: Time at which they are offered [s].
+            packets: Number of packets.
+            size: Total size with all headers [B].
 
         Returns:
             When the last of them arrives [s]; None, and nothing is sent, where each must
@@ -250,7 +250,7 @@ class PartedLink(Link):
 
     Args:
         whole: The link.
-        gaps: When it carries nothing for this pair.
+        gaps: Times at which it carries nothing for this pair.
     """
 
     def __init__(self, whole: Link, gaps: Sequence[Gap]) -> None:
@@ -306,10 +306,10 @@ def part_links(
     """The link from one node to another and the one back, as far as partitions let them through.
 
     Args:
-        links: The same without partitions.
+        links: Links without partitions.
         source: Name of one node.
         destination: Name of the other.
-        partitions: Who does not hear whom, and when.
+        partitions: Partitions: pairs of nodes, and times.
     """
     out = [p for p in partitions if p.parts(source, destination)]
     back = [p for p in partitions if p.parts(destination, source)]
@@ -344,10 +344,9 @@ class RadioLink(Link):
 
     Args:
         config: Delay, loss, queue of the link as such.
-        serialiser: What gives its rate.
-        streams: The run's luck.
-        name: Name of this direction, for its luck.
-        direction: Which it is.
+        serialiser: Model of the line's rate.
+        streams: Random streams of the run.
+        name: Name of this direction, which selects its random stream.
         reception: The quality where the robot is now; None: nothing is added.
     """
 
@@ -438,10 +437,9 @@ def make_link(
     """The `up` or `down` direction of a configured link.
 
     Args:
-        config: What it is like.
         direction: `up` or `down`.
-        streams: The run's luck.
-        name: Of the link, for its luck.
+        streams: Random streams of the run.
+        name: Name of the link, which selects its random streams.
         reception: The quality of its radio hop now, if it has one.
         by_packet: See `Link`; not for radio links.
 

@@ -23,8 +23,8 @@ class Bursts(Config):
     """Losses that come in bursts; `loss` of the link stays the share lost in the long run.
 
     Attributes:
-        mean_s: How long a burst lasts on average. When it comes is a matter of virtual time,
-            so that all who send at that time meet it.
+        mean_s: Mean length of a burst. Bursts are functions of virtual time, so all who send at
+            that time meet them.
         mean_packets: Instead, how many packets one lasts on average: each packet moves the
             weather on, which then depends on how often one sends.
         loss: Probability that a packet is lost in a burst; outside none is.
@@ -65,9 +65,9 @@ class Bursts(Config):
 
         Args:
             loss: In the long run.
-            streams: The run's luck.
-            name: Of these bursts.
-            luck: Decides packet by packet within a burst.
+            streams: Random streams of the run.
+            name: Name of the bursts' random stream.
+            luck: Random numbers that decide packet by packet within a burst.
         """
         share = loss / self.loss  # of time, or of packets, that is in a burst
         if self.mean_s is not None:
@@ -94,7 +94,7 @@ def counted_bursts(
 
     Args:
         rng: Moves the weather on.
-        share: Of all packets that are in a burst.
+        share: Share of all packets that are in a burst.
         length: Mean length of a burst, in packets.
         loss: Probability in a burst.
         luck: Gives each packet its number.

@@ -16,8 +16,8 @@ class Gap(Config):
     """A time without a link, once or again and again.
 
     Attributes:
-        from_s: When it begins.
-        for_s: How long it lasts.
+        from_s: Start of the gap.
+        for_s: Length of the gap.
         every_s: From one beginning to the next; left out, it comes once.
     """
 
@@ -43,7 +43,7 @@ class Outage(Gap):
     """A time at which what would cross the link is lost.
 
     Attributes:
-        direction: Which way; `up` is towards the robot.
+        direction: Direction that is lost; `up` is towards the robot.
     """
 
     direction: Literal["up", "down", "both"] = "both"

@@ -148,7 +148,7 @@ class PacketQueue(Serialiser):
     """A line with room for so many packets, the one on its way onto the link among them.
 
     Args:
-        line: What gives the rate.
+        line: Model of the line's rate.
         packets: Room; bytes do not count.
     """
 

@@ -32,8 +32,8 @@ class DelayLog(NamedTuple):
     """Probes of a link.
 
     Attributes:
-        times: When each was sent [s], ascending, shape `(n,)`.
-        delays: What each measured [s]; not a number where it was lost, shape `(n,)`.
+        times: Send times of the probes [s], ascending, shape `(n,)`.
+        delays: Measured delays [s]; not a number for lost probes, shape `(n,)`.
     """
 
     times: Floats

@@ -18,10 +18,9 @@ class Replay:
     While the nearest probe is a lost one, every packet is lost: the log knows no finer.
 
     Args:
-        log: What was measured.
-        share: Of each delay that this direction takes.
-        here: Whether a probe, if it was lost, was lost in this direction, shape `(n,)`.
-        offset: Where in the log the run begins [s].
+        share: Share of each delay that this direction takes.
+        here: True for lost probes that were lost in this direction, shape `(n,)`.
+        offset: Place in the log at which the run begins [s].
     """
 
     def __init__(self, log: DelayLog, share: float, here: Flags, offset: float) -> None:

@@ -40,8 +40,8 @@ class Weather:
     Packets of the same millisecond have numbers of their own, which follow from that one.
 
     Args:
-        streams: The run's luck.
-        name: Of this source.
+        streams: Random streams of the run.
+        name: Name of this source.
     """
 
     def __init__(self, streams: Streams, name: str) -> None:
@@ -109,9 +109,9 @@ class SlowWeather:
     distribution function. The correlation of the process at a distance `t` is exp(-t / time).
 
     Args:
-        streams: The run's luck.
-        name: Of this source.
-        time: Of correlation [s].
+        streams: Random streams of the run.
+        name: Name of this source.
+        time: Correlation time [s].
 
     References:
         Gillespie: Exact numerical simulation of the Ornstein-Uhlenbeck process and its
@@ -145,10 +145,10 @@ class Spells:
     """Two states by turns, each left without memory of how long it has lasted.
 
     Args:
-        streams: The run's luck.
-        name: Of this source.
-        mean_off: How long a spell of the normal state lasts on average [s].
-        mean_on: The same of the other state [s].
+        streams: Random streams of the run.
+        name: Name of this source.
+        mean_off: Mean length of a spell of the normal state [s].
+        mean_on: Mean length of a spell of the other state [s].
     """
 
     def __init__(self, streams: Streams, name: str, mean_off: float, mean_on: float) -> None:

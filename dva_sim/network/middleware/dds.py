@@ -26,7 +26,7 @@ class DdsTransport(CommandTransport):
     """DDS over UDP.
 
     Args:
-        reliable: Whether what is lost is sent again.
+        reliable: True to send lost data again.
         depth: Messages kept for a reader that has not read them.
     """
 

@@ -34,7 +34,7 @@ class Rendezvous:
         far: IPv4 address of the robot's.
         port: The first of three ports in a row that a transport may use at either address.
         folder: A transport's own files, such as the configuration of a broker.
-        ready_by: When a connection must stand, by `time.monotonic` [s].
+        ready_by: Deadline for the connection, by `time.monotonic` [s].
     """
 
     near: str
@@ -90,11 +90,11 @@ class CommandTransport(ABC):
     Its constructor takes the transport's options; one object makes one end.
 
     Attributes:
-        title: What it is called in reports.
+        title: Name in reports.
         library: Python package that it needs besides those of this program; empty for none.
         extra: Extra of this package that installs it.
         program: Program that must be on the path, such as a broker's; empty for none.
-        carries_pictures: Whether pictures can travel beside the commands.
+        carries_pictures: True if pictures can travel beside the commands.
     """
 
     title: str = ""

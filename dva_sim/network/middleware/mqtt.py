@@ -35,7 +35,7 @@ class MqttTransport(CommandTransport):
 
     Args:
         qos: 0: sent once. 1: sent until acknowledged. 2: exactly once.
-        nodelay: Whether broker and clients send small messages at once (TCP_NODELAY).
+        nodelay: True if broker and clients send small messages at once (TCP_NODELAY).
         expiry_s: The broker drops what has waited longer [s], whole seconds; None: never.
         broker: The end at which the broker is.
     """

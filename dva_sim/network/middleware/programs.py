@@ -91,16 +91,16 @@ class Plan(Config):
 
     Attributes:
         transport: By name, or a file and a class.
-        options: Of the transport.
+        options: Options of the transport.
         near: Address of the operator's machine.
         far: Address of the robot's.
         port: First of three ports in a row.
-        folder: Where both write: `near.notes`, `far.notes`, and what a transport needs.
-        ready_by: When both ends must be connected, by `time.monotonic` [s].
-        until: When the operator sends no more, by the same clock [s].
+        folder: Folder that both write to: `near.notes`, `far.notes`, and the transport's own files.
+        ready_by: Deadline for connecting both ends, by `time.monotonic` [s].
+        until: Time at which the operator stops sending, by the same clock [s].
         command_hz: Commands per second.
         picture_hz: Pictures per second; 0 for none.
-        picture_bytes: Of each.
+        picture_bytes: Size of a picture.
     """
 
     transport: str

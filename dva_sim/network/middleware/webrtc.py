@@ -32,8 +32,8 @@ class WebRtcTransport(CommandTransport):
     """A WebRTC data channel.
 
     Args:
-        ordered: Whether messages arrive in the order in which they were sent.
-        retransmits: How often a lost message is sent again; None: until it arrives.
+        ordered: True if messages arrive in the order in which they were sent.
+        retransmits: Number of times a lost message is sent again; None: until it arrives.
     """
 
     title, library, extra = "WebRTC", "aiortc", "webrtc"

@@ -28,7 +28,7 @@ class WebSocketTransport(CommandTransport):
     """WebSocket over TCP.
 
     Args:
-        nodelay: Whether small messages leave at once (TCP_NODELAY).
+        nodelay: True if small messages leave at once (TCP_NODELAY).
     """
 
     title = "WebSocket"

@@ -25,10 +25,10 @@ class ZenohTransport(CommandTransport):
     """Zenoh.
 
     Args:
-        carrier: What its session runs over.
+        carrier: Transport protocol of its session.
         congestion: `drop`: what finds no room is dropped. `block`: the sender waits.
-        reliable: Whether what is lost is sent again, where the carrier does not do that itself.
-        express: Whether messages are sent at once instead of in batches.
+        reliable: True to send lost data again where the carrier does not do that itself.
+        express: True to send messages at once instead of in batches.
     """
 
     title, library, extra = "Zenoh", "zenoh", "zenoh"

@@ -20,7 +20,7 @@ class Reno:
 
     Attributes:
         window: Congestion window [segments], not always whole.
-        threshold: Where slow start ends [segments].
+        threshold: End of slow start [segments].
     """
 
     BACKOFF = 0.5
@@ -35,8 +35,8 @@ class Reno:
         """Segments have been delivered while the window was in use.
 
         Args:
-            segments: How many.
-            now: When [s].
+            segments: Number of segments.
+            now: Current time [s].
             ahead: The shortest round trip [s].
         """
         if self.window < self.threshold:
@@ -218,7 +218,7 @@ class RateReduction:
         Args:
             delivered: Segments newly acknowledged, selectively or not.
             in_flight: Segments on their way by the sender's estimate.
-            advanced: Whether the left edge moved and nothing more was found lost.
+            advanced: True if the left edge moved and no further loss was found.
         """
         self._delivered += delivered
         if in_flight > self._threshold:

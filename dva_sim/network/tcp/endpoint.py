@@ -22,7 +22,7 @@ class TcpEndpoint:
 
     Args:
         clock: The run's clock.
-        options: Of this end.
+        options: Options of this end.
         link: Carries what this end sends.
         greet: Called when a segment arrives before this end is established.
 

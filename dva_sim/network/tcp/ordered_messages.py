@@ -15,9 +15,9 @@ class OrderedMessages:
     What the send buffer has no room for waits in the program, without end.
 
     Args:
-        writer: Where they are written.
-        reader: Where they are read.
-        deliver: Told of every message once all of it is read.
+        writer: Endpoint that messages are written to.
+        reader: Endpoint that messages are read from.
+        deliver: Callback for every message that has been read completely.
 
     Attributes:
         waiting: Bytes that wait in the program [B].

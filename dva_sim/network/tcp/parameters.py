@@ -31,27 +31,26 @@ class TcpOptions:
             last small one (RFC 896, as draft-minshall-nagle-01 amends it).
         congestion: `cubic` or `reno`.
         initial_window: Congestion window at the start [segments] (RFC 6928).
-        delayed_ack: How long an acknowledgement waits for data to ride on [s];
-            0 acknowledges every segment at once.
+        delayed_ack: Time that an acknowledgement waits for data to travel with [s]; 0 acknowledges
+            every segment at once.
         min_rto: Floor of the variance part of the retransmission time-out [s].
         first_rto: Time-out before there is a round-trip sample [s] (RFC 6298).
         max_rto: Longest time-out [s].
         retries: Time-outs in a row after which the connection is given up [tcp_retries2].
-        syn_retries: The same for the opening [tcp_syn_retries].
+        syn_retries: Time-outs in a row after which opening is given up [tcp_syn_retries].
         syn_linear: Openings repeated at a fixed interval before doubling
             [tcp_syn_linear_timeouts].
         tick: Granularity of the kernel's timers [s]; 0 = exact.
-        handshake: Whether opening takes a round trip.
-        congestion_window: Whether there is one at all.
-        hystart: Whether slow start ends when the round trip grows (cubic).
-        idle_restart: Whether the window shrinks when nothing was sent for a time-out
+        handshake: True if opening takes a round trip.
+        congestion_window: True to limit sending by a congestion window.
+        hystart: True if slow start ends when the round trip grows (cubic).
+        idle_restart: True if the window shrinks after a time-out without sending
             [tcp_slow_start_after_idle].
-        rtt_variance: Whether the time-out follows the variance of the round trip.
-        tail_probe: Whether a tail-loss probe goes before the time-out.
-        rack: Whether loss is judged by time; otherwise by three later segments acknowledged.
-        collapse: Whether small neighbours are sent again as one segment
-            [tcp_retrans_collapse].
-        undo: Whether a needless recovery is taken back (by time stamps).
+        rtt_variance: True if the time-out follows the variance of the round trip.
+        tail_probe: True if a tail-loss probe precedes the time-out.
+        rack: True if loss is judged by time; otherwise by three later segments acknowledged.
+        collapse: True if small neighbours are sent again as one segment [tcp_retrans_collapse].
+        undo: True if a needless recovery is undone (by time stamps).
     """
 
     send_buffer: int | None = None

@@ -31,15 +31,15 @@ class Receiver:
 
     Args:
         clock: The run's clock.
-        options: Of this end.
+        options: Options of this end.
         times: Round trip as this end's sender sees it.
         acknowledge: Sends an acknowledgement without data.
 
     Attributes:
         next: First byte that is missing.
         read_to: First byte not read by the program.
-        edge: First byte that does not fit, as the other end has been told.
-        acknowledged: First missing byte, as the other end has been told.
+        edge: First byte beyond the window last advertised to the other end.
+        acknowledged: First missing byte last acknowledged to the other end.
         blocks: Bytes received beyond `next`, latest first.
         duplicate: Something has arrived twice since the last acknowledgement.
         stamp: Time stamp to echo [s].

@@ -30,7 +30,7 @@ class ByTime:
     during recovery as long as no reordering has been seen.
 
     Attributes:
-        round_trip: Of the latest segment delivered [s].
+        round_trip: Round trip of the latest segment delivered [s].
     """
 
     __slots__ = (
@@ -149,10 +149,10 @@ class Recovery:
     """Open, recovering from losses found by acknowledgements, or from a time-out.
 
     Args:
-        options: Of this end.
+        options: Options of this end.
         times: Its round trip.
         window: Its congestion window.
-        board: What it has under way.
+        board: Segments under way.
 
     Attributes:
         state: `open`, `recovery` or `loss`.

@@ -118,7 +118,7 @@ class Timer:
         tick: Grid of the finest ring [s]; 0 = exact.
 
     Attributes:
-        deadline: When it rings [s]; infinite if it is not set.
+        deadline: Deadline [s]; infinite if not set.
     """
 
     __slots__ = ("_action", "_clock", "_due", "_tick", "deadline")
@@ -179,15 +179,15 @@ class Alarm:
 
     Args:
         clock: The run's clock.
-        options: Of this end.
+        options: Options of this end.
         times: Its round trip.
         ring: Called when the time has come.
 
     Attributes:
-        kind: What it waits for: a time-out, the moment for a tail-loss probe, the end of
-            a doubt about reordering, or a closed window's probe.
-        back_off: How many times the time-out has been doubled.
-        doubt: When the next segment in doubt is held to be lost [s]; 0 if none is.
+        kind: Kind of deadline: a time-out, a tail-loss probe, the end of a doubt about reordering,
+            or a closed window's probe.
+        back_off: Number of times the time-out has been doubled.
+        doubt: Time at which the next segment in doubt counts as lost [s]; 0 if there is none.
     """
 
     __slots__ = ("_options", "_timeout_at", "_timer", "_times", "back_off", "doubt", "kind")
@@ -235,7 +235,7 @@ class Alarm:
             board: The segments, at least one.
             advanced: Something was acknowledged in order.
             fresh: Something new was sent.
-            probing: Whether a tail-loss probe may be sent.
+            probing: True if a tail-loss probe may be sent.
         """
         if not (advanced or self.doubt) and self._stands(fresh, probing):
             return

@@ -30,14 +30,14 @@ class SendBuffer:
 
     Args:
         size: SO_SNDBUF as the program sets it [B], or None = automatic.
-        initial_window: Of the congestion window [segments].
+        initial_window: Initial congestion window [segments].
         mss: Payload of a full segment [B].
 
     Attributes:
-        limit: How much may be charged before no further packet is begun [B].
-        used: How much is charged [B].
-        blocked: Whether somebody waits for room, because a write was not taken whole, say.
-        is_cut: Whether the last segment left more behind in its packet: so it has no PSH.
+        limit: Charge above which no further packet is begun [B].
+        used: Current charge [B].
+        blocked: True if a writer waits for room, for example after a partial write.
+        is_cut: True if the last segment left part of its packet behind, and so has no PSH.
     """
 
     __slots__ = (
@@ -132,9 +132,9 @@ class SentSegment:
     Attributes:
         start: Its first byte.
         end: The byte after its last.
-        sent_at: When it was sent last [s].
-        charge: What the send buffer is charged for it [B].
-        pushes: Whether it has PSH: it ends what was written by then.
+        sent_at: Time of the latest transmission [s].
+        charge: Charge to the send buffer [B].
+        pushes: True if it has PSH: it ends the data written by then.
         repeated: It has been sent more than once.
         sacked: It has been acknowledged selectively.
         lost: It is held to be lost.
@@ -183,9 +183,9 @@ class Scoreboard:
 
     Attributes:
         queue: All that are not acknowledged in order.
-        sacked: How many of them are acknowledged selectively.
-        lost: How many are held to be lost.
-        resent: How many have been sent again and are under way.
+        sacked: Number of selectively acknowledged segments.
+        lost: Number of segments considered lost.
+        resent: Number of retransmitted segments under way.
     """
 
     __slots__ = ("lost", "queue", "resent", "sacked")

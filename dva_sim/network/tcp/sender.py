@@ -27,7 +27,7 @@ class Sender:
 
     Args:
         clock: The run's clock.
-        options: Of this end.
+        options: Options of this end.
         emit: Sends one segment: first byte, byte after the last, now [s], whether it has PSH.
             A first byte of -1 asks for an acknowledgement.
         give_up: Called when the other end has not answered for too long.
@@ -37,15 +37,15 @@ class Sender:
         next: First byte not sent yet.
         first: First byte not acknowledged.
         edge: First byte that the receive window does not take.
-        end_mark: Where the stream ends, once it is finished.
+        end_mark: End of the stream, once it is finished.
         retransmitted: Repetitions.
         timeouts: Retransmission time-outs.
         tail_probes: Tail-loss probes.
-        buffer: What is written and not acknowledged, in bytes charged.
-        board: What is under way.
+        buffer: Data written and not acknowledged, in bytes charged.
+        board: Segments under way.
         times: The round trip.
         window: The congestion window.
-        recovery: What is done about losses.
+        recovery: Loss recovery.
     """
 
     def __init__(
@@ -120,7 +120,7 @@ class Sender:
         """Take one acknowledgement, and send what it allows.
 
         Args:
-            now: When it arrives [s].
+            now: Arrival time [s].
             acknowledged: First byte that is missing at the other end.
             edge: First byte that does not fit there.
             blocks: Bytes received beyond, from and to.

@@ -38,11 +38,11 @@ class BottleneckConfig(Config):
     """The congested link; both directions are alike.
 
     Attributes:
-        rate_bps: Of the line.
+        rate_bps: Rate of the line.
         queue_bytes: Room in its drop-tail queue.
         delay_s: One way, besides queue and line.
         loss: Probability that a packet is lost on the way, besides those that find no room.
-        place: Where its queue is: in the `network`, or in the end `hosts` whose own line it is.
+        place: Location of its queue: in the `network`, or in the end `hosts` whose own line it is.
     """
 
     rate_bps: Annotated[float, Field(ge=1e4), Key("rate of the shared link")] = 1e6
@@ -60,8 +60,7 @@ class Bottleneck:
     """Both directions of the congested link.
 
     Args:
-        config: Of the link.
-        streams: The run's luck.
+        streams: Random streams of the run.
     """
 
     def __init__(self, config: BottleneckConfig, streams: Streams) -> None:
@@ -78,9 +77,8 @@ class Bottleneck:
         """The way of a flow over the link; it counts only what is the flow's own.
 
         Args:
-            flow: Its name, for its luck.
-            way: Which direction.
-            priority: Whether the end hosts prefer its packets, which matters in their queue only.
+            flow: Name of the flow, which selects its random stream.
+            priority: True if the end hosts prefer its packets; matters in their queue only.
         """
         line: Serialiser = self._lines[way]
         if priority and self._config.place == "hosts":
@@ -128,8 +126,8 @@ class Passing(Serialiser):
     not delayed by one that passes them; those that come later are.
 
     Args:
-        line: Where the others are.
-        rate_bps: Of the line [bit/s].
+        line: Line shared with the other packets.
+        rate_bps: Rate of the line [bit/s].
     """
 
     def __init__(self, line: SharedLine, rate_bps: float) -> None:
@@ -188,8 +186,8 @@ class CommandsConfig(Config):
     """Commands of the operator.
 
     Attributes:
-        rate_hz: How often there is a new command.
-        bytes: Of each.
+        rate_hz: Rate of new commands.
+        bytes: Size of a command.
         crucial_every: Each so many is one that must arrive, such as a stop; 0: none is.
     """
 
@@ -202,8 +200,8 @@ class PicturesConfig(Config):
     """Pictures of the robot.
 
     Attributes:
-        rate_hz: How often there is a new picture.
-        bytes: Of each, with the state that comes with it.
+        rate_hz: Rate of new pictures.
+        bytes: Size of a picture, with the state sent along.
     """
 
     rate_hz: Annotated[Rate, Key("pictures per second")] = 10.0
@@ -214,8 +212,8 @@ class BulkConfig(Config):
     """TCP flows that always have more to send, over the same link.
 
     Attributes:
-        up: How many send the way of the commands.
-        down: How many send the way of the pictures.
+        up: Number of flows that send in the direction of the commands.
+        down: Number of flows that send in the direction of the pictures.
     """
 
     up: Annotated[int, Field(ge=0, le=50)] = 0
@@ -226,7 +224,7 @@ class ContestConfig(Config):
     """A session and its competitors.
 
     Attributes:
-        transport: Of the session.
+        transport: Transport of the session.
         warm_up_s: Not counted, so that all flows have found their rate.
         measure_s: Counted.
     """
@@ -245,9 +243,9 @@ class Fates:
     """Fates of the messages of one direction.
 
     Attributes:
-        made: When each was ready to be sent [s].
-        arrived: When all of it had arrived [s]; infinity if that did not happen.
-        crucial: Whether it had to.
+        made: Time at which each was ready to be sent [s].
+        arrived: Time at which each had arrived completely [s]; infinity if never.
+        crucial: True for messages that had to arrive.
     """
 
     made: list[float] = field(default_factory=list)
@@ -271,9 +269,9 @@ class Contest:
         until: Until when [s].
         commands: Fates of the commands.
         pictures: Fates of the pictures.
-        session_bytes: That the session put on the line in each direction, with all headers, while
-            it counted [B].
-        bulk_bytes: The same of each TCP flow, in the direction of its data [B].
+        session_bytes: Bytes that the session put on the line in each direction, with all headers,
+            within the counted time [B].
+        bulk_bytes: Bytes of each TCP flow, in the direction of its data [B].
     """
 
     since: float
@@ -288,8 +286,8 @@ def play(config: ContestConfig, seed: int) -> Contest:
     """Let them send.
 
     Args:
-        config: Who sends what over which link.
-        seed: Decides when everything begins, and the link's luck.
+        config: Senders, receivers and link.
+        seed: Seed of start times and of the link's random numbers.
     """
     clock, streams = Clock(), Streams(seed)
     bottleneck = Bottleneck(config.bottleneck, streams)

@@ -59,7 +59,7 @@ class Trinomial(Config):
     Attributes:
         header_bytes: Besides IP and UDP, in each datagram and acknowledgement.
         linear: Datagrams per round trip, with each round trip since the last loss.
-        square: The same with its square.
+        square: Datagrams per round trip, with the square of that number.
         decrease: Share of the rate that a loss costs.
     """
 
@@ -137,7 +137,7 @@ class Zeromq(Config):
     """A publisher and a subscriber of ZeroMQ in each direction, each pair on its own connection.
 
     Attributes:
-        conflate: Whether the publisher keeps only the newest message of what waits in ZeroMQ.
+        conflate: True if the publisher keeps only the newest message in ZeroMQ's queue.
         send_buffer_bytes: Left out, the kernel tunes it.
     """
 

@@ -26,15 +26,16 @@ class DatagramSender:
 
     Args:
         clock: Virtual time.
-        link: What the datagrams take.
-        header: Of the transport, in each datagram [B].
-        law: How often.
-        deliver: Told of every message at the other end.
-        repeats_crucial: Whether crucial messages go at once and again until they have arrived.
+        link: Link that carries the datagrams.
+        header: Header of the transport in each datagram [B].
+        law: Law that decides the rate.
+        deliver: Callback for every message at the other end.
+        repeats_crucial: True if crucial messages are sent at once, and again until they have
+            arrived.
 
     Attributes:
         ride: Gives the acknowledgements, of the other direction, that ride on a datagram.
-        on_arrival: Told at the other end of every datagram, with what rode on it.
+        on_arrival: Callback at the other end for every datagram, with its feedback.
     """
 
     def __init__(

@@ -56,8 +56,8 @@ class Feedback:
     """Datagrams that were sent and are not known to have arrived.
 
     Attributes:
-        round_trips: What they were like.
-        lost: How many are taken for lost.
+        round_trips: Statistics of round trips.
+        lost: Number considered lost.
         samples: Round trips since somebody emptied the list [s].
     """
 

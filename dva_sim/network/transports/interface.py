@@ -18,7 +18,7 @@ class TransportMessage:
     Attributes:
         number: Counts the messages of its direction from 0.
         size: Without any header [B].
-        crucial: Whether it must arrive, as a stop must.
+        crucial: True if it must arrive, as a stop must.
     """
 
     number: int
@@ -33,8 +33,8 @@ class Ends:
     Attributes:
         up: The link that commands take.
         down: The link that pictures take.
-        on_command: Told of every command at the robot.
-        on_picture: Told of every picture at the operator.
+        on_command: Callback for every command at the robot.
+        on_picture: Callback for every picture at the operator.
     """
 
     up: Link

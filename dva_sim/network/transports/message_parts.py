@@ -24,8 +24,8 @@ def parts_of(message: TransportMessage, header: int) -> list[MessagePart]:
     """The datagrams that a message is cut into, all full but the last.
 
     Args:
-        message: What is sent.
-        header: Of the transport, in each datagram [B].
+        message: Message to send.
+        header: Header of the transport in each datagram [B].
     """
     room = PACKET - IP_UDP - header
     count = max(1, math.ceil(message.size / room))
@@ -37,7 +37,7 @@ class Assembly:
     """Puts parts together again.
 
     Args:
-        deliver: Told of every message once it is whole.
+        deliver: Callback for every complete message.
     """
 
     def __init__(self, deliver: Deliver) -> None:

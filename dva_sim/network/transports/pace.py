@@ -12,11 +12,11 @@ class Pace:
     """A law, and the round trips that it goes by.
 
     Args:
-        law: How often a datagram may be sent.
-        feedback: Where round trips come from.
+        law: Law that decides how often a datagram may be sent.
+        feedback: Source of round trips.
 
     Attributes:
-        held: Whether the gap has made something wait since the round trip began.
+        held: True if the gap has delayed a message since the round trip began.
     """
 
     def __init__(self, law: RateLaw, feedback: Feedback) -> None:

@@ -95,7 +95,7 @@ class ThreeTerms(Aimd):
 
     Args:
         linear: Datagrams per round trip, with each round trip since the loss.
-        square: The same, with the square of that time in round trips.
+        square: Coefficient of the square of that time in round trips.
         decrease: Share of the rate that a loss costs.
 
     References:
