@@ -53,7 +53,7 @@ class Assumption:
         low: Lower end of its band.
         high: Upper end.
         why: Reason for the band.
-        is_whole: Whether it counts something.
+        is_whole: True if the number is a count.
     """
 
     key: str
@@ -77,7 +77,7 @@ def assumptions_in(model: type[BaseModel], above: str = "", depth: int = 4) -> I
     Args:
         model: Model of a file, or of a part of one.
         above: Key of that part, with the dot at its end.
-        depth: Of keys in keys.
+        depth: Depth of nested keys.
     """
     for key, info in fields_below(model, above, depth):
         for note in (note for note in info.metadata if isinstance(note, Assumed)):

@@ -51,12 +51,12 @@ class Key:
     """Name of a key where people read it: `Annotated[float, Key("one-way delay")]`.
 
     Attributes:
-        title: As a factor of a study.
+        title: Name as a factor of a study.
         stated: In the table of what was the same for all that is compared: whether it is there,
             or the words for it there.
-        zero: What is not there at a level of zero: `delay` gives `without delay`; whether it is
-            what the title says.
-        inner: The same of keys below it whose names depend on this place.
+        zero: Name of what is absent at a level of zero: `delay` gives `without delay`; True if it
+            equals the title.
+        inner: Names of keys below it that depend on this place.
     """
 
     title: str = ""
@@ -90,8 +90,8 @@ def meant(path: KeyPath, value: Any, *models: Any) -> str:
 
     Args:
         path: The key as it was given.
-        value: What it was given.
-        models: What the file may be; the first has the place of the key.
+        value: Value given for the key.
+        models: Models that the file may have; the first has the place of the key.
     """
     given, here = str(path[-1]), fields_at(models[0], path[:-1])
     known = {} if isinstance(value, Mapping) else _every_name(models)
@@ -215,7 +215,7 @@ def first_mistake(
     """The first mistake, and the path of the key that it is about.
 
     Args:
-        model: What the data should be.
+        model: Model of the data.
         data: Plain data.
         found: The errors of pydantic, at least one.
     """

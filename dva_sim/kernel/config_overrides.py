@@ -42,7 +42,7 @@ def build(
     """A configuration with some keys changed, whose mistakes are told with their place.
 
     Args:
-        model: What it is.
+        model: Class of the configuration.
         source: A document or plain data.
         changes: New values by dotted key; a number chooses an item of a list.
         complete: Judges what the model alone cannot, and adds what follows from it.

@@ -44,7 +44,7 @@ class DvaSimError(Exception):
     """Base of all errors a user can cause and mend.
 
     Attributes:
-        exit_code: What the command line ends with.
+        exit_code: Exit code of the command line.
     """
 
     exit_code: ClassVar[ExitCode] = ExitCode.MISTAKE
@@ -60,11 +60,11 @@ class ConfigError(DvaSimError):
     """Bad input: one line that says where, what, and what would be right.
 
     Args:
-        problem: What is wrong and what would be right, without a trailing full stop.
+        problem: Mistake and correction, without a trailing full stop.
         file: The file that holds the mistake, if one does.
         line: Line in that file, counted from 1.
         column: Column in that line, counted from 1.
-        keys: Which of the keys that were changed are at fault, if the file alone is valid.
+        keys: Changed keys at fault, if the file alone is valid.
     """
 
     def __init__(

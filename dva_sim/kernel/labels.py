@@ -48,8 +48,8 @@ def distinct(label: str, id_tag: str, others: Iterable[str]) -> str:
     """A label as it is shown: with the device's id where one of the others looks the same.
 
     Args:
-        label: As somebody gave it.
-        id_tag: Of the device.
+        label: Label as given by a device.
+        id_tag: Id of the device.
         others: Labels of other devices.
     """
     look = look_of(label)

@@ -22,15 +22,15 @@ class Measure:
     """A column of a table of results.
 
     Attributes:
-        name: Of the column; it ends in the unit.
+        name: Name of the column; it ends in the unit.
         meaning: In words, for the data dictionary.
         title: In reports; left out, the name without its unit.
-        better: Which values are better, where one has to be chosen.
-        awaits: What a duration waits for, such as `confirmation`. A run in which that never
-            comes counts with all the time it was given.
+        better: Better direction, where one has to be chosen.
+        awaits: Event that a duration waits for, such as `confirmation`. A run in which it never
+            comes counts with the whole time available.
         low: The least value possible; left out, as the name and the unit say.
         high: The greatest value possible; likewise.
-        is_number: Whether it can be asked for; words cannot.
+        is_number: True for numbers; only they can be requested.
     """
 
     name: str

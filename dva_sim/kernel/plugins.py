@@ -33,16 +33,16 @@ class Plugins(Generic[T]):
     """One kind of thing that users may add.
 
     Attributes:
-        kind: What it is called: `policy`.
-        base: What its classes derive from.
-        shipped: What we bring, by name.
-        folder: Where files are looked for last: `agents/policies`.
+        kind: Name of the kind: `policy`.
+        base: Base class.
+        shipped: Shipped classes, by name.
+        folder: Folder searched last: `agents/policies`.
         group: Entry points of installed packages: `dva_sim.policies`.
-        key: What names one in a configuration: `dispatch.policy`.
+        key: Configuration key that names one: `dispatch.policy`.
         needs: A method that a class must define, as it is written in a message.
-        public: Where users import `base` from.
+        public: Module that users import `base` from.
         hidden: Shipped names that a configuration cannot use.
-        finish: What is done with one of a user's that was made, such as holding it in limits.
+        finish: Wrapper applied to a user's plug-in once made, such as one that enforces limits.
     """
 
     kind: str
@@ -79,9 +79,9 @@ class Plugins(Generic[T]):
         """Return a factory for the plug-in of a name, with its options applied.
 
         Args:
-            name: As for `find`.
+            name: Name as for `find`.
             options: Keyword arguments of its constructor, besides what it is given.
-            base: As for `find`.
+            base: Folder as for `find`.
 
         Raises:
             ConfigError: as `find`; a bad option is told when it is made, as by `make`.
@@ -223,8 +223,8 @@ class Guard:
     """Asks a plug-in in a run; what it gets wrong is counted, and whoever asks goes on without.
 
     Attributes:
-        failures: How often there was no answer that is one.
-        first_failure: What was wrong first, in a line.
+        failures: Number of missing or invalid answers.
+        first_failure: First failure, in one line.
     """
 
     failures: int

@@ -18,7 +18,7 @@ class Moment(NamedTuple):
     """One line of the timeline.
 
     Attributes:
-        time: When [s].
+        time: Time [s].
         who: The agent it is about.
         what: In words.
         kind: `event`, `order`, `drive`, `mode`, `link` or `safety`.
@@ -44,8 +44,8 @@ class Sent(NamedTuple):
     """A message that went onto the network.
 
     Attributes:
-        time: When [s].
-        source: Who sent it, by id.
+        time: Time [s].
+        source: Id of the sender.
         destination: To whom.
         size: With all framing [B].
         payload: The XML as bytes, or the frame of a camera.
@@ -62,10 +62,10 @@ class Issued(NamedTuple):
     """A command on its way.
 
     Attributes:
-        made: When the app made it from the tilt [s].
-        sent: When the pattern let it go [s].
+        made: Time at which the app made it from the tilt [s].
+        sent: Time at which the pattern sent it [s].
         sample_age: Mean age of the tilt samples behind it when it was made [s].
-        captured: When the pictures behind it were captured, on average [s].
+        captured: Mean capture time of the pictures behind it [s].
     """
 
     made: float
@@ -81,12 +81,12 @@ class Accepted(NamedTuple):
     """A command that a robot accepted, whoever sent it.
 
     Attributes:
-        robot: Which, by id.
-        source: Who sent it, as the message says.
-        session: As the message says.
+        robot: Id of the robot.
+        source: Sender according to the message.
+        session: Session according to the message.
         message_id: Its number.
         seen_tick: The newest picture's time behind it, by the robot's own clock [ms].
-        arrived: When, as the robot says [s].
+        arrived: Arrival time according to the robot [s].
         time: Now [s].
     """
 
@@ -106,7 +106,7 @@ class ByHand(NamedTuple):
     """Action of a person who drives a robot by hand, at the robot itself, and is obeyed.
 
     Attributes:
-        robot: Which, by id.
+        robot: Id of the robot.
         who: The hand.
         what: `takes`, `drives`, `lets go`, or `stops` by the emergency button.
         time: Now [s].
@@ -122,13 +122,13 @@ class Applied(NamedTuple):
     """A command that took effect at the robot; times in [s].
 
     Attributes:
-        issued: When the operator's app made it from the tilt.
-        sent: When the pattern let it go.
-        arrived: When it reached the robot.
-        time: When it took effect.
-        until: When it ceases to be in force, if no newer one comes.
+        issued: Time at which the operator's app made it from the tilt.
+        sent: Time at which the pattern sent it.
+        arrived: Time at which it reached the robot.
+        time: Time at which it took effect.
+        until: Time at which it ceases to be in force, if no newer one comes.
         sample_age: Mean age of the tilt samples behind it when it was made.
-        captured: When the pictures behind it were captured, on average.
+        captured: Mean capture time of the pictures behind it.
     """
 
     issued: float
@@ -147,8 +147,8 @@ class Shown(NamedTuple):
     """A frame on the operator's screen.
 
     Attributes:
-        captured: When the camera took it [s].
-        time: When it was shown [s].
+        captured: Capture time [s].
+        time: Display time [s].
         tick: The robot's own clock when it was taken [ms].
     """
 
@@ -164,8 +164,8 @@ class Followed(NamedTuple):
     """Command that an operator wants, and the picture that it is based on; times in [s].
 
     Attributes:
-        captured: When that picture was captured.
-        shown: When it was shown.
+        captured: Capture time of that picture.
+        shown: Display time of that picture.
         time: From when on it is wanted.
     """
 
@@ -182,11 +182,12 @@ class DrivenBy(NamedTuple):
 
     Attributes:
         person: A number and no name; empty of a simulated person.
-        pattern: What carried the commands.
-        pipeline: How tilt became commands.
+        pattern: Pattern that carried the commands.
+        pipeline: Pipeline from tilt to commands.
         sensor_hz: Samples of a real phone per second, as measured.
         link_delay_s: One-way delay of the link, as it was last set during the drive [s].
-        tour_time: Of the leg of the guided tour that this drive ended, as its page measured it [s].
+        tour_time: Time for the leg of the guided tour that this drive ended, as its page measured
+            it [s].
     """
 
     person: str = ""
@@ -205,30 +206,31 @@ class DriveLog:
     """One drive of one robot by one operator.
 
     Attributes:
-        ordered: When the operator got the order [s].
-        started: When the robot said that teleoperation had started [s].
-        ended: When the drive was over [s].
+        ordered: Time at which the operator got the order [s].
+        started: Time at which the robot reported that teleoperation had started [s].
+        ended: End of the drive [s].
         outcome: `confirmed`, `refuted`, `gave up`, `refused`, `lost link` or `timeout`.
-        refused: How often commands were answered with each code but OK, or would have been.
+        refused: Number of commands refused, by reply code, including those without a reply.
         refusal: The code that ended it, if one did.
-        disturbed: When the scenario disturbed it [s].
+        disturbed: Time of the scenario's disturbance [s].
         round_trips: From each command's request to its reply [s]; none of what is published.
-        samples: Of the accelerometer, in all batches that the phone's filter was read after.
-        values: How many such batches there were; none with a filter that takes no batches.
+        samples: Number of accelerometer samples, in all batches after which the phone's filter was
+            read.
+        values: Number of such batches; 0 for a filter without batches.
         applied: Commands in the order they took effect; those still under way when the
             drive ended, too.
         hand_lag: Time constant with which the hand follows what is wanted [s].
         frames: Those shown, in order.
-        intents: What was wanted, in order.
-        workload: What its way of steering asked of the operator, such as `waits`.
-        taken_up: When the operator turned to the order [s].
+        intents: Commands wanted, in order.
+        workload: Workload measures of the way of steering, such as `waits`.
+        taken_up: Time at which the operator turned to the order [s].
         attended: From when to when the operator looked at this robot's picture [s].
         looks_since: From when on it has been looking [s]; None: it looks elsewhere.
-        turned_to: How often it turned to that from another one.
-        waits_from: When the robot had come to where its operator has to judge [s].
+        turned_to: Number of times the operator turned to it from another order.
+        waits_from: Time at which the robot reached the place where its operator has to judge [s].
         commands: Made from the tilt: when [s], speed [m/s], turn rate [rad/s].
         ways: Those planned by the operator: when [s], points `(n, 2)` [m].
-        by: Who drove, and with what, where people take part.
+        by: Driver and equipment, where people take part.
     """
 
     robot: str
@@ -303,13 +305,13 @@ class Recorder:
         keep_traffic: Also keep each message sent, for pictures and recordings.
 
     Attributes:
-        messages: How many were sent.
-        bytes: Of all of them [B].
+        messages: Number of messages sent.
+        bytes: Size of all messages sent [B].
         counters: Whatever else is counted, by what it is.
         broken: First breach of each rule by each agent.
         facts: Facts that the safety rules are judged by, in order; None: not kept.
-        on_accepted: Told of each command that a robot accepts.
-        on_hand: Told of what is done to a robot by hand.
+        on_accepted: Callback for each command that a robot accepts.
+        on_hand: Callback for each action on a robot by hand.
     """
 
     def __init__(self, keep_traffic: bool = False) -> None:

@@ -20,8 +20,8 @@ class FolderKind(NamedTuple):
     """Contents of a resource folder.
 
     Attributes:
-        word: What such a file is called.
-        command: What does something with it, if a command does.
+        word: Word for such a file.
+        command: Command that takes such files, if any.
     """
 
     word: str
@@ -82,7 +82,7 @@ def find(
         folder: Folder below each root, for example `experiments` or `experiments/scenarios`.
         suffix: Ending that a bare name stands for.
         base: Folder of the file that mentions `name`.
-        is_asked: Whether a user asks for this one to be used, who may want another command.
+        is_asked: True if a user asks to use this one, and may have meant another command.
 
     Raises:
         ConfigError: nothing of that name; the message says what was meant, or what there is.
@@ -135,9 +135,9 @@ def refuse_to_replace(
     """See that nothing is lost of what an earlier run or command left.
 
     Args:
-        paths: What is to be written.
+        paths: Files to be written.
         overwrite: The user has said that it may be replaced.
-        way: What the user can do.
+        way: Remedy to suggest to the user.
 
     Raises:
         ConfigError: something is there.

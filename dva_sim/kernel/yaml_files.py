@@ -27,7 +27,7 @@ class Document:
 
     Attributes:
         data: Plain dictionaries, lists and scalars.
-        file: Where it was read.
+        file: File that was read.
         places: Line and column (from 1) of each key path.
     """
 

@@ -52,7 +52,7 @@ def in_words(error: Any) -> tuple[str, Place]:
     """Return what is wrong, and its line and column, from 1.
 
     Args:
-        error: What ruamel raised, with its marks.
+        error: Exception raised by ruamel, with its marks.
     """
     problem = str(error.problem or "").split("\n")[0]
     for said in _WORDS:

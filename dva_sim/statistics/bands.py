@@ -70,9 +70,9 @@ def studentised(values: Floats, mean: Floats, error: Floats, resamples: int) -> 
 
     Args:
         values: One row per person `(n_persons, k)`, nan where missing.
-        mean: Of each level `(k,)`.
+        mean: Mean of each level `(k,)`.
         error: Its standard error `(k,)`, above zero.
-        resamples: How many times persons are drawn.
+        resamples: Number of bootstrap resamples.
     """
     if not len(mean):
         return np.empty((resamples, 0))
@@ -89,7 +89,7 @@ def reach(ratio: Floats, count: Floats, level: float) -> tuple[Floats, Floats]:
 
     Args:
         ratio: See `studentised` `(resamples, k)`.
-        count: How many persons each level has `(k,)`.
+        count: Number of persons at each level `(k,)`.
         level: Confidence level.
     """
     least = np.array([students_t(level, int(n)) for n in count])
@@ -141,7 +141,7 @@ class Band:
         pointwise_high: Its upper end `(k,)`.
         critical: Standard errors between each mean and the farther edge of the band `(k,)`; nan
             where there is no spread to measure by.
-        n_persons: How many persons have at least one value.
+        n_persons: Number of persons with at least one value.
     """
 
     mean: Floats
@@ -166,7 +166,7 @@ def band(differences: ArrayLike, level: float = LEVEL, resamples: int = RESAMPLE
     Args:
         differences: One row per person `(n_persons, k)`, nan where a cell is missing.
         level: Confidence level.
-        resamples: How many times persons are drawn.
+        resamples: Number of bootstrap resamples.
 
     References:
         Westfall & Young, Resampling-Based Multiple Testing (1993), section 2.3 (min-p); Beran,
@@ -208,7 +208,7 @@ def _share_of_each(sizes: Floats, level: float) -> float:
     """The chance to err at each level that leaves all of them to hold at once with `level`.
 
     Args:
-        sizes: Deviations of persons drawn anew `(resamples, k)`.
+        sizes: Deviations in bootstrap resamples of persons `(resamples, k)`.
         level: Confidence that all hold.
     """
     drawn = len(sizes)

@@ -29,7 +29,7 @@ def adjusted(means: ArrayLike, covariates: ArrayLike) -> Floats:
     A level with too few persons stays as it is, and so does one whose covariates do not vary.
 
     Args:
-        means: Of each person `(n, k)`, nan where missing.
+        means: Means of the persons `(n, k)`, nan where missing.
         covariates: Means of the same trials `(p, n, k)`, of which each has a true mean of zero.
 
     Returns:

@@ -47,8 +47,8 @@ def effect_size(
     Args:
         a: One treatment `(n,)`, nan where missing.
         b: The other `(n,)`, row by row the same person and trial.
-        person: Whose run it was `(n,)`.
-        resamples: How many times persons are drawn.
+        person: Person of each run `(n,)`.
+        resamples: Number of bootstrap resamples.
 
     References:
         Lakens, Front. Psychol. 4 (2013) 863; Hedges, J. Educ. Stat. 6 (1981) 107-128.
@@ -175,8 +175,8 @@ class Components:
     """The variance of one value per run, split.
 
     Attributes:
-        between: Of the persons' own means; never below zero.
-        within: Of one person's trials around that mean.
+        between: Variance of the persons' own means; never below zero.
+        within: Variance of one person's trials around that mean.
     """
 
     between: float
@@ -220,11 +220,11 @@ class Pairs(NamedTuple):
     """Sums over the pairs of means of some persons, each entry of the same shape.
 
     Attributes:
-        persons: How many.
+        persons: Number of persons.
         difference: Mean of first minus second.
         first: Variance of the first means, divided by the number of persons.
-        second: Of the second.
-        apart: Of the differences.
+        second: Variance of the second means, divided by the number of persons.
+        apart: Variance of the differences, divided by the number of persons.
     """
 
     persons: Floats
@@ -246,7 +246,7 @@ def _studentised(
         statistics: Each on a scale without bounds.
         first: Persons' means under one treatment `(n,)`, at least 3.
         second: Under the other.
-        resamples: How many times persons are drawn.
+        resamples: Number of bootstrap resamples.
 
     References:
         Efron & Tibshirani, An Introduction to the Bootstrap (1993), chapters 11 and 12.
@@ -262,8 +262,8 @@ class _Drawn:
     """Draws of persons, each also without each of its persons.
 
     Args:
-        weights: How often each person is drawn `(b, n)`.
-        rows: What each adds to the sums `(6, n)`.
+        weights: Number of times each person is drawn `(b, n)`.
+        rows: Contribution of each person to the sums `(6, n)`.
         shift: Mean difference of all.
     """
 

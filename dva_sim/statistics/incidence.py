@@ -38,9 +38,9 @@ class Incidence:
     """Share of events that had met each cause by each time: steps, constant between them.
 
     Attributes:
-        times: When something happened, ascending, shape `(k,)` [s].
+        times: Times of changes, ascending, shape `(k,)` [s].
         shares: Share that had met each cause from then on, shape `(causes, k)`.
-        events: How many events it rests on.
+        events: Number of events.
     """
 
     times: Floats
@@ -101,9 +101,9 @@ def incidence(time: ArrayLike, cause: ArrayLike, causes: int) -> Incidence:
     What happens at the moment at which others are cut off happens before.
 
     Args:
-        time: When each event met its cause, or was cut off, shape `(n,)` [s].
-        cause: Which, from 1; `CUT` if it was cut off.
-        causes: How many causes there are.
+        time: Time at which each event met its cause or was cut off, shape `(n,)` [s].
+        cause: Number of the cause, from 1; `CUT` if it was cut off.
+        causes: Number of causes.
     """
     when, what = np.asarray(time, dtype=float), np.asarray(cause, dtype=np.intp)
     times, place = np.unique(when[what != CUT], return_inverse=True)
@@ -142,10 +142,10 @@ def cumulative_incidence(
     person in turn is left out.
 
     Args:
-        times: When it happened, or until when the run was followed `(n,)`; nan where missing.
-        causes: What happened `(n,)`; None or an empty string where nothing did until then.
+        times: Time of the outcome, or end of the follow-up `(n,)`; nan where missing.
+        causes: Outcome `(n,)`; None or an empty string for none until then.
         horizon: Later does not count.
-        person: Whose run it was `(n,)`.
+        person: Person of each run `(n,)`.
 
     References:
         Aalen & Johansen, Scand. J. Stat. 5 (1978) 141-150; Andersen, Klein & Rosthoj,

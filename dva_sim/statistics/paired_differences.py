@@ -28,7 +28,7 @@ def mean_interval(values: ArrayLike, person: ArrayLike, level: float = LEVEL) ->
 
     Args:
         values: One value per run `(n,)`, nan where missing.
-        person: Whose run it was `(n,)`.
+        person: Person of each run `(n,)`.
         level: Confidence level.
     """
     means = person_means(values, person)[1]
@@ -45,7 +45,7 @@ def paired_difference(
     Args:
         a: One treatment `(n,)`.
         b: The other `(n,)`, row by row the same person and trial.
-        person: Whose run it was `(n,)`.
+        person: Person of each run `(n,)`.
         level: Confidence level.
     """
     return mean_interval(_minus(a, b), person, level)
@@ -62,7 +62,7 @@ def one_sided_test(
     Args:
         a: One treatment `(n,)`, nan where missing.
         b: The other `(n,)`, row by row the same person and trial.
-        person: Whose run it was `(n,)`.
+        person: Person of each run `(n,)`.
         bound: In the measure's unit.
         side: On which side of it the difference is claimed to lie.
 
@@ -82,7 +82,7 @@ def equivalence(a: ArrayLike, b: ArrayLike, person: ArrayLike, margin: float) ->
     Args:
         a: One treatment `(n,)`, nan where missing.
         b: The other `(n,)`, row by row the same person and trial.
-        person: Whose run it was `(n,)`.
+        person: Person of each run `(n,)`.
         margin: Largest difference that does not matter, either way; in the measure's unit.
 
     Returns:
@@ -107,7 +107,7 @@ def permutation_test(a: ArrayLike, b: ArrayLike, person: ArrayLike) -> float:
     Args:
         a: One treatment `(n,)`, nan where missing.
         b: The other `(n,)`, row by row the same person and trial.
-        person: Whose run it was `(n,)`.
+        person: Person of each run `(n,)`.
 
     Returns:
         Chance of a difference at least as large, either way, if the labels were swapped by luck;
@@ -147,8 +147,9 @@ def holm(p_values: ArrayLike, family: ArrayLike | None = None) -> Floats:
     adjusted value is not above that level.
 
     Args:
-        p_values: Of each test `(m,)`; nan where a test could not be made, which counts not.
-        family: Which declared family each test is of `(m,)`; all of one if left out.
+        p_values: p-value of each test `(m,)`; nan for tests that could not be made, which do not
+            count.
+        family: Declared family of each test `(m,)`; by default all belong to one.
 
     Returns:
         Adjusted p-values `(m,)`, at most 1; nan stays nan.

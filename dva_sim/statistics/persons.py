@@ -24,7 +24,7 @@ class Interval:
         mean: The estimate (a mean, a quantile, a share, a ratio ...).
         low: Lower end; nan where there are too few persons.
         high: Upper end.
-        n_persons: How many persons it rests on.
+        n_persons: Number of persons.
     """
 
     mean: float
@@ -43,7 +43,7 @@ def person_means(values: ArrayLike, person: ArrayLike) -> tuple[NDArray[Any], Fl
 
     Args:
         values: One value per run `(n,)`, nan where missing.
-        person: Who drove it `(n,)`.
+        person: Person of each run `(n,)`.
 
     Returns:
         The persons `(m,)`, sorted, and their means `(m,)`; nobody without a value.

@@ -19,7 +19,7 @@ def share_interval(flags: ArrayLike, person: ArrayLike) -> Interval:
 
     Args:
         flags: True where it happened `(n,)`; nan or None where the run is missing.
-        person: Whose run it was `(n,)`.
+        person: Person of each run `(n,)`.
 
     References:
         Korn & Graubard, Survey Methodology 24 (1998) 193-201.
@@ -36,7 +36,7 @@ def interval_of_share(share: float, variance: float, persons: int, runs: int) ->
 
     Args:
         share: The estimate.
-        variance: Of the estimate, from how persons differ.
+        variance: Variance of the estimate, from the differences between persons.
         persons: The least number of runs that it counts as; of one, the ends are nan.
         runs: The greatest.
     """
@@ -60,8 +60,8 @@ def quantile_interval(values: ArrayLike, person: ArrayLike, q: float = 0.5) -> I
 
     Args:
         values: One value per run `(n,)`, nan where missing.
-        person: Whose run it was `(n,)`.
-        q: Which quantile; 0.5 is the median.
+        person: Person of each run `(n,)`.
+        q: Probability of the quantile; 0.5 is the median.
 
     References:
         Woodruff, JASA 47 (1952) 635-646.

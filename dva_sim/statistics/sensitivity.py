@@ -20,12 +20,12 @@ class Effect:
 
     Attributes:
         factors: The factor; or the two.
-        levels: Which level of each is judged.
+        levels: Level of each factor that is judged.
         baselines: Beside which, the first level of each.
-        interval: Of a main effect, the difference of the level from the baseline, averaged
-            over all settings of the other factors; of an interaction, by how much that
-            difference grows as the second factor goes from its baseline to its level. Its
-            ends hold for all effects at once.
+        interval: Interval of the effect. Main effect: difference of the level from the baseline,
+            averaged over all settings of the other factors. Interaction: growth of that difference
+            as the second factor goes from its baseline to its level. The ends hold for all effects
+            at once.
     """
 
     factors: tuple[str, ...]
@@ -60,8 +60,8 @@ def factorial_effects(
         levels: For each factor, the level of each run `(n,)`; the first to appear is the
             baseline.
         values: One value per run `(n,)`, nan where missing.
-        person: Whose run it was `(n,)`.
-        resamples: How many times persons are drawn.
+        person: Person of each run `(n,)`.
+        resamples: Number of bootstrap resamples.
 
     Returns:
         Main effects in the order of the factors, then interactions.

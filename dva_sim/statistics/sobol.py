@@ -45,9 +45,9 @@ def sobol_indices(
     Args:
         levels: For each factor, its value in each run `(n,)`.
         values: One value per run `(n,)`, nan where missing.
-        person: Whose run it was `(n,)`.
-        cell: Which cell the run is of `(n,)`, ascending in the order of the design.
-        resamples: How many times blocks and persons are drawn.
+        person: Person of each run `(n,)`.
+        cell: Cell of each run `(n,)`, ascending in the order of the design.
+        resamples: Number of bootstrap resamples over blocks and persons.
 
     Raises:
         ValueError: the cells are not such a design.
