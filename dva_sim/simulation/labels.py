@@ -84,7 +84,7 @@ def take_up(columns: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> None:
     """From now on call the measures of users as a results folder does; the newest one counts.
 
     Args:
-        columns: What its manifest keeps of columns that are none of ours, by table and name.
+        columns: User-defined columns from the manifest, by table and name.
     """
     for table in columns.values():
         _TOLD.update(

@@ -78,11 +78,11 @@ class Model(Generic[S]):
 
     Attributes:
         name: Set when it is loaded: a file's with its whole path.
-        scenario: What its scenarios are; a user's derives from `OwnScenario`.
+        scenario: Class of its scenarios; a user's derives from `OwnScenario`.
         columns: Every column of its tables. `runs` has one row for each run.
-        is_recorded: Whether its runs can be kept as recordings, filmed and run side by side.
-        is_real_time: Whether a run is measured by the clock: then nothing else may run beside it,
-            and the order of runs is random.
+        is_recorded: True if its runs can be recorded, filmed and run side by side.
+        is_real_time: True if runs take real time: then nothing else may run beside them, and their
+            order is random.
     """
 
     name = ""

@@ -26,8 +26,8 @@ class GateVerdict:
         part: Name of the part.
         levels: Levels that the cells have in common.
         first: The statistic in the first folder.
-        second: Value of the second folder.
-        bound: Limit for the second folder's value.
+        second: The statistic in the second folder.
+        bound: Limit for the second folder's statistic.
         missing: Share of the rows without a value, in both.
     """
 

@@ -56,10 +56,9 @@ def add_dva(
     """The DVA; sessions are drawn by the run's seed where no other `permissions` are given.
 
     Args:
-        stage: Where.
-        permissions: Who holds what, if not drawn by the seed.
-        memory: What survives the DVA.
-        keep_events: Whether every event that ever was is kept, for a recording.
+        permissions: Permissions, if not drawn by the seed.
+        memory: State that survives the DVA.
+        keep_events: True to keep all past events, for a recording.
 
     Raises:
         ConfigError: a policy that cannot be loaded.
@@ -128,11 +127,7 @@ def at_event_m(scenario: Scenario) -> float:
 
 
 class _Ways:
-    """Travel times as the DVA expects them: the planner's length, and a pace for each kind.
-
-    Args:
-        stage: Where.
-    """
+    """Travel times as the DVA expects them: the planner's length, and a pace for each kind."""
 
     def __init__(self, stage: Stage) -> None:
         guards = guard_profile(stage.scenario)
@@ -251,7 +246,6 @@ def add_operator(
     """The `number`-th operator.
 
     Args:
-        stage: Where.
         number: From 1.
         truth: The true state of a robot by id, where somebody can tell.
 

@@ -16,8 +16,7 @@ class Disturbance:
     """Waits for the first drive, and then ends its permission, or what else the scenario says.
 
     Args:
-        stage: Where.
-        dva: Who grants and revokes.
+        dva: DVA that grants and revokes permissions.
         field: The robots.
     """
 

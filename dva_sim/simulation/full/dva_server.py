@@ -42,15 +42,15 @@ class DvaAgent:
 
     Args:
         device: Its identity and ways to talk.
-        desk: What decides.
+        desk: Core that makes the decisions.
 
     Attributes:
         beats: Heartbeats heard, by device.
-        leave_after: Who is silent is listened to for so much longer [s].
+        leave_after: Time that a silent device is still listened to before it leaves [s].
         events: Every event there ever was, by number, where `keep_events`.
-        facts: What was decided; the last of it, unless `keep_events`.
-        on_fact: Is told of each fact as it is taken from the desk.
-        is_gone: Whether it has crashed; another one may take its place.
+        facts: Decisions; only the latest ones, unless `keep_events`.
+        on_fact: Callback for each fact as it is taken from the core.
+        is_gone: True once it has crashed; another one may take its place.
     """
 
     def __init__(
@@ -115,8 +115,8 @@ class DvaAgent:
 
         Args:
             robot: Its id.
-            takes: Who has it from then on, if anybody.
-            holder_told: Whether the word of it reaches who held it.
+            takes: Device that gets it next, if any.
+            holder_told: True if the notice reaches the previous holder.
         """
         sessions, entries = self.desk.sessions, self.desk.registry.entries
         grant = sessions.permissions.grants.get(robot)

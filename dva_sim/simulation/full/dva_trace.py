@@ -40,10 +40,10 @@ class TracedDva:
     """A desk that is written down: whoever has it asks as if it were the desk itself.
 
     Args:
-        desk: What decides.
+        desk: Core that makes the decisions.
         sink: Takes lines.
-        stage: Where it works.
-        memory: What it will recall, if it does.
+        stage: Stage of the run.
+        memory: Store that it will recall, if any.
     """
 
     def __init__(self, desk: Dva, sink: Sink, stage: Stage, memory: Store | None = None) -> None:
@@ -193,8 +193,8 @@ def replay_dva(lines: Iterable[str | bytes], path: Path) -> Iterator[Decided]:
     """Tell a fresh DVA the same again.
 
     Args:
-        lines: Of a trace.
-        path: Where they are from, for what is said of them.
+        lines: Lines of a trace.
+        path: File of the lines, for error messages.
 
     Raises:
         ConfigError: this is no trace of a DVA; or it would have to run a class in a file.

@@ -48,10 +48,10 @@ class Debt(NamedTuple):
     """Next step that a device owes after accepting an order: to set out, or to move.
 
     Attributes:
-        who: Who has the order; None: nobody owes anything.
-        step: Whether it has set out, and so has to move.
+        who: Device that has the order; None: nobody owes anything.
+        step: True if it has set out, and so has to move.
         since: From when on [s].
-        place: Where it was then.
+        place: Its place at that time.
     """
 
     who: str | None
@@ -64,12 +64,12 @@ class Seen(NamedTuple):
     """State of an event when it was last checked; times in [s].
 
     Attributes:
-        found: What somebody has found, or done, there.
-        hands: Who has it in hand, and for what; empty: nobody.
+        found: Findings and actions reported at the event.
+        hands: Devices in charge, by task; empty: nobody.
         since: From when on those do.
         waits: Since when it has waited for somebody who takes it up.
         times: Time of each step, as the book has it.
-        debt: What who has it in hand owes.
+        debt: Next step owed by the device in charge.
         is_over: True if it is closed, and nothing happens to it any more.
     """
 
@@ -87,13 +87,13 @@ class Word:
     """Statement about one event on the network.
 
     Attributes:
-        ordered: Who was sent there, and what goes there for them: a robot, or they themselves.
-        taken: Who has taken that up.
-        ended: Who has done with it, by its own word or the DVA's.
-        loose: Who has it no longer, by its own word or the DVA's, or has started anew.
-        busy: Whether somebody has taken it up since it was last looked at.
-        anew: Whether somebody loose was sent there since then.
-        found: What those at the place have found, or done.
+        ordered: Devices sent there, with the device that travels: a robot, or themselves.
+        taken: Devices that have accepted the order.
+        ended: Devices that have finished, by their own report or the DVA's.
+        loose: Devices no longer in charge, by their own report or the DVA's, or after a restart.
+        busy: True if somebody accepted it since the last check.
+        anew: True if such a device was sent there again since then.
+        found: Findings and actions of those at the place.
     """
 
     ordered: dict[str, str] = field(default_factory=dict)
@@ -109,14 +109,14 @@ class EventLedger:
     """A second book of the events, by what is said on the network, beside what the DVA's shows.
 
     Args:
-        rules: How long an event may wait, or be in one pair of hands.
+        rules: Limits on the waiting time of an event, and on the time of one responder.
         dva: Id of the DVA.
-        place_of: Where a device really is.
-        at_event: Who is so near may have seen what there is [m].
+        place_of: True position of a device.
+        at_event: Distance within which a device may have seen the event [m].
         name: Gives the name of a device by its id.
 
     Attributes:
-        knows_places: Whether anybody knows where devices are; else they are taken at their word.
+        knows_places: True if true positions are known; otherwise devices are believed.
     """
 
     def __init__(

@@ -40,14 +40,14 @@ class RunHazard:
     """A hazard of this run.
 
     Attributes:
-        kind: What it is reported as: `fire`, `gas_leak` or `flood`.
-        room: Where, by name; empty outside all rooms.
-        start: When it begins [s].
-        detected: When a detector or a person notices it [s]; infinite if nobody does.
+        kind: Kind as reported: `fire`, `gas_leak` or `flood`.
+        room: Name of the room; empty outside all rooms.
+        start: Start time [s].
+        detected: Time at which a detector or a person notices it [s]; infinite if nobody does.
         detector: The detector that does, if one does.
-        hazard: How it grows.
+        hazard: Model of its growth.
         false_alarm: Nothing is there; the hazard is what those who report it believe in.
-        hearsay: What others report of it after the first report.
+        hearsay: Later reports by other people.
     """
 
     kind: str
@@ -163,13 +163,10 @@ def _watched_rooms(kind: type[Hazard], site: Site) -> list[str | None]:
 class RunHazards:
     """Hazards at the site: what is there and visible, and what has been dealt with.
 
-    Args:
-        stage: Where.
-
     Attributes:
-        incidents: Of the scenario, in its order.
-        surroundings: What the hazards make of the air and the floor.
-        contained: When an incident was dealt with [s], by its place in `incidents`.
+        incidents: Incidents of the scenario, in its order.
+        surroundings: Effect of the hazards on air and floor.
+        contained: Time at which an incident was contained [s], by its index in `incidents`.
 
     Raises:
         ConfigError: the site cannot hold the events.

@@ -84,9 +84,9 @@ class Driven(NamedTuple):
     """A drive as far as its commands had an effect.
 
     Attributes:
-        log: Of the drive.
-        applied: What took effect before its end.
-        hold: How long each of them was in force, shape `(n,)` [s].
+        log: Log of the drive.
+        applied: Commands that took effect before its end.
+        hold: Time for which each of them was in force, shape `(n,)` [s].
     """
 
     log: DriveLog

@@ -39,7 +39,7 @@ class SafetyTerms:
     """Limits that the safety rules hold a run to.
 
     Attributes:
-        watchdog: How long a command may be in force after its arrival [s].
+        watchdog: Time for which a command may be in force after its arrival [s].
         max_age: And after the picture behind it was taken [s].
         rules: Deadlines of the DVA.
         at_event: From how far somebody may see what was reported somewhere [m].
@@ -103,12 +103,12 @@ class RobotMotion(NamedTuple):
         mode: Its mode, by its own word; all else is measured.
         speed: Measured along its heading [m/s].
         turn_rate: Measured [rad/s].
-        asked_speed: What the motors were asked for last [m/s].
-        asked_turn_rate: The same [rad/s].
+        asked_speed: Latest set point of the motors [m/s].
+        asked_turn_rate: Latest set point of the motors [rad/s].
         asked_until: Until when that is in force [s]; 0: they were asked to stand.
-        touched: When it last was in contact with anything [s]; -inf: never.
+        touched: Time of the latest contact with anything [s]; -inf: never.
         grip: Friction coefficient of the floor under it.
-        powered: Whether it has power.
+        powered: True while it has power.
     """
 
     mode: str
@@ -210,7 +210,7 @@ class Senders:
     """Finds the true sender of a message over sockets, where only the message names one.
 
     Args:
-        is_ours: Tells the devices whose every message is noted.
+        is_ours: Predicate for devices whose every message is noted.
         most: So many messages are remembered; None: all.
     """
 
@@ -237,7 +237,7 @@ class Arrived(NamedTuple):
     """A message has reached a robot or the DVA.
 
     Attributes:
-        time: When [s].
+        time: Arrival time [s].
         source: Its true sender; empty if it claims to be of a device that has not sent it.
         to: Its receiver.
         payload: Its bytes.
@@ -274,7 +274,7 @@ class BookNews(NamedTuple):
     """Changes of the DVA's book since the last look at it.
 
     Attributes:
-        time: When [s].
+        time: Time [s].
         events: Events that have changed, as `event_facts` has them.
         gone: Numbers of events that are in it no longer.
         total: Number of all events so far.

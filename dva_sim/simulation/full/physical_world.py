@@ -37,9 +37,6 @@ REPORT_AGAIN = 2.0  # after a report that was not answered, or refused [s]
 class Field(RunHazards):
     """Everything that has a place.
 
-    Args:
-        stage: Where.
-
     Raises:
         ConfigError: the site cannot hold the team or the events.
     """

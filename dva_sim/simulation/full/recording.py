@@ -25,15 +25,15 @@ class PersonLog(NamedTuple):
     """Record of a guard or bystander.
 
     Attributes:
-        name: As in `guard-1`.
+        name: Name as in `guard-1`.
         kind: `guard` or `bystander`.
         activity: At the end.
         exposure: Time within the danger radius of a hazard and in sight of it, or in air or water
             that is dangerous [s].
         heat: Fractional effective dose of heat; at 1 half of all people are incapacitated.
-        toxic: The same of carbon monoxide.
-        leaves: When it set out to leave [s]; infinite if it never did.
-        out: When it was out [s]; infinite if it never was.
+        toxic: Dose of carbon monoxide.
+        leaves: Time of setting out to leave [s]; infinite if never.
+        out: Time of reaching the outside [s]; infinite if never.
     """
 
     name: str
@@ -94,7 +94,7 @@ class Ending(NamedTuple):
     Attributes:
         outcome: `confirmed`, `refuted`, `escalated` or `expired`; `open` if none of them came
             before the run ended, and `undetected` if nobody reported it.
-        time: When [s]; infinite if it is open or undetected.
+        time: Time [s]; infinite if it is open or undetected.
     """
 
     outcome: str
@@ -106,19 +106,19 @@ class Playback:
     """Everything that can be told and shown of a run, whether or not it ran here.
 
     Attributes:
-        recorder: What happened, as far as it is told or seen.
+        recorder: Events and reports of the run.
         incidents: The hazards as they were.
-        surroundings: What the hazards made of the air and the floor.
+        surroundings: Effect of the hazards on air and floor.
         labels: Names by id.
-        radii: Of the robots, seen from above, by id [m].
-        duration: How long the run lasted [s].
-        contained: When incidents were dealt with [s], by their place in `incidents`.
-        endings: What became of each incident, in the order of `incidents`; empty if that is not
-            known, as of a recording that was cut short.
+        radii: Footprint radius of each robot, by id [m].
+        duration: Length of the run [s].
+        contained: Time at which incidents were contained [s], by their index in `incidents`.
+        endings: Outcome of each incident, in the order of `incidents`; empty if unknown, as in a
+            recording that was cut short.
         events: The events as the DVA knew them in the end.
-        facts: What was decided, by whom and why, in order.
-        about_robots: What its robots are held to, as `Terms.about_robots` tells it; None: as the
-            profiles say that the scenario names.
+        facts: Decisions with author and reason, in order.
+        about_robots: Limits of its robots, as in `Terms.about_robots`; None: as in the profiles
+            that the scenario names.
     """
 
     scenario: Scenario
@@ -154,8 +154,8 @@ class Recording(Playback):
     Attributes:
         robots: Measures of the robots, by id.
         links: Modelled links to each robot and back, by its id.
-        people: What became of the people on foot.
-        depth: How the network was modelled: `message`, `segment` (where any connection was), or
+        people: Record of each person on foot.
+        depth: Depth of the network model: `message`, `segment` (if any connection had it), or
             `datagram`.
         persons: Numbers of the operators whose places people took.
     """

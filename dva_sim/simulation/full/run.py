@@ -80,8 +80,7 @@ def simulate(scenario: Scenario, seed: int, keep_traffic: bool = False) -> Recor
     """Run one scenario.
 
     Args:
-        scenario: What the run consists of.
-        seed: Decides all luck but the persons'.
+        seed: Random seed of everything but the persons.
         keep_traffic: Keep messages, the operators' views and finer tracks, for pictures and
             recordings.
 
@@ -123,13 +122,14 @@ class Watched:
 
     Attributes:
         clock: Its time.
-        recorder: Told what happens.
-        cameras: Where the robots' pictures are.
+        recorder: Recorder of the run.
+        cameras: Addresses of the robots' pictures.
         seats: So many operators are people, the last ones, if the scenario names none.
-        keeps: Whether all that happens is kept to be measured; without, a run may last for ever.
-        real: What carries the messages; None: the network that the scenario models.
-        memory: What survives the DVA.
-        time_of_day: See `AgentDevice`; devices that start anew need exact timestamps.
+        keeps: True to keep everything for measuring; without, a run may last forever.
+        real: Transport of the messages; None: the network that the scenario models.
+        memory: State that survives the DVA.
+        time_of_day: Time of day at the start, and exactness of timestamps; see `AgentDevice`.
+            Devices that restart need exact ones.
     """
 
     clock: Clock
@@ -146,10 +146,9 @@ class Run:
     """Everybody in place on the network, at time zero.
 
     Args:
-        scenario: What the run consists of.
-        seed: Decides all luck but the persons'.
+        seed: Random seed of everything but the persons.
         keep_traffic: Keep messages and the operators' views, for pictures.
-        watched: What people give a run who watch it, and take part.
+        watched: Options of a run that people watch and join.
 
     Attributes:
         persons: Numbers of the operators who are people.

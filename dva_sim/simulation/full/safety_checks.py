@@ -120,28 +120,28 @@ class Witness:
     """Facts about one robot that are known without asking it; times in [s].
 
     Attributes:
-        obeys_within: How long it may take to obey a message.
+        obeys_within: Longest time to obey a message.
         sessions: By session: what the DVA gave.
         over: By session: from when on nobody may act by it.
         unanswered: By sender and number: what it has not answered yet.
         done: By sender, session and number: what it has said OK to; it may say so again.
         arrivals: By sender, number and session: when copies of the newest commands arrived.
-        stopped: When the newest emergency was obeyed, or should have been.
-        ordered: When the newest order that was accepted had arrived.
-        does: What that was, by sender and session; nothing once that was ended.
-        owner: Who gave it.
+        stopped: Time at which the newest emergency was obeyed, or should have been.
+        ordered: Arrival time of the newest accepted order.
+        does: Content of that order, by sender and session; None once it was ended.
+        owner: Sender of that order.
         newest: Sender and session, and number, of the newest command that was accepted.
         allowed: Until when that lets it move.
-        offset: What is to be added to its own clock to have the time.
-        last_mission: When it was last on a mission that it may be on.
-        looked: When it was last looked at.
-        stood: When it was last seen to be commanded nothing.
-        stood_before: The same before the newest order was accepted.
-        heard: When something of its driver, or of a hand, was last obeyed.
+        offset: Offset from its own clock to the time of the run.
+        last_mission: Time at which it was last on a permitted mission.
+        looked: Time of the last check.
+        stood: Time at which it was last seen with no commanded motion.
+        stood_before: Value of `stood` before the newest order was accepted.
+        heard: Time at which a message of its driver, or of a manual driver, was last obeyed.
         confirmed: Sessions that the DVA has confirmed to it, when it asked.
         question: Number of its newest question to the DVA: only the answer to that counts.
-        asked: When it sent that first.
-        hand: Who has taken it by hand, and has not let it go since.
+        asked: Time at which that request was first sent.
+        hand: Person in manual control, until released.
         registrations: Its newest ones, by number and time stamp.
     """
 
@@ -254,10 +254,10 @@ class SafetyAudit:
     It is an `Observer`.
 
     Args:
-        recorder: Told what broke which rule.
+        recorder: Recorder of broken rules.
         terms: Limits that the run is held to.
         motion_of: Gives the motion of a robot now, by its id.
-        place_of: Where a device really is, by its id; None: it has no place.
+        place_of: True position of a device, by its id; None if it has none.
     """
 
     def __init__(

@@ -108,15 +108,13 @@ class Stage:
     """Stage of a run, or of a part of one.
 
     Attributes:
-        scenario: What the run consists of.
-        seed: Decides all luck but the persons'.
-        network: What carries messages.
-        recorder: Told what happens.
+        seed: Random seed of everything but the persons.
+        recorder: Recorder of the run.
         address: Gives a new device its address, by kind and number.
         time_of_day: See `AgentDevice`.
-        cameras: Where the robots' pictures are.
+        cameras: Addresses of the robots' pictures.
         devices: All that were made.
-        pattern_names: What carries the commands for a robot, by its id, where that was changed.
+        pattern_names: Pattern of the commands for a robot, by its id, where it was changed.
 
     Raises:
         ConfigError: a map that cannot be read, or that the team does not fit on.

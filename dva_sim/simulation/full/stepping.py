@@ -29,8 +29,8 @@ class SteppedDrive:
     commands by the scenario's pattern, and sees what the robot's camera sends, when that arrives.
 
     Args:
-        scenario: What the run consists of; one of its operators drives no robot.
-        seed: Decides everything that is random.
+        scenario: Scenario to run; one of its operators drives no robot.
+        seed: Random seed of the whole run.
 
     Attributes:
         run: The run.

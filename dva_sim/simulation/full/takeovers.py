@@ -17,8 +17,8 @@ class Stopping(NamedTuple):
 
     Attributes:
         asker: For whom.
-        session: Of its last holder.
-        until: Whoever has it later than this has got it otherwise [s].
+        session: Session of its last holder.
+        until: Time after which any holder has got it in another way [s].
     """
 
     asker: str

@@ -59,9 +59,8 @@ class TeamBuilder:
     the site, chosen by the run's seed: that way, cut off where so much of it is left.
 
     Args:
-        stage: Where.
         world: The physics.
-        hazards: What is going on there.
+        hazards: Hazards of the run.
     """
 
     def __init__(self, stage: Stage, world: World, hazards: RunHazards) -> None:
@@ -313,10 +312,9 @@ class Power:
     """A robot's battery, if it has one, and the base that charges it.
 
     Args:
-        profile: Of the robot.
         charge: Share of the capacity that it begins with.
         body: Says how far it went, and what that took.
-        base: Where it is charged.
+        base: Pose of its charging base.
         clock: The run's.
     """
 

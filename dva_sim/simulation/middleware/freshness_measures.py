@@ -86,8 +86,8 @@ class Ages:
     """The age in force over a window, piece by piece; in each it grows as time does.
 
     Args:
-        made: When each applied command was made [s], shape `(n,)`, in the order of application.
-        applied: When it was applied [s], shape `(n,)`.
+        made: Creation time of each applied command [s], shape `(n,)`, in the order of application.
+        applied: Time of application [s], shape `(n,)`.
         window: The time looked at.
     """
 
@@ -129,8 +129,8 @@ def command_row(
     """Return the measures of the applied commands.
 
     Args:
-        made: When each was made [s], shape `(n,)`, in the order of application.
-        applied: When it was applied [s], shape `(n,)`.
+        made: Creation time of each command [s], shape `(n,)`, in the order of application.
+        applied: Time of application [s], shape `(n,)`.
         window: The time looked at.
         max_age_s: The robot's limit.
         watchdog_s: The robot stops after so long without a newer command.
@@ -155,8 +155,8 @@ def picture_row(taken: Floats, shown: Floats, window: Window) -> Row:
     """Return the measures of the pictures that arrived.
 
     Args:
-        taken: When each was taken [s], shape `(n,)`.
-        shown: When it arrived [s], shape `(n,)`.
+        taken: Capture time of each picture [s], shape `(n,)`.
+        shown: Arrival time of each picture [s], shape `(n,)`.
         window: The time looked at.
     """
     inside = (shown >= window.since) & (shown < window.until)

@@ -46,11 +46,10 @@ class MiddlewareRun(NamedTuple):
     """Results of a run.
 
     Attributes:
-        scenario: As it was run.
         near: ProgramNotes of the operator's program.
         far: ProgramNotes of the robot's program.
         window: The time that was measured.
-        link: What the link did, and how late it was itself.
+        link: Report of the link: packets, and its own lateness.
         attempts: Runs made until one was undisturbed; this is the last.
         load: Runnable processes of the machine when it began, one-minute mean.
     """

@@ -34,7 +34,7 @@ class StreamConfig(Config):
 
     Attributes:
         rate_hz: Messages per second.
-        bytes: Of each.
+        bytes: Size of a message.
     """
 
     rate_hz: Annotated[float, Field(gt=0, le=200)]
@@ -57,15 +57,15 @@ class MiddlewareScenario(Config):
     """An operator that sends commands to a robot over real middleware, in real time.
 
     Attributes:
-        model: Tells this kind of scenario from the others.
-        transport: What carries the commands.
-        link: What lies between the two, as of a full scenario; its time begins with the run.
+        model: Name of this kind of scenario.
+        transport: Transport of the commands.
+        link: Link between the two, as in a full scenario; its time begins with the run.
         command_rate_hz: Commands per second, each as the phone's app sends it.
-        pictures: What the robot sends back over the same transport; none if left out.
-        robot: What the robot obeys.
-        set_up_s: When measuring begins; a transport that is not connected by then has failed.
+        pictures: Pictures that the robot sends over the same transport; by default none.
+        robot: Robot's rules for accepting commands.
+        set_up_s: Start of the measurement; a transport that is not connected by then has failed.
         measure_s: For how long it is measured.
-        attempts: How often a run that the machine has disturbed is made again; the last counts.
+        attempts: Number of attempts when the machine disturbs a run; the last counts.
     """
 
     model: Literal["middleware"]
@@ -86,7 +86,7 @@ def build(
     """A scenario from a file or plain data, with some keys changed.
 
     Args:
-        source: A document (mistakes are told with their place) or plain data.
+        source: Document, whose mistakes are reported with their place, or plain data.
         changes: New values by dotted key, such as `{"transport.name": "mqtt"}`.
 
     Raises:

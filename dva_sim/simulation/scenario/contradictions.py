@@ -38,8 +38,8 @@ def contradictions(scenario: Scenario, *, live: bool = False) -> list[str]:
     """List contradictory settings, a sentence each without its full stop.
 
     Args:
-        scenario: As `build` makes it.
-        live: Whether it is run over real sockets, where the modelled link plays no part.
+        scenario: Scenario as `build` makes it.
+        live: True for runs over real sockets, where the modelled link plays no part.
     """
     link = _of_modelled_link(scenario) if live else _of_link(scenario)
     others = (

@@ -164,7 +164,7 @@ def build(
     """A scenario from a file or plain data, with some keys changed.
 
     Args:
-        source: A document (mistakes are told with their place) or plain data.
+        source: Document, whose mistakes are reported with their place, or plain data.
         changes: New values by dotted key, for example `{"link.delay_s": 0.25}`.
 
     Raises:

@@ -32,7 +32,7 @@ class SiteConfig(Config):
     """Site by name or path, or a bare map in ROS map_server form.
 
     Attributes:
-        options: Of a site that is generated, such as `{seed: 7, width_m: 80}`.
+        options: Options of a generated site, such as `{seed: 7, width_m: 80}`.
     """
 
     name: str = "caparica"
@@ -55,7 +55,7 @@ class RobotConfig(Config):
         profile: One for all, or a list: the first robot has the first, and so on in turn.
         processing_s: Time a message takes a robot's computer, a number or a law such as
             `{law: gamma, mean_s: 0.2, cv: 0.5, first_s: 2}`; left out: as its profile says.
-        sensors: What they carry; left out: as their profile says.
+        sensors: Sensors that they carry; by default those of their profile.
         charge: Share of the battery's capacity that they begin with.
         way_m: They begin at places from which the way to the first event is so long, rather than
             at the site's bases. Those for whom the site has no base begin where it is free.
@@ -116,7 +116,7 @@ class GuardConfig(OmitsUnset):
     """The guards: how many, and from which profile they are drawn.
 
     Attributes:
-        kind: Who plays them: `simulated`, `person`, or some by number, as in `{2: person}`.
+        kind: Player of each guard: `simulated`, `person`, or some by number, as in `{2: person}`.
         traits: Medians that take the place of the profile's, such as `{contain_s: 300}`.
         habits: Assumed numbers that take the place of the profile's, such as
             `{work: {stands_off_m: 12}}`.
@@ -201,16 +201,16 @@ class OperatorConfig(OmitsUnset):
 
     Attributes:
         strategy: By name, or a class in a file, `mine.py:Mine`.
-        options: Of the strategy, such as `{inner: pursuit, quality: 0.8}` of the predictor.
+        options: Options of the strategy, such as `{inner: pursuit, quality: 0.8}` of the predictor.
         traits: Medians that take the place of the population's, such as `{margin: 0.4}`.
         habits: Assumed numbers that take the place of the population's, such as
             `{waiting: {shortest_s: 0.7}}`.
-        span: How many robots one operator may have in hand at once.
+        span: Maximum number of robots that one operator handles at once.
         person: Index of the first operator's person in the population; the next operator
             is the next person.
         population_seed: Draws the population; a study gives its own seed.
-        kind: Who they are: `simulated`, `person`, or some by number, as in `{2: person}`; people
-            take part at a console, and nowhere else.
+        kind: Kind of each operator: `simulated`, `person`, or some by number, as in `{2: person}`.
+            People take part at a console only.
     """
 
     strategy: Annotated[str, Key("operator strategy")] = "adaptive"
@@ -243,11 +243,11 @@ class CommandConfig(Config):
     """Sending of commands, the same for every pattern.
 
     Attributes:
-        timeout_s: Of a command that is to be answered; left out: 9 s, or as much longer as the
-            link's round trip needs.
-        attempts: How often it is sent before the link counts as lost.
-        window: How many requests may be unanswered at once under `pipelined`.
-        heeds: Whether the app acts on being refused. As the document has it, it does not.
+        timeout_s: Time-out of a command that needs a reply; by default 9 s, or longer if the link's
+            round trip needs it.
+        attempts: Number of attempts before the link counts as lost.
+        window: Maximum number of unanswered requests under `pipelined`.
+        heeds: True if the app reacts to refused commands. As the document has it, it does not.
     """
 
     rate_hz: Annotated[
@@ -270,8 +270,9 @@ class RequestConfig(Config):
     before the request leaves: nothing would ever be answered.
 
     Attributes:
-        timeout_s: Of a request; left out: 9 s, or as much longer as the link's round trip needs.
-        attempts: How often it is sent before the link counts as lost.
+        timeout_s: Time-out of a request; by default 9 s, or longer if the link's round trip needs
+            it.
+        attempts: Number of attempts before the link counts as lost.
     """
 
     timeout_s: Annotated[float, Field(gt=0, le=120)] | None = None
@@ -285,7 +286,7 @@ class DisturbanceConfig(Config):
         kind: `revoke`: the DVA ends the permission. `take_over`: and gives the robot to another.
             `refuse`: from then on the robot answers every command with NOT_PERMITTED.
         after_s: So long after the drive began.
-        holder_told: Whether the word of the DVA reaches who held the robot.
+        holder_told: True if the DVA's notice reaches the previous holder of the robot.
     """
 
     kind: Annotated[
@@ -319,15 +320,15 @@ class EventConfig(Config):
     Attributes:
         kind: `fire`, `gas_leak`, `flood`, a class in a file as `mine.py:Mine`, or what an
             installed package offers.
-        room: Where, by name; left out, the run's seed chooses a room.
-        at_s: When it starts.
-        latest_s: If given, the seed draws the start between `at_s` and this.
-        reported: Whether somebody reports it at once; otherwise detectors must notice it.
-        false_alarm: Whether nothing is there: it is reported as it would be, and that is all.
-        hazard: What else belongs to its kind, such as `{growth: fast}` of a fire or
-            `{gas: propane, rate: 0.01}` of a leak.
-        reports: How many report it; the others are people who see it a little later, and tell
-            the place a little otherwise.
+        room: Name of the room; by default the run's seed chooses one.
+        at_s: Start time.
+        latest_s: Latest start time: if given, the seed draws the start between `at_s` and this.
+        reported: True if somebody reports it at once; otherwise detectors must notice it.
+        false_alarm: True for a false alarm: it is reported in the usual way, but nothing is there.
+        hazard: Parameters of its kind, such as `{growth: fast}` of a fire or `{gas: propane, rate:
+            0.01}` of a leak.
+        reports: Number of reports; the further ones are by people who see it a little later and
+            report a slightly different place.
     """
 
     kind: str
@@ -361,19 +362,20 @@ class DispatchConfig(Config):
 
     Attributes:
         policy: By name, or as `my_policy.py:Mine`.
-        options: Of that policy.
+        options: Options of that policy.
         escalate_after_s: An event that has waited so long for somebody is escalated; 0: at
             once if nobody is free; null: never.
-        containment: Whether a confirmed event also needs a guard who deals with it.
+        containment: True if a confirmed event also needs a guard to contain it.
         most_waiting: More events than that do not wait: the newest is escalated at once.
         merge_distance_m: Reports of one kind nearer than this are one event; 0: never.
-        order_limit_s: Who has not settled an event so long after the order gives it back.
+        order_limit_s: Time limit of an order; a responder who has not settled the event by then
+            gives it back.
         depart_within_s: So does who has taken an order up and not set out after this; null: never.
         still_within_s: And who is on the way and has not moved for so long; null: never.
-        bid_within_s: How long an auction takes bids.
+        bid_within_s: Time for which an auction takes bids.
         mode: `automatic`: the policy sends whom it wants. `ask_first`: it asks people at a control
             room, as long as one is there.
-        decide_within_s: How long it then waits for an answer before it acts by itself.
+        decide_within_s: Time for which it then waits for an answer before it acts by itself.
         person: Somebody who dispatches by a script; left out: nobody.
     """
 
@@ -439,11 +441,11 @@ class DvaConfig(Config):
     """Duties of the DVA besides giving orders.
 
     Attributes:
-        sensors: Which sensors of robots it heeds: much of it raises an event, or confirms one.
-        sensor_rate_hz: How often it wants their values.
-        supervisors: Who may take a robot from its holder: labels of operators, or ids.
-        control_rooms: What control rooms may do, `look`, `drive`, `dispatch` or `supervise`, by
-            label, such as `control-room-1`, or id. Others may look.
+        sensors: Robot sensors that it uses: a high value raises an event, or confirms one.
+        sensor_rate_hz: Rate at which it requests their values.
+        supervisors: Operators who may take a robot from its holder, by label or id.
+        control_rooms: Roles of control rooms, `look`, `drive`, `dispatch` or `supervise`, by label,
+            such as `control-room-1`, or id. Others may look.
     """
 
     sensors: tuple[Literal["temperature", "smoke", "gas"], ...] = ()

@@ -56,15 +56,16 @@ class Scenario(Config):
     """Everything one run needs but its seed.
 
     Attributes:
-        model: Tells this kind of scenario from the timed ones.
-        control: How operators use robots. `direct`: they close the loop over the link.
-            `coordinated`: the robot also watches where it drives, and slows by itself.
-            `supervisory`: they name the goal and judge the picture, the robot drives alone.
-        pattern: How commands travel: by name, or a class in a file, `mine.py:Mine`.
-        pattern_options: Of the pattern, such as `{every: 5}` of one that asks now and then.
-        transport: What carries messages: ZeroMQ over TCP, or datagrams.
-        network_depth: How ZeroMQ over TCP is modelled: by whole messages, exact where nothing
-            is lost or piles up; by TCP segments; or as each link asks for.
+        model: Name of this kind of scenario.
+        control: Mode of control. `direct`: operators close the loop over the link. `coordinated`:
+            the robot also watches its path, and slows down by itself. `supervisory`: operators name
+            the goal and judge the picture, and the robot drives alone.
+        pattern: Messaging pattern of the commands: by name, or a class in a file, `mine.py:Mine`.
+        pattern_options: Options of the pattern, such as `{every: 5}` of one that requests now and
+            then.
+        transport: Transport of the messages: ZeroMQ over TCP, or datagrams.
+        network_depth: Depth of the model of ZeroMQ over TCP: whole messages, exact where nothing is
+            lost or queued; TCP segments; or as each link requires.
     """
 
     model: Literal["full"] = "full"

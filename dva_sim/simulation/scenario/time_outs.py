@@ -18,7 +18,7 @@ def time_out_s(needed_s: float) -> float:
     """The time-out of a request that nobody gave one [s]: the usual one, or longer.
 
     Args:
-        needed_s: What the first answer over a new connection takes [s].
+        needed_s: Time that the first reply over a new connection takes [s].
     """
     return USUAL_S if needed_s < USUAL_S else min(_ROOM * needed_s, LONGEST_S)
 

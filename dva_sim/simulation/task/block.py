@@ -38,9 +38,9 @@ def play(scenario: TaskScenario, seed: int, recording: RecordedDelays | None = N
 
     Args:
         scenario: The task, the person and what lies between.
-        seed: Decides all luck but who the person is.
-        recording: Of a link that takes the place of the scenario's, for a vehicle; each trial
-            begins somewhere in it.
+        seed: Random seed of everything but the choice of the person.
+        recording: Recording that replaces the scenario's link, for a vehicle; each trial begins
+            somewhere in it.
     """
     return [row for row, _ in _play(scenario, seed, drawn=None, recording=recording)]
 
@@ -92,9 +92,7 @@ def in_a_moment(person: Person, alertness: float, task: Task) -> Person:
     Where nothing but the first reaction is of interest, what it sees varies as well.
 
     Args:
-        person: Who it is.
         alertness: A standard normal number.
-        task: What is done.
     """
     share = math.exp(REACTIONS * alertness)
     sees = share if isinstance(task, HeadingStep) else 1.0

@@ -27,8 +27,8 @@ class Channel(Generic[T]):
     Args:
         way: Delay, jitter, loss.
         extra: On top of them, always [s].
-        streams: The luck of the trial.
-        name: Of this direction, for its luck.
+        streams: Random streams of the trial.
+        name: Name of this direction, which selects its random stream.
     """
 
     def __init__(self, way: OneWayDelay, extra: float, streams: Streams, name: str) -> None:

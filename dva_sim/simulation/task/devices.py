@@ -36,8 +36,9 @@ class HandDevice(ABC):
     Attributes:
         top: The fastest cursor that it can ask for [m/s].
         period: Between two readings [s].
-        is_place: Whether the cursor goes where the hand is; else as fast as it is far from rest.
-        failures: How often a filter of a user gave no answer that is one.
+        is_place: True if the cursor follows the hand's position; otherwise its speed follows the
+            deflection.
+        failures: Number of missing or invalid values of a user's filter.
     """
 
     top: float
@@ -215,9 +216,9 @@ def make_device(config: DeviceConfig, person: Person, streams: Streams, dt: floa
     """The device of a trial, in a person's hand.
 
     Args:
-        config: Which, and its gain.
-        person: Whose hand it is.
-        streams: The luck of the trial.
+        config: Kind of device, and its gain.
+        person: Person who holds it.
+        streams: Random streams of the trial.
         dt: The trial's step [s].
     """
     return KINDS[config.kind](config, person, streams, dt)

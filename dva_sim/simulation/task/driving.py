@@ -46,7 +46,7 @@ def way_of(task: Task, first: float, width: float) -> Points:
     Args:
         task: A corner, slalom or course.
         first: The condition's length or spacing [m].
-        width: Of the way [m].
+        width: Width of the path [m].
     """
     if isinstance(task, Corner):
         leg = 0.5 * first
@@ -82,9 +82,9 @@ class DriveTrial(Trial[Observation]):
 
     Args:
         scenario: Vehicle, links, frames.
-        seat: Who drives.
+        seat: Person who drives.
         condition: See the kinds of tasks.
-        streams: The luck of this trial.
+        streams: Random streams of the trial.
         reaction: See `Trial`.
     """
 
@@ -206,11 +206,11 @@ class HeadingTrial(DriveTrial):
 
     Args:
         scenario: Vehicle, links, frames.
-        seat: Who drives.
+        seat: Person who drives.
         condition: Error [deg] and width [m].
-        streams: The luck of this trial.
+        streams: Random streams of the trial.
         reaction: See `Trial`.
-        leftwards: Whether the vehicle points to the left of its way.
+        leftwards: True if the vehicle points to the left of its path.
     """
 
     def __init__(

@@ -47,8 +47,8 @@ def throughput(
         amplitude: Nominal way to the target [m].
         width: Nominal width [m]; stands where no `ends` are given.
         times: Movement times [s].
-        ends: Where the trials ended along the task axis, from the centre of the target [m]: the
-            index then rests on the effective width and the amplitude really covered.
+        ends: End positions of the trials along the task axis, from the centre of the target [m]:
+            the index then rests on the effective width and the amplitude actually covered.
 
     Returns:
         nan without trials, or if all trials ended at the same place.
@@ -141,7 +141,7 @@ def first_peak(values: Sequence[float], falls: float = 0.1) -> int:
     """Return where the first rise of a signal ends: before it falls by a share of its height.
 
     Args:
-        values: Of the signal, smoothed.
+        values: Smoothed values of the signal.
         falls: Share; a shorter fall is noise.
     """
     best, height = 0, 0.0

@@ -95,14 +95,14 @@ class Goal(ABC):
     """Goal of a pointing trial, and its measures.
 
     Attributes:
-        flat: Whether the cursor only moves along x.
-        stands: Whether the target stands where it is; one that takes another's place has no
-            velocity, and nobody leads it.
+        flat: True if the cursor moves only along x.
+        stands: True if the target is stationary; one that takes another's place has no velocity,
+            and nobody leads it.
         path: The middle line, if the cursor is led along one.
         tolerance: Half the width of the target or tunnel [m].
         edge: Distance from the start at which a moving target turns back [m].
-        is_pushed: Whether the cursor is moved by something else as well: what it does then tells
-            nobody how late it is.
+        is_pushed: True if the cursor is moved by something else as well: its motion then says
+            nothing about the delay.
     """
 
     flat = False
@@ -154,14 +154,14 @@ class CursorTrial(Trial[Sighting]):
 
     Args:
         scenario: Device, links, frames.
-        seat: Who does it.
-        goal: What is to be done.
+        seat: Person who does the trial.
+        goal: Goal of the trial.
         streams: The noise of this trial.
         reaction: See `Trial`.
 
     Attributes:
         path: Way gone so far [m].
-        moved_at: When the cursor first moved [s], or None.
+        moved_at: Time at which the cursor first moved [s], or None.
     """
 
     STEP = 0.004

@@ -26,8 +26,8 @@ class FrameStream:
 
     Attributes:
         period: Between two messages [s].
-        delays: Of each message, from when it was made until it was there [s], shape `(n,)`;
-            infinity if it never was. Recorded from its first message on, without a gap.
+        delays: Delay of each message from creation to arrival [s], shape `(n,)`; infinity if it
+            never arrived. Recorded from its first message on, without a gap.
     """
 
     period: float
@@ -43,8 +43,8 @@ class RecordedDelays:
     """Both directions of a link.
 
     Attributes:
-        up: What became of commands.
-        down: What became of frames.
+        up: Fates of the commands.
+        down: Fates of the frames.
     """
 
     up: FrameStream
@@ -60,8 +60,8 @@ class RecordedChannel(Channel[T]):
     """One direction of a recording; what newer things have overtaken is thrown away.
 
     Args:
-        stream: What became of its messages.
-        begin: Where in the recording the trial begins [s].
+        stream: Fates of its messages.
+        begin: Place in the recording at which the trial begins [s].
         extra: On top of the delays, always [s].
     """
 

@@ -80,15 +80,15 @@ class DeviceConfig(Config):
         kind: `mouse`: the hand's place is the cursor's. `tilt_position`, `tilt_velocity`: the
             tilt is the cursor's place, or its velocity. `joystick`: the deflection is the
             velocity.
-        gain: Of the cursor, per unit of the hand: [m/m] of a mouse, [m/rad] and [m/s per rad]
+        gain: Gain of the cursor per unit of the hand: [m/m] of a mouse, [m/rad] and [m/s per rad]
             of a tilt, [m/s] at full deflection of a joystick. Vehicles and arms have their top
             speed at full deflection, and need none.
-        rate_hz: How often it is read and its reading sent. A tilt device has the rate of its
-            accelerometer if that is lower.
+        rate_hz: Rate at which it is read and sent. A tilt device has the rate of its accelerometer
+            if that is lower.
         limit_deg: No hand tilts farther (tilt devices).
         accelerometer: By name (tilt devices).
         filter: On what the accelerometer measures, by name (tilt devices).
-        filter_options: Of the filter.
+        filter_options: Options of the filter.
     """
 
     kind: Annotated[
@@ -108,8 +108,8 @@ class PlantConfig(Config):
     Attributes:
         lag_s: Time constant with which it follows its command.
         speed_mps: Its top speed, of an arm along each axis; left out, a cursor has none.
-        turn_rate_deg_s: Of a vehicle, at most.
-        width_m: Of a vehicle's body.
+        turn_rate_deg_s: Largest turn rate of a vehicle.
+        width_m: Width of a vehicle's body.
     """
 
     lag_s: NonNegative = 0.0
@@ -122,15 +122,16 @@ class TaskScenario(Config):
     """A task, and everything else that a run of it needs but its seed.
 
     Attributes:
-        model: Tells this kind of scenario from the others.
-        operator: Who does it, as in a full scenario; there is one, with one thing in hand.
+        model: Name of this kind of scenario.
+        operator: Person who does the task, as in a full scenario; there is one, with one task at a
+            time.
         automation: Share of the correction that the machine makes itself: the part of the
             command that removes the error (towards the target, the middle of the tunnel or
             of the road) is (1 - share) of what the person asks for and share of what a
             proportional controller at the machine, which knows the error without delay, asks
             for. How fast a tunnel or a road is gone through stays the person's. 0 is direct
             control; 1 leaves the person nothing to correct.
-        trials: Of each condition that the task crosses.
+        trials: Number of trials of each condition that the task crosses.
         practice: Trials before them that are not kept, in which the person learns the delay.
         horizon_s: A trial that is not done by then is given up.
     """
@@ -195,7 +196,7 @@ def build(
     """A task from a file or plain data, with some keys changed.
 
     Args:
-        source: A document (mistakes are told with their place) or plain data.
+        source: Document, whose mistakes are reported with their place, or plain data.
         changes: New values by dotted key, such as `{"link.down.delay_s": 0.225}`.
 
     Raises:

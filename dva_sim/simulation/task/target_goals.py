@@ -38,7 +38,7 @@ class Wandering:
         task: Its speed and how often it turns.
         amplitude: Way to where it appears [m].
         angle: Direction of that place [rad].
-        rng: Luck of its ways.
+        rng: Random generator of its motion.
     """
 
     LIMIT = 1.5  # amplitudes from the start at which it turns back
@@ -87,9 +87,9 @@ class PointGoal(ToTarget):
     """Select a target.
 
     Args:
-        task: How it is selected.
-        way: Of the target.
-        width: Of the target [m].
+        task: Rules of selection.
+        way: Motion of the target.
+        width: Width of the target [m].
         press: From the decision to press a button to the press at the machine [s].
     """
 
@@ -170,7 +170,7 @@ class TrackGoal(ToTarget):
 
     Args:
         task: The sines.
-        phases: Of them, `(k,)` [rad].
+        phases: Phases of the sines, `(k,)` [rad].
     """
 
     flat = True

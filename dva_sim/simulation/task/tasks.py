@@ -32,13 +32,13 @@ class Pointing(Config):
 
     Attributes:
         amplitude_m: From the start to the centre of the target.
-        width_m: Of the target along the way; in two dimensions its diameter.
+        width_m: Width of the target along the path; in two dimensions its diameter.
         axes: 1: the cursor moves on a line. 2: targets lie on a circle and are taken across it.
-        targets: How many lie on that circle (two dimensions).
+        targets: Number of targets on that circle (two dimensions).
         cursor_m: Diameter of the cursor, which must be inside the target as a whole.
         selection: `first_entry`: inside once. `dwell`: inside for `dwell_s`. `click`: when the
             person presses a button; a press outside the target is an error.
-        dwell_s: How long it must stay inside.
+        dwell_s: Time that it must stay inside.
         misses: A press outside ends the trial (`over`), or another one is made (`again`).
         errors: A press outside is a failure for the person (`count`), or costs nothing (`free`),
             so that it is in a hurry.
@@ -47,7 +47,7 @@ class Pointing(Config):
         cue: `known`: where the next target will be is known, so one sets off as soon as one
             sees it. `unexpected`: one acts a reaction time after the first frame is on the screen.
             Who drives a vehicle always does.
-        timed_from: When the movement time begins: with the `target`, or the first `movement`.
+        timed_from: Start of the movement time: with the `target`, or the first `movement`.
     """
 
     kind: Literal["pointing"] = "pointing"
@@ -86,8 +86,8 @@ class Tunnel(Config):
         shape: A straight tunnel, or once around a circle.
         length_m: Along its middle.
         width_m: From wall to wall.
-        on_error: What becomes of a trial in which a wall is crossed: it is `counted` and goes
-            on, or it is `over`.
+        on_error: Effect of crossing a wall: the error is `counted` and the trial goes on, or it is
+            `over`.
     """
 
     kind: Literal["tunnel"] = "tunnel"
@@ -115,12 +115,12 @@ class Tracking(Config):
     """Follow a target that moves as a sum of sines, on a line, or resist a push of that form.
 
     Attributes:
-        record_s: What is measured; sines are rounded to whole periods in it.
+        record_s: Length of the measured part; sines are rounded to whole periods in it.
         warm_up_s: Before that, not measured.
-        frequencies_rad_s: Of the sines.
-        amplitudes_m: Of the sines.
-        moves: The `target`, or the `cursor`: then the sines are added to what it is told, in
-            seconds of its motion, and the target stands.
+        frequencies_rad_s: Frequencies of the sines.
+        amplitudes_m: Amplitudes of the sines.
+        moves: Moving part: the `target`, or the `cursor`. With `cursor` the sines are added to its
+            input, in seconds of its motion, and the target is stationary.
     """
 
     kind: Literal["tracking"] = "tracking"
@@ -156,7 +156,7 @@ class Corner(Config):
 
     Attributes:
         leg_m: Before the corner, and after it, along the middle.
-        width_m: Of the corridor.
+        width_m: Width of the corridor.
     """
 
     kind: Literal["corner"] = "corner"
@@ -173,10 +173,10 @@ class Slalom(Config):
     """Drive around cones in a row, to their left and right by turns.
 
     Attributes:
-        cones: How many.
+        cones: Number of cones.
         spacing_m: Between neighbours.
-        swing_m: How far beside the row the middle of the way passes a cone.
-        width_m: Of the way: who is farther off its middle touches something.
+        swing_m: Distance from the row at which the middle of the path passes a cone.
+        width_m: Width of the path; a vehicle farther off its middle touches something.
     """
 
     kind: Literal["slalom"] = "slalom"
@@ -205,7 +205,7 @@ class Course(Config):
 
     Attributes:
         points_m: Its corners, `[x, y]` each.
-        width_m: Of the way.
+        width_m: Width of the path.
     """
 
     kind: Literal["course"] = "course"
@@ -233,8 +233,8 @@ class HeadingStep(Config):
     The machine holds the top speed; only the steering is the person's.
 
     Attributes:
-        error_deg: Of the heading, to the left and to the right by turns.
-        width_m: Of the way.
+        error_deg: Error of the heading, alternately to the left and to the right.
+        width_m: Width of the path.
         watched_s: Time for which the steering is watched.
     """
 
@@ -255,7 +255,7 @@ class Stop(Config):
     Attributes:
         swing_m: Along the arc of the swing at the arm's middle reach.
         reach_m: Outwards.
-        work_s: What the work there takes, whoever commands it (digging, emptying).
+        work_s: Time for the work there, regardless of the operator (digging, emptying).
     """
 
     swing_m: float
@@ -267,9 +267,9 @@ class ReachTask(Config):
     """Bring the tip of a slow arm from place to place, as an excavator loads a truck.
 
     Attributes:
-        stops: Where to, in this order.
-        tolerance_m: How near is near enough, either way.
-        settle_s: How long it must stay so near before the work begins.
+        stops: Places of the tip, in this order.
+        tolerance_m: Tolerance of the position, either way.
+        settle_s: Time that it must stay within the tolerance before the work begins.
     """
 
     kind: Literal["reach"] = "reach"

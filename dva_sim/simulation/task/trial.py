@@ -39,11 +39,10 @@ class Seat:
     """Person who does the trials of a block, and what carries over between them.
 
     Attributes:
-        person: Who it is.
         strategy: Makes the strategy for what is steered.
-        delay: What the person has learnt of the delay, on a clock that runs on over trials.
-        begun: When this trial begins, on that clock [s].
-        timing: How the delay is misjudged.
+        delay: The person's estimate of the delay, on a clock that runs on over trials.
+        begun: Start of this trial, on that clock [s].
+        timing: Errors of the perceived delay.
     """
 
     person: Person
@@ -67,7 +66,7 @@ class Trace:
         times: [s]
         places: [m]
         speeds: Since the time before [m/s].
-        touched: Where a wall was crossed, or a target left again [m].
+        touched: Places where a wall was crossed, or a target left again [m].
         walls: Lines that show the geometry, each a list of places [m].
         marks: Circles that show targets: x, y and radius [m].
     """
@@ -84,7 +83,7 @@ class Waits:
     """Counts how often, and how long, a person wants nothing and waits to see.
 
     Attributes:
-        count: How often.
+        count: Number of waits.
         seconds: In all [s].
     """
 
@@ -107,11 +106,11 @@ class WayKept:
     """Departures from a path: a crossing of its edge counts once, until one is back.
 
     Args:
-        limit: How far the middle may be from that of the way [m].
+        limit: Largest distance from the middle of the path [m].
 
     Attributes:
-        crossings: How often the edge was crossed.
-        touched: Where [m].
+        crossings: Number of crossings of the edge.
+        touched: Places of the crossings [m].
     """
 
     def __init__(self, limit: float) -> None:
@@ -143,19 +142,19 @@ class Trial(ABC, Generic[S]):
 
     Args:
         scenario: Rates, links, horizon.
-        seat: Who does it.
-        reach: What can be done with what is moved.
-        device: What is in the hand.
-        streams: The luck of this trial.
+        seat: Person who does the trial.
+        reach: Limits of what is moved.
+        device: Device in the hand.
+        streams: Random streams of the trial.
         reaction: From the first frame on the screen to the first that is acted on, perception in
             it [s]; 0 for who expects the goal: it acts as soon as it has perceived a frame.
 
     Attributes:
         now: Since the trial began [s].
-        over: Whether it is done.
-        plant: What is moved.
-        path: How far that has gone [m].
-        first_move: When the person first wanted to move anything [s], or None.
+        over: True once the trial is finished.
+        plant: Model of what is moved.
+        path: Distance moved [m].
+        first_move: Time at which the person first wanted to move anything [s], or None.
     """
 
     STEP: float  # [s]
@@ -267,7 +266,7 @@ class Trial(ABC, Generic[S]):
 
         Args:
             now: [s]
-            half: Of a step [s].
+            half: Half the step size [s].
         """
         seen = self._frames.take(now + half)
         if seen:

@@ -91,8 +91,9 @@ def share_of_the_way(floor: Floats, reached: Floats, bound: Floats) -> Band:
     once.
 
     Args:
-        floor: Of the policy that the others must beat, by shift, shape `(shifts,)` or as `reached`.
-        reached: Of each policy, shape `(shifts, k)`.
+        floor: Value of the policy that the others must beat, by shift, shape `(shifts,)` or as
+            `reached`.
+        reached: Value of each policy, shape `(shifts, k)`.
         bound: The best possible, shape as of `floor`.
 
     References:

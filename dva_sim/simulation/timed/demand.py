@@ -23,10 +23,8 @@ class EventDraws:
     """The luck of a stream's events, by their index.
 
     Args:
-        stream: What the scenario says.
-        name: Of the stream.
-        streams: The run's luck.
-        terrain: Where.
+        name: Name of the stream.
+        streams: Random streams of the run.
     """
 
     def __init__(self, stream: EventStream, name: str, streams: Streams, terrain: Terrain) -> None:
@@ -90,12 +88,9 @@ class Demand:
     """Lets the events of a scenario happen.
 
     Args:
-        scenario: What may happen.
-        streams: The run's luck.
-        terrain: Where.
-        clock: When.
-        happens: Told of each incident as it breaks out.
-        noticed: Told of each incident when it is to be reported.
+        streams: Random streams of the run.
+        happens: Callback for each incident as it breaks out.
+        noticed: Callback for each incident when it is to be reported.
     """
 
     def __init__(

@@ -25,8 +25,8 @@ class Draws(Generic[T]):
     """Draws number 0, 1, 2, ... for one purpose.
 
     Args:
-        streams: The run's luck.
-        name: Of the purpose, unique in the run.
+        streams: Random streams of the run.
+        name: Name of the purpose, unique in the run.
         draw: Makes a number of draws from a generator.
     """
 

@@ -18,11 +18,11 @@ def approach(incident: Incident, start: float, left: float, speed: float, until:
     The radius grows while the way shrinks, so the border is crossed once.
 
     Args:
-        incident: Where to.
-        start: When the way begins [s].
-        left: How far it is then [m].
+        incident: Destination.
+        start: Departure time [s].
+        left: Distance left at departure [m].
         speed: [m/s]
-        until: When it ends, there or before [s].
+        until: End of the approach or of its part [s].
     """
 
     def inside(now: float) -> bool:

@@ -20,16 +20,15 @@ class Incident:
         index: Its place in the stream.
         number: Its place among all incidents of the run.
         kind: `fire`, `gas_leak` or `flood`.
-        place: Where.
-        true: Whether there is something at all.
-        severity: As reported, 0 to 1.
-        confidence: As reported, 0 to 1.
-        occurred: When it broke out [s].
-        noticed: When it was first reported [s]; nan before.
+        true: True for a real event, false for a false alarm.
+        severity: Reported severity, 0 to 1.
+        confidence: Reported confidence, 0 to 1.
+        occurred: Start of the event [s].
+        noticed: Time of the first report [s]; nan before.
         sources: Devices that have reported it.
         event: The DVA's event about it, once it is reported.
-        shared: Whether the DVA knew the event already from another incident.
-        over: When there was no danger any more, or others took over [s].
+        shared: True if the DVA already knew the event from another incident.
+        over: Time at which the danger ended, or others took over [s].
     """
 
     stream: int

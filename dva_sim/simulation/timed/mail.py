@@ -34,14 +34,14 @@ class Mail:
 
     Args:
         desk: The DVA's.
-        clock: Tells the time.
+        clock: Clock of the run.
         changed: Called when the desk has done something, with whom the message was about.
-        moved: Called before the desk decides anything, so that it can be told who is where.
-        attentive: Whether one decision can make the next possible.
+        moved: Callback before each decision of the core, to update positions.
+        attentive: True if one decision can make the next possible.
 
     Attributes:
-        takers: Who hears what is sent to an id.
-        sent: How many messages the desk took.
+        takers: Receivers of messages, by id.
+        sent: Number of messages that the core took.
         refused: Answers other than OK, by text.
     """
 

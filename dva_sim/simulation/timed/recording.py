@@ -93,7 +93,7 @@ class Slices:
     Args:
         start: [s]
         end: [s]
-        count: How many parts.
+        count: Number of parts.
     """
 
     def __init__(self, start: float, end: float, count: int) -> None:
@@ -111,7 +111,7 @@ class Level:
     """Number of something, integrated over the measured time.
 
     Attributes:
-        now: How many there are.
+        now: Current number.
         areas: Integral over each part [s].
     """
 
@@ -149,9 +149,9 @@ class Ledger:
     """Rows or sums.
 
     Args:
-        streams: How many streams.
+        streams: Number of streams.
         slices: Parts of the measured time.
-        rows: Whether to keep a row for each event.
+        rows: True to keep a row for each event.
     """
 
     def __init__(self, streams: int, slices: Slices, rows: bool) -> None:
@@ -240,7 +240,7 @@ class UnitRecord:
         kind: `guard` or `robot`.
         spent: Time by phase [s]: `ready`, `travel`, `look`, `act`, `stand by`, `return`.
         exposure: Time within danger radii by stage [s]: `approach`, `look`, `act`, `leave`.
-        distance: What it has gone in the whole run [m].
+        distance: Distance moved in the whole run [m].
         jobs: Orders it has settled in the whole run, by task.
     """
 
@@ -262,8 +262,7 @@ class TimedRecording:
     """One run.
 
     Attributes:
-        scenario: What it consisted of.
-        seed: What decided its luck.
+        seed: Random seed.
         zones: Names by the number in the column `zone`.
         streams: Names by the number in the column `stream`.
         responders: Names by the number in the columns `responder` and `actor`.
@@ -274,14 +273,14 @@ class TimedRecording:
         outcomes: Events first reported in each batch by what became of them, shape
             `(streams, batches, OUTCOMES)`.
         waiting: Integral over time of how many events wait, shape `(streams, batches)` [s].
-        served: The same of those that somebody is at.
+        served: Number of events with a responder on site, integrated over each part.
         units: Each responder.
         operators: Time that each operator had an order [s].
-        counters: What the DVA counted; `refused ...`: its answers other than OK.
+        counters: Counters of the DVA; `refused ...`: its replies other than OK.
         violations: Rules found broken, by what; empty if all is well.
         events: Events of the world.
-        messages: What the DVA's desk took.
-        ended: When the run ended [s].
+        messages: Number of messages that the DVA took.
+        ended: End of the run [s].
         duration: Measured time [s].
     """
 

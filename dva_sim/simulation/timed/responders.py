@@ -74,11 +74,10 @@ class Job:
 
     Attributes:
         order: The DVA's.
-        incident: What it is about.
         voice: Device that answers for it: the guard's, or the operator's.
-        begun: When [s].
+        begun: Start time [s].
         phase: `ready`, `travel`, `look`, `act`, `stand by` or `return`.
-        inside: Whether it is within the danger, not standing by.
+        inside: True within the danger radius, false on stand-by.
     """
 
     order: m.Order
@@ -108,22 +107,21 @@ class Unit:
     """A guard, or a robot with whoever drives it.
 
     Args:
-        world: Where.
         number: Among all units, from 0.
         name: For people.
         device: Its id.
-        group: What it is like.
-        base: Where it waits.
+        group: Properties of the unit.
+        base: Waiting place.
         speed: [m/s]
 
     Attributes:
-        place: Where it is, or set out from.
-        job: What it is at.
+        place: Current place, or place of departure.
+        job: Current job.
         leg: Its way, while it moves.
-        equipped: Whether it would set out at once: it is out already.
-        since: When the present phase of its job began [s].
-        distance: What it has gone [m].
-        jobs: How many orders it has settled, by task.
+        equipped: True if it would set out at once, being out already.
+        since: Start of the present phase of its job [s].
+        distance: Distance moved [m].
+        jobs: Number of orders settled, by task.
     """
 
     def __init__(

@@ -15,8 +15,7 @@ def simulate_timed(
     """Run one scenario.
 
     Args:
-        scenario: What the run consists of.
-        seed: Decides all luck; the events are the same whatever the policy.
+        seed: Random seed; the events are the same for every policy.
         policy: Instead of the scenario's.
 
     Raises:

@@ -137,10 +137,10 @@ class Group(Config):
         speed_sd_mps: Between members.
         mobilisation: From the order to the first step.
         look: From arrival to being sure, unless the event says otherwise.
-        act: What it takes a person to contain an event, unless the event says otherwise.
+        act: Time for a person to contain an event, unless the event sets another.
         after: `stay` where the event was; `return` to base and be busy until there; or `recall`:
             walk back, but take orders on the way.
-        from_s: When the shift begins.
+        from_s: Start of the shift.
     """
 
     name: Name
@@ -204,16 +204,16 @@ class EventStream(Config):
         between: From one to the next; exponential: a Poisson process.
         sources: Instead of `between`: a finite number of sources.
         batch: Instead of `between`: all at once.
-        zones: Where, with weights. Left out, anywhere: uniform over the area, or over the
-            rooms of the site.
+        zones: Zones of the events, with weights. By default anywhere: uniform over the area, or
+            over the rooms of the site.
         notice: From the outbreak to the first report; `detectors`: until a detector of the site
             notices.
-        severity: As reported.
-        confidence: As reported.
-        false_share: How often there is nothing.
+        severity: Reported severity.
+        confidence: Reported confidence.
+        false_share: Share of false alarms.
         look: Instead of the responders' own.
         act: Instead of the responders' own.
-        patience: Whoever reported it takes it back so long after the report.
+        patience: Time after the report at which its sender withdraws it.
         repeats: Doubled reports.
         from_s: The first event comes one interval after this.
         until_s: No event after this; left out, the horizon.
@@ -258,17 +258,17 @@ class TimedDispatch(Config):
 
     Attributes:
         policy: By name, or `file.py:Class`.
-        options: What the policy can be told.
-        escalate_after_s: How long an event may wait; 0: not at all; `.inf` or null: forever.
-        containment: Whether a confirmed event needs a person who deals with it.
-        most_waiting: How many events may wait.
+        options: Options of the policy.
+        escalate_after_s: Time that an event may wait; 0: not at all; `.inf` or null: forever.
+        containment: True if a confirmed event needs a person to contain it.
+        most_waiting: Maximum number of waiting events.
         merge_distance_m: Reports so near each other are one event; left out, 8 m on a site,
             elsewhere 1 m if events are reported twice, and else 0 (never).
         max_attempts: Orders for one event.
-        order_limit_s: How long an order may take; left out, without limit.
-        bid_within_s: How long bids are taken.
+        order_limit_s: Time limit of an order; by default none.
+        bid_within_s: Time for which bids are taken.
         preferences: For each zone, names of responders in order.
-        stations: Where guards may wait.
+        stations: Places where guards may wait.
     """
 
     policy: Annotated[str, Key("dispatch policy")] = "min_eta"
@@ -288,9 +288,9 @@ class TimedScenario(Config):
     """Everything one run needs but its seed.
 
     Attributes:
-        model: Tells this kind of scenario from the others.
-        site: Where; or ...
-        area: ... where; without either, place does not matter.
+        model: Name of this kind of scenario.
+        site: Site of the run, if there is one.
+        area: Size of the area, if there is one; without site and area, place does not matter.
         zones: Named parts of an area: xmin, ymin, xmax, ymax [m].
         travel: `none`: no time; `straight`; `path`: planned on the site; or a law: a time for
             each pair of an event and a responder. Left out, whatever the ground allows best.
@@ -300,7 +300,7 @@ class TimedScenario(Config):
         max_events: No event after so many.
         drain: Go on after the horizon until every event is closed.
         keep: `events`: a row for each; `batches`: sums only, for very long runs.
-        batches: How many parts of equal length the measured time is cut into.
+        batches: Number of equal parts of the measured time.
     """
 
     model: Literal["timed"]
@@ -391,7 +391,7 @@ def build(
     """A scenario from a file or plain data, with some keys changed.
 
     Args:
-        source: A document (mistakes are told with their place) or plain data.
+        source: Document, whose mistakes are reported with their place, or plain data.
         changes: New values by dotted key, for example `{"dispatch.policy": "batch"}`; a number
             chooses an item of a list: `{"responders.0.count": 3}`.
 

@@ -91,9 +91,8 @@ class Shift:
     """Everybody in place at time zero.
 
     Args:
-        scenario: What the run consists of.
-        seed: Decides all luck.
-        policy: Who decides; made from the scenario by the caller.
+        seed: Random seed.
+        policy: Dispatch policy, made from the scenario by the caller.
 
     Raises:
         ConfigError: a site that cannot hold the team.

@@ -23,14 +23,13 @@ class SteppedShift:
     only while `advise` waits for it: nothing ever happens at the same time.
 
     Args:
-        scenario: What the run consists of.
-        seed: Decides everything that is random, as in `simulate_timed`.
+        seed: Random seed, as in `simulate_timed`.
         preempts: See `Policy`.
         auctions: See `Policy`.
         relocates: See `Policy`.
 
     Attributes:
-        situation: What the DVA asks about; None once the shift is over.
+        situation: Situation that the DVA asks about; None once the shift is over.
         rng: Random numbers for policies that use them.
         recording: The whole run, once it is over.
 

@@ -67,8 +67,8 @@ class Terrain:
 
     Attributes:
         zones: Names of the zones.
-        frame: Where on earth it lies.
-        placed: Whether events have a place by luck.
+        frame: Location on earth.
+        placed: True if events have random places.
     """
 
     placed = False
@@ -188,7 +188,7 @@ class Plane(Terrain):
         width: [m]
         height: [m]
         zones: Rectangles xmin, ymin, xmax, ymax [m] by name.
-        straight: Whether ways take any time.
+        straight: True if travel takes time.
     """
 
     placed = True
@@ -346,7 +346,7 @@ class Rooms(Terrain):
     Args:
         name: Name or path.
         spots: Places in each room.
-        way: How ways are measured.
+        way: Kind of distance: none, straight or along paths.
 
     Raises:
         ConfigError: the site cannot be read, or has no rooms.

@@ -53,9 +53,9 @@ class TransportScenario(ContestConfig):
     """A session beside TCP flows, and a drive over the commands and pictures that it delivers.
 
     Attributes:
-        model: Tells this kind of scenario from the others.
-        operator: Who drives, as in a full scenario.
-        drive: What is driven.
+        model: Name of this kind of scenario.
+        operator: Person who drives, as in a full scenario.
+        drive: Vehicle and course.
     """
 
     model: Literal["transports"]
@@ -89,7 +89,7 @@ def build(
     """A comparison from a file or plain data, with some keys changed.
 
     Args:
-        source: A document (mistakes are told with their place) or plain data.
+        source: Document, whose mistakes are reported with their place, or plain data.
         changes: New values by dotted key, such as `{"bulk.down": 2}`.
 
     Raises:
@@ -115,9 +115,8 @@ class SessionRecording(NamedTuple):
     """Results of a run.
 
     Attributes:
-        scenario: As it was run.
-        contest: What became of all that was sent.
-        trial: What was measured of the drive.
+        contest: Fates of everything sent.
+        trial: Measures of the drive.
     """
 
     scenario: TransportScenario

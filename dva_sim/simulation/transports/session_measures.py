@@ -138,8 +138,8 @@ def age_in_force(made: Floats, arrived: Floats, since: float, until: float) -> f
     """Mean over time of the age of the newest message that has arrived [s].
 
     Args:
-        made: When each was made, ascending [s], shape `(n,)`.
-        arrived: When it was there [s], shape `(n,)`; infinity if never.
+        made: Creation time of each message, ascending [s], shape `(n,)`.
+        arrived: Arrival time [s], shape `(n,)`; infinity if never.
         since: Beginning of the time looked at [s].
         until: Its end [s].
 
@@ -159,9 +159,9 @@ def round_trips(made: Floats, arrived: Floats, taken: Floats, shown: Floats) -> 
     """From an applied command to the first picture that can show it, for each [s].
 
     Args:
-        made: Of the commands [s], shape `(n,)`.
+        made: Creation times of the commands [s], shape `(n,)`.
         arrived: At the robot [s], shape `(n,)`.
-        taken: Of the pictures [s], shape `(m,)`.
+        taken: Capture times of the pictures [s], shape `(m,)`.
         shown: At the operator [s], shape `(m,)`.
     """
     used = applied(arrived)
