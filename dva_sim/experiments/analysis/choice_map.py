@@ -25,6 +25,9 @@ from dva_sim.experiments.analysis.study_view import StudyView, interval_of
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.units import unit_of
 
+BESIDE = ("contacts", "stop_share")
+_WAITS = "move_and_wait_share"
+
 
 @dataclass(frozen=True)
 class ChoiceMap:
@@ -42,6 +45,10 @@ class ChoiceMap:
         smallest: Smallest difference that matters; 0 where none was declared.
         most: Value of runs that never ended; infinite if the measure is unbounded.
         outside: True for cells beyond the delays at which people were watched, `(g, c, m)`.
+        median: Median loss, `(g, c, m)`.
+        beside: Means of further measures of the runs, `(g, c, m)` each, by column.
+        waiting: Share of the persons who choose how they steer that move and wait, `(g, c)`; None
+            where no model lets them choose.
         notes: Further assumptions, by situation.
     """
 
@@ -55,6 +62,9 @@ class ChoiceMap:
     smallest: float
     most: float
     outside: NDArray[np.bool_]
+    median: Floats
+    beside: Mapping[str, Floats]
+    waiting: Floats | None
     notes: Mapping[str, str]
 
     @property
@@ -141,6 +151,9 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
         smallest=smallest,
         most=view.possible[1],
         outside=_outside(view, axes),
+        median=np.nanmedian(cells, axis=(3, 4)),
+        beside={column: _mean(view, column, axes) for column in BESIDE},
+        waiting=_waiting(view, axes, declared.get("choosing")),
         notes=dict(declared.get("notes") or {}),
     )
 
@@ -161,6 +174,21 @@ def _clear(cells: Floats, best: NDArray[np.intp], smallest: float) -> NDArray[np
         found = interval_of(cells[g, c, m] - cells[g, best[g, m], m])
         clear[g, c, m] = found is not None and found.low > 0.0 and found.mean > smallest
     return clear
+
+
+def _mean(view: StudyView, column: str, axes: tuple[Factor, ...]) -> Floats:
+    cells = _cells(view.part, view.part.grid(column), axes)
+    return nan_mean(nan_mean(cells, axis=-1), axis=-1)
+
+
+def _waiting(view: StudyView, axes: tuple[Factor, ...], choosing: Any) -> Floats | None:
+    """Return the share of persons who moved and waited at any time, `(g, c)`."""
+    if choosing is None:
+        return None
+    grid = view.part.grid(_WAITS)
+    waited = np.where(np.isnan(grid), np.nan, grid > 0.0)
+    shares = nan_mean(nan_mean(_cells(view.part, waited, axes), axis=-1), axis=-1)
+    return np.asarray(shares[:, :, axes[2].levels.index(choosing)])
 
 
 def _outside(view: StudyView, axes: tuple[Factor, ...]) -> NDArray[np.bool_]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dva_sim.experiments.analysis.choice_map import ChoiceMap
+from dva_sim.experiments.analysis.run_grid import Floats
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.report.prose import note
 from dva_sim.kernel.wording import listing, quantity
@@ -32,6 +33,32 @@ def choice_table(found: ChoiceMap, part: str) -> CellTable:
     return CellTable(part, heads, 2, rows, note=told)
 
 
+def beside_table(found: ChoiceMap, part: str) -> CellTable:
+    """A row for each situation and choice: the loss itself, and what else a drive is like."""
+    heads = [
+        factor_name(found.given.name),
+        factor_name(found.choice.name),
+        f"median [{found.unit}]" if found.unit else "median",
+        "contacts",
+        "in safe stop [%]",
+        *(["move and wait [%]"] if found.waiting is not None else []),
+    ]
+    rows = []
+    for g, c in np.ndindex(found.is_worse.shape):
+        stops = 100.0 * found.beside["stop_share"][g, c]
+        cells = [found.median[g, c], found.beside["contacts"][g, c], stops]
+        waits = [] if found.waiting is None else [regret_number(100.0 * float(found.waiting[g, c]))]
+        choice = level_name(found.choice.name, found.choice.levels[c], short=True)
+        rows.append([situation_name(found, g), choice, *map(_range, cells), *waits])
+    return CellTable(part, heads, 2, rows, note=note("beside", found=found))
+
+
+def _range(values: Floats) -> str:
+    """`39 to 103`, from the least to the greatest."""
+    ends = (regret_number(float(edge)) for edge in (values.min(), values.max()))
+    return " to ".join(dict.fromkeys(ends))
+
+
 def regret_text(found: ChoiceMap, situation: int, choice: int) -> str:
     """`3 to 69`, over the models of persons; `=` where it is as good as the best."""
     if not found.is_worse[situation, choice]:
@@ -39,8 +66,7 @@ def regret_text(found: ChoiceMap, situation: int, choice: int) -> str:
     if found.never[situation, choice]:
         return NEVER
     low, high = found.least[situation, choice], found.worst[situation, choice]
-    ends = dict.fromkeys((regret_number(float(low)), regret_number(float(high))))
-    return " to ".join(ends)
+    return _range(np.array([low, high]))
 
 
 def situation_name(found: ChoiceMap, situation: int) -> str:

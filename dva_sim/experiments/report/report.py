@@ -34,7 +34,7 @@ from dva_sim.experiments.report.blocks import (
     texts_of,
 )
 from dva_sim.experiments.report.cell_table import CellTable
-from dva_sim.experiments.report.choice_table import choice_table
+from dva_sim.experiments.report.choice_table import beside_table, choice_table
 from dva_sim.experiments.report.figures.registry import draw_all
 from dva_sim.experiments.report.figures.style import Drawn, ReportFigure
 from dva_sim.experiments.report.glossary import Marker, terms_in
@@ -189,7 +189,9 @@ def _found(reading: Reading) -> Iterator[Block]:
     """The answer level by level, what else was found, and what other models of persons say."""
     if reading.map is not None and reading.view is not None:
         yield Heading("The map")
-        yield Printed(choice_table(reading.map, reading.view.part.name), is_words=True)
+        part = reading.view.part.name
+        yield Printed(choice_table(reading.map, part), is_words=True)
+        yield Folded("What drives are like", (Printed(beside_table(reading.map, part)),))
     table = answer_table(reading)
     if table is not None or reading.answer.notes:
         yield Heading("The answer in numbers")

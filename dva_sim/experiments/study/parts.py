@@ -298,10 +298,13 @@ class MapRule(Config):
     Attributes:
         models: Factor whose levels are the models of persons that the data leave open; findings are
             given as a range over them.
+        choosing: Level of `models` whose persons choose how they steer: the share of them who
+            move and wait is shown beside each pattern.
         notes: Further assumptions, by level of the factor that the answer runs over.
     """
 
     models: str
+    choosing: str | None = None
     notes: dict[str, str] = Field(default_factory=dict)
 
 

@@ -313,7 +313,9 @@ def of_map(study: Study) -> Iterator[Problem]:
     if answer is None or answer.over is None:
         yield "a map needs an answer that runs over a factor", ("map",)
         return
+    choosing = [] if study.map.choosing is None else [study.map.choosing]
     yield from _fault_of_level(study, ("map", "models"), models, ())
+    yield from _fault_of_level(study, ("map", "choosing"), models, choosing)
     if models in (answer.factor, answer.over):
         yield f"{models!r} is what the answer compares or runs over", ("map", "models")
     for name, levels in study.factors.items():

@@ -8,7 +8,7 @@ from helpers.studies.synthetic_results import columns
 
 from dva_sim.experiments.analysis.choice_map import choice_map
 from dva_sim.experiments.analysis.study_view import view_of
-from dva_sim.experiments.report.choice_table import choice_table, lead_of
+from dva_sim.experiments.report.choice_table import beside_table, choice_table, lead_of
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.errors import ConfigError
 
@@ -54,6 +54,8 @@ def read(study=STUDY, losses=LOSSES, persons=6):
         {"part": "drive", "person": person, "trial": 0, "seed": person, "is_reference": False}
         | {"link": link, "messaging": choice, "steering": model}
         | {"drive_time_s": loss(mean, person, link)}
+        | {"contacts": person, "stop_share": 0.25 * (model == "wait")}
+        | {"move_and_wait_share": 0.5 * (model == "wait" and (link == "far" or person == 0))}
         for (link, choice), means in losses.items()
         for model, mean in zip(MODELS, means, strict=True)
         for person in range(persons)
@@ -141,6 +143,7 @@ map: {models: operator.strategy}
         ("  over: link.delay_s\n", "  within: {link.delay_s: 0}\n", "runs over a factor"),
         ("parts:", "  robot.count: [1, 2]\nparts:", "no room for the factor 'robot.count'"),
         ("strategy}\n", "strategy, notes: {far: guessed}}\n", "'far'"),
+        ("strategy}\n", "strategy, choosing: adaptive}\n", "'adaptive'"),
     ],
 )
 def test_a_map_that_cannot_be_drawn_is_refused(tmp_path, before, after, told):
@@ -159,3 +162,16 @@ def test_a_map_that_cannot_be_drawn_is_refused(tmp_path, before, after, told):
     with pytest.raises(ConfigError, match=r".") as caught:
         load_study(file)
     assert told in str(caught.value)
+
+
+def test_beside_the_regret_stand_the_loss_itself_and_what_drives_are_like():
+    found = read(STUDY | {"map": {"models": "steering", "choosing": "wait"}})
+    far = found.given.levels.index("far")
+    tell = found.choice.levels.index("tell")
+    assert found.median[far, tell] == pytest.approx([50.0, 80.0], abs=5.0)
+    assert (found.beside["contacts"] == 2.5).all()
+    assert found.waiting[far] == pytest.approx([1.0, 1.0, 1.0])
+    assert found.waiting[found.given.levels.index("near")] == pytest.approx([1 / 6] * 3)
+    rows = {tuple(row[:2]): row[2:] for row in beside_table(found, "drive").rows}
+    assert rows["far", "tell"][1:] == ["2.5", "0.0 to 25", "100"]
+    assert len(rows) == len(LINKS) * len(CHOICES)
