@@ -12,7 +12,7 @@ What is here is loaded when it is first used; `dva_sim.api` explains it.
 from importlib import import_module
 from typing import Any
 
-__version__ = "0.8.0"
+__version__ = "0.9.0"
 __all__ = [
     "Comparison",
     "Episode",
