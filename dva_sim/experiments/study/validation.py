@@ -19,6 +19,7 @@ from dva_sim.experiments.study.parts import (
     UNTUNED,
     Contrast,
     Level,
+    MapRule,
     Prediction,
     refuse_keys_of_the_design,
 )
@@ -193,8 +194,7 @@ def kept_claims(study: Study) -> Study:
     Predictions stay: of each is told that it was not run.
     """
     lost: dict[str, object] = {}
-    if any(of_map(study)):
-        lost["map"] = None
+    lost["map"] = _kept_map(study)
     if any(of_answer(study)):
         lost["answer"] = None
     if "answer" in lost or any(of_robustness(study)):
@@ -211,6 +211,16 @@ def kept_claims(study: Study) -> Study:
     return rest.model_copy(update={"hypotheses": kept})
 
 
+def _kept_map(study: Study) -> MapRule | None:
+    """The map without what it notes about levels that are gone."""
+    if study.map is None:
+        return None
+    gone = {path[-1] for _, path in of_map(study) if path[:2] == ("map", "notes")}
+    notes = {level: text for level, text in study.map.notes.items() if level not in gone}
+    kept = study.map.model_copy(update={"notes": notes})
+    return None if any(of_map(study.model_copy(update={"map": kept}))) else kept
+
+
 def lost_claims(study: Study) -> list[str]:
     """Claims that the changed factors or levels no longer allow, one sentence each."""
     kept = kept_claims(study)
@@ -220,6 +230,8 @@ def lost_claims(study: Study) -> list[str]:
         ("hypothesis", study.hypotheses, kept.hypotheses),
     ):
         lost += [f"{what} {name!r} is left out" for name in declared if name not in left]
+    if study.map is not None and kept.map is None:
+        lost.append("the map will not be drawn")
     return lost
 
 

@@ -37,3 +37,17 @@ def test_a_contrast_that_settings_take_half_of_is_told_before_any_run(mine, tmp_
 
 def test_settings_that_leave_all_that_is_declared_lose_nothing(mine):
     assert load_study(mine, ["persons=2", "factors.link.delay_s=[0, 0.25, 0.5]"]).lost == ()
+
+
+LINKS = "factors.link=[near (10 ms), cellular]"
+
+
+def test_a_map_goes_on_without_notes_on_levels_that_are_left_out():
+    left = load_study("which-messaging", [LINKS])
+    assert (left.map.models, left.map.notes, left.lost) == ("steering", {}, ())
+
+
+def test_a_map_that_settings_leave_nothing_of_is_told():
+    left = load_study("which-messaging", [LINKS, "factors.steering=[throughout, in-moves]"])
+    assert left.map is None
+    assert unnamed(left.lost[-1], "map") == []
