@@ -28,7 +28,7 @@ from dva_sim.experiments.analysis.study_view import (
 )
 from dva_sim.experiments.report.results_reading import ResultsReading
 from dva_sim.experiments.study.parts import STRATEGY, TUNING
-from dva_sim.experiments.study.screening import MAIN, kept_keys
+from dva_sim.experiments.study.screening import MAIN, kept_effects
 from dva_sim.kernel.wording import capital, listing, number, percent, quantity
 from dva_sim.simulation.labels import brief, level_name, setting
 from dva_sim.simulation.scenario.assumptions import all_assumptions
@@ -85,10 +85,13 @@ def _assumptions(reading: ResultsReading, finding: Finding) -> str:
         return ""
     count = len(all_assumptions())
     told = f"{count} numbers about people and phones are assumed (dva-sim assumed)."
-    keys = kept_keys(_MOST_KEYS)
-    if not keys:
+    effects = kept_effects(_MOST_KEYS)
+    if not effects:
         return f"{told} Which of them move such an answer: dva-sim screen {MAIN}."
-    return f"{told} In the screening of {MAIN} those that move it most are {listing(keys)}."
+    clear = [effect.key for effect in effects if effect.is_clear]
+    sure = f"clear of chance {listing(clear)}" if clear else "none of them clear of chance"
+    keys = listing([effect.key for effect in effects])
+    return f"{told} In the screening of {MAIN} the largest effects were those of {keys}; {sure}."
 
 
 def _how(view: StudyView, finding: Finding) -> str:

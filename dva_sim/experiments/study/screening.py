@@ -10,6 +10,7 @@ import csv
 from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -100,14 +101,29 @@ def file_of(study: Study) -> Path:
     return study.folder / "screened" / f"{study.file.stem}.csv"
 
 
-def kept_keys(most: int) -> list[str]:
-    """Keys of the numbers that move the main study's answer most; none if it was not screened."""
+class KeptEffect(NamedTuple):
+    """Effect of an assumed number on the main study's answer.
+
+    Attributes:
+        key: Key of the number.
+        is_clear: True if the 95 % interval of the mean effect lies on one side of zero.
+    """
+
+    key: str
+    is_clear: bool
+
+
+def kept_effects(most: int) -> list[KeptEffect]:
+    """The largest effects on the main study's answer; none if it was not screened."""
     path = resources.available(KEPT, "*.csv").get(MAIN)
     if path is None:
         return []
     with path.open(encoding="utf-8", newline="") as file:
         rows = [row for row in csv.DictReader(file) if float(row["size"]) > 0.0]
-    return [row["key"] for row in rows[:most]]
+    return [
+        KeptEffect(row["key"], float(row["mean_low"]) * float(row["mean_high"]) > 0.0)
+        for row in rows[:most]
+    ]
 
 
 def folder_of_screening(name: str) -> Path:

@@ -17,7 +17,7 @@ from dva_sim.experiments.study.screening import (
     KEPT,
     MAIN,
     file_of,
-    kept_keys,
+    kept_effects,
     screened,
     screening_study,
 )
@@ -128,7 +128,10 @@ def test_what_a_screening_found_is_kept_beside_its_study_for_the_reports_of_othe
     found = screen(asked, tmp_path / "out", jobs=1, episode=pretend)
     assert file_of(asked) == tmp_path / "screened" / "mine.csv"
     monkeypatch.chdir(tmp_path)
-    assert kept_keys(5) == []
     found.write(tmp_path / KEPT / f"{MAIN}.csv")
-    assert kept_keys(1) == [f"{WAITING}shortest_s"]
-    assert len(kept_keys(5)) == 2  # the others do not move it at all
+    (largest,) = kept_effects(1)
+    assert largest.key == f"{WAITING}shortest_s"
+    assert largest.is_clear == (
+        found.numbers[0][1].mean.low > 0 or found.numbers[0][1].mean.high < 0
+    )
+    assert len(kept_effects(5)) == 2  # the others do not move it at all
