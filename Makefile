@@ -6,11 +6,13 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 RUNTIME := $(VENV)/.runtime
 DEV := $(VENV)/.dev
 BENCH := $(VENV)/.bench
+DOCS := $(VENV)/.docs
 EXTRAS := $(VENV)/.extras
 DEMO := results/demo
+SITE := build/docs
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-extras test-long test-soak storms tools check same-bytes bench goals clean
+.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-extras test-long test-soak storms tools check docs same-bytes bench goals clean
 
 # Compiled files are kept whatever a shell says: without them each program that a test starts
 # compiles all modules again.
@@ -78,6 +80,10 @@ check: $(DEV)  ## lint, format, types, import contracts, prose
 	@$(BIN)/lint-imports --no-logo 2>/dev/null || $(BIN)/lint-imports
 	@$(BIN)/python tests/prose_lint.py
 
+docs: $(DOCS)  ## the documentation as web pages, in build/docs; needs no network
+	@$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet docs $(SITE)
+	@echo "Open $(SITE)/index.html"
+
 same-bytes: $(DEV)  ## whether results are those of another version: make same-bytes AGAINST=COMMIT
 	@$(BIN)/python tests/same_bytes.py --against $(or $(AGAINST),HEAD)
 
@@ -116,3 +122,8 @@ $(BENCH): $(DEV)
 	@echo "Installing what the benchmarks compare with ..."
 	@$(PIP) install -c constraints.txt -e '.[dev,bench]'
 	@touch $@ $(DEV) $(RUNTIME)
+
+$(DOCS): pyproject.toml constraints.txt | $(VENV)
+	@echo "Installing dva-sim and what builds the documentation ..."
+	@$(PIP) install -c constraints.txt -e '.[docs]'
+	@touch $@ $(RUNTIME)
