@@ -1,13 +1,30 @@
 """Sphinx configuration: Markdown pages, generated reference, no address outside the site."""
 
+import sys
 from importlib.metadata import version as installed_version
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import generators
 
 project = "dva-sim"
 author = "The dva-sim authors"
 project_copyright = author
 version = release = installed_version("dva-sim")
 
-extensions = ["myst_parser", "sphinx_copybutton", "sphinx_design"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "sphinx_design",
+]
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+default_role = "code"  # docstrings write code between single backticks
 myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "fieldlist"]
 myst_heading_anchors = 3
 copybutton_prompt_text = r"\$ |>>> |\.\.\. "
@@ -18,3 +35,8 @@ html_theme = "furo"
 html_title = f"dva-sim {version}"
 html_copy_source = False
 html_show_sphinx = False
+
+
+def setup(app: Sphinx) -> None:
+    """Write the generated pages before Sphinx looks for pages."""
+    generators.write(Path(app.srcdir))

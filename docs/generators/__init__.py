@@ -1,0 +1,60 @@
+"""Reference pages that are written from the code before each build of the documentation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from generators import (
+    assumptions,
+    catalogue,
+    command_line,
+    configuration,
+    console,
+    exit_codes,
+    glossary,
+    measures,
+    messages,
+    plugins,
+    python_api,
+    recordings,
+    results,
+)
+
+PAGES: dict[str, Callable[[], str]] = {
+    "reference/command-line.md": command_line.page,
+    "reference/python.md": python_api.page,
+    "reference/scenario-keys.md": configuration.scenario_page,
+    "reference/study-keys.md": configuration.study_page,
+    "reference/profile-keys.md": configuration.profile_page,
+    "reference/measures.md": measures.page,
+    "reference/plugins.md": plugins.page,
+    "reference/catalogue.md": catalogue.page,
+    "reference/assumptions.md": assumptions.page,
+    "reference/exit-codes.md": exit_codes.page,
+    "reference/recordings.md": recordings.page,
+    "reference/console.md": console.page,
+    "reference/messages.md": messages.page,
+    "reference/glossary.md": glossary.page,
+}
+"""Pages by their path below docs, each with the function that returns its Markdown."""
+
+
+def all_pages() -> Iterator[tuple[str, str]]:
+    """Yield the path and the text of every generated page."""
+    for path, page in PAGES.items():
+        yield path, page()
+    yield from results.pages()
+
+
+def paths() -> list[str]:
+    """Return the paths of all generated pages, without writing them."""
+    return [*PAGES, *results.paths()]
+
+
+def write(docs: Path) -> None:
+    """Write every page whose text has changed, so that Sphinx reads only those again."""
+    for path, text in all_pages():
+        file = docs / path
+        if not file.exists() or file.read_text(encoding="utf-8") != text:
+            file.write_text(text, encoding="utf-8")

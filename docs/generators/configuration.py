@@ -1,0 +1,162 @@
+"""The pages of keys: scenarios, studies and profiles, from the schemas that validate the files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from dva_sim.kernel.units import unit_of
+from dva_sim.testing.files import schema_text
+from generators.markdown import code, prose, sentence, table
+from generators.markdown import page as page_of
+
+Schema = dict[str, Any]
+_MODELS = {
+    "Scenario": "Model `full`",
+    "TimedScenario": "Model `timed`",
+    "TaskScenario": "Model `task`",
+    "TransportScenario": "Model `transports`",
+    "MiddlewareScenario": "Model `middleware`",
+}
+_PROFILES = {
+    "RobotProfile": "Robots: `agents/robots`",
+    "RosProfile": "ROS robots: `agents/ros`",
+    "PhoneProfile": "Phones: `agents/phones`",
+    "AccelerometerPart": "Accelerometers: `agents/accelerometers`",
+    "Population": "Operators: `agents/people`",
+    "Bands": "Bands of operators: `agents/people`",
+    "GuardProfile": "Guards: `agents/people`",
+    "BystanderProfile": "Bystanders: `agents/people`",
+}
+_BOUNDS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
+_BEYOND = 2**53  # bounds of integers that only keep numbers storable
+
+
+def scenario_page() -> str:
+    """Return the page of a scenario's keys, one section for each model and part."""
+    head = (
+        "A scenario is a YAML file. The key `model` selects the model that runs it; without it "
+        "the model is `full`. A dotted key, such as `link.up.delay_s`, names a key within a part: "
+        "`--set link.up.delay_s=0.25` changes it, and a study varies it under `factors`. "
+        "`dva-sim schema scenario` prints the schema for an editor."
+    )
+    defs = json.loads(schema_text("scenario"))["$defs"]
+    return page_of("Keys of scenarios", head, *Keys("scenario", defs, _MODELS).sections())
+
+
+def study_page() -> str:
+    """Return the page of a study's keys."""
+    head = (
+        "A study is a YAML file in `experiments/`, or your own. `dva-sim new` writes one to begin "
+        "with. `dva-sim schema study` prints the schema for an editor."
+    )
+    schema = json.loads(schema_text("study"))
+    defs = schema["$defs"] | {"Study": schema}
+    return page_of("Keys of studies", head, *Keys("study", defs, {"Study": "A study"}).sections())
+
+
+def profile_page() -> str:
+    """Return the page of the keys of sites and of profiles of robots, phones and people."""
+    head = (
+        "A profile is a YAML file that a scenario names. Copy a shipped one and change it. "
+        "`dva-sim schema agent` and `dva-sim schema site` print the schemas."
+    )
+    agents, site = json.loads(schema_text("agent")), json.loads(schema_text("site"))
+    defs = agents["$defs"] | site["$defs"] | {"Site": site}
+    tops = _PROFILES | {"Site": "Sites: `worlds`"}
+    return page_of("Keys of profiles and sites", head, *Keys("profile", defs, tops).sections())
+
+
+class Keys:
+    """Tables of the keys of some models and of all parts that they refer to.
+
+    Args:
+        page: Name of the page, the first word of its anchors.
+        defs: Schemas of all models, by name.
+        tops: Models that come first, with their titles.
+    """
+
+    def __init__(self, page: str, defs: dict[str, Schema], tops: dict[str, str]) -> None:
+        self._page, self._defs, self._titles = page, defs, dict(tops)
+        for name in (shown := list(tops)):
+            for key, value in defs[name].get("properties", {}).items():
+                above = "" if name in tops else f"{self._titles[name].strip('`')}."
+                for each in _referred(value):
+                    if each not in self._titles and each in defs:
+                        self._titles[each] = code(above + key)
+                        shown.append(each)
+
+    def sections(self) -> Iterator[str]:
+        """Yield the blocks of the page; a part is titled by the key that leads to it first."""
+        for name, title in self._titles.items():
+            model = self._defs[name]
+            if "properties" not in model:
+                continue
+            yield f"({self._page}-{name.lower()})=\n## {title}{self._kind(name)}"
+            yield prose(model.get("description", "").partition("\n\n")[0])
+            yield table(
+                ["key", "unit", "type", "default", "meaning"],
+                (self._row(key, value, model) for key, value in model["properties"].items()),
+            )
+
+    def _kind(self, name: str) -> str:
+        """Return the name of a model where several parts share a key, such as laws of delay."""
+        twins = [each for each, title in self._titles.items() if title == self._titles[name]]
+        return f": {name}" if len(twins) > 1 else ""
+
+    def _row(self, key: str, value: Schema, model: Schema) -> list[str]:
+        default = "required" if key in model.get("required", ()) else _default(value)
+        meaning = sentence(value.get("description", ""))
+        return [code(key), unit_of(key), self._type(value), default, meaning]
+
+    def _type(self, value: Schema) -> str:
+        """Return the type with its bounds; a part as a link to its table."""
+        if "$ref" in value:
+            name = value["$ref"].rpartition("/")[2]
+            if "properties" not in self._defs[name]:
+                return self._type(self._defs[name])
+            return f"[{name}](#{self._page}-{name.lower()})"
+        if "enum" in value:
+            return ", ".join(code(each) for each in value["enum"])
+        if "const" in value:
+            return code(value["const"])
+        if options := value.get("anyOf") or value.get("oneOf") or value.get("allOf"):
+            kinds = [self._type(each) for each in options if each.get("type") != "null"]
+            return " or ".join(dict.fromkeys(kind for kind in kinds if kind))
+        kind = value.get("type", "")
+        if kind == "array":
+            items = value.get("items") or next(iter(value.get("prefixItems", [])), {})
+            return f"list of {self._type(items)}" if items else "list"
+        if kind == "object":
+            inner = value.get("additionalProperties")
+            return f"map to {self._type(inner)}" if isinstance(inner, dict) and inner else "map"
+        return " ".join([kind, _bounds(value)]).strip()
+
+
+def _default(value: Schema) -> str:
+    if "default" not in value or value["default"] in (None, {}, []):
+        return ""
+    text = json.dumps(value["default"], ensure_ascii=False)
+    return code(text) if len(text) <= 60 else "see the part"
+
+
+def _bounds(value: Schema) -> str:
+    bounds = [
+        f"{sign} {value[name]:g}".replace("<", "\\<")
+        for name, sign in _BOUNDS.items()
+        if name in value and abs(value[name]) < _BEYOND
+    ]
+    return ", ".join(bounds)
+
+
+def _referred(value: Any) -> Iterator[str]:
+    """Yield the names of all models that a schema refers to."""
+    if isinstance(value, dict):
+        if isinstance(value.get("$ref"), str):
+            yield value["$ref"].rpartition("/")[2]
+        for each in value.values():
+            yield from _referred(each)
+    elif isinstance(value, list):
+        for each in value:
+            yield from _referred(each)

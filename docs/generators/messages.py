@@ -1,0 +1,120 @@
+"""The page of messages: every kind, field and value of the XML schema, with its version."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from lxml import etree
+
+from dva_sim.protocol.limits import schema_file
+from generators.markdown import code, prose, table
+from generators.markdown import page as page_of
+
+_XS = "{http://www.w3.org/2001/XMLSchema}"
+_SINCE = re.compile(r"since (\d+\.\d+)")
+_KINDS = ("EmergencyMsg", "HBMsg", "RegMsg", "SimpleMsg")
+_PAYLOADS = (
+    *("RobotStatus", "PersonStatus", "Mission", "TeleOp", "Sensor", "DevSub"),
+    *("Access", "Event", "RobotHolder", "Dispatch", "Reply"),
+)
+_HEAD = """\
+Generated from [`protocol/dva.xsd`](../../protocol/dva.xsd), version {version}. Elements stand in
+the order of the tables. *Count* says how often an element may occur; *since* gives the first
+version that has it, 1.0 and 1.1 where it is empty. [The protocol](protocol.md) says what messages
+mean and when a receiver obeys them."""
+
+
+def page() -> str:
+    """Return the page in Markdown."""
+    schema = etree.parse(str(schema_file())).getroot()
+    types = {each.get("name"): each for each in schema if each.tag == f"{_XS}complexType"}
+    blocks = [_HEAD.format(version=schema.get("version"))]
+    for title, names in (
+        ("Kinds of messages", _KINDS),
+        ("Payloads of `SimpleMsg`", _PAYLOADS),
+        ("Parts", [name for name in types if name not in (*_KINDS, *_PAYLOADS, "Empty")]),
+    ):
+        blocks.append(f"## {title}")
+        for name in names:
+            blocks += _section(name, types[name], schema)
+    blocks += ["## Values", table(["type", "form", "since"], _values(schema))]
+    return page_of("Messages", *blocks)
+
+
+def names() -> set[str]:
+    """Return the names of all elements that the schema declares."""
+    schema = etree.parse(str(schema_file())).getroot()
+    return {each.get("name") for each in schema.iter(f"{_XS}element") if each.get("name")}
+
+
+def _section(name: str, node: etree._Element, schema: etree._Element) -> Iterator[str]:
+    yield f"### {name}"
+    if since := _since(node):
+        yield f"Since version {since}."
+    yield table(["element", "type", "count", "since"], _rows(node, schema, ""))
+
+
+def _rows(node: etree._Element, schema: etree._Element, above: str) -> Iterator[list[str]]:
+    """Yield a row for each element, those of an unnamed type below their parent."""
+    for each in node:
+        if each.tag == f"{_XS}element":
+            name, type_ = f"{above}{each.get('name')}", each.get("type")
+            yield [code(name), _link(type_), _count(each), _since(each)]
+            yield from _rows(each, schema, f"{name} / ")
+        elif each.tag == f"{_XS}group" and each.get("ref"):
+            group = schema.find(f"{_XS}group[@name='{each.get('ref')}']")
+            yield from _rows(group, schema, above)
+        elif isinstance(each.tag, str):
+            yield from _rows(each, schema, above)
+
+
+def _link(type_: str | None) -> str:
+    if type_ in (None, "Empty"):
+        return ""
+    return code(type_.removeprefix("xs:"))
+
+
+def _count(element: etree._Element) -> str:
+    least, most = element.get("minOccurs", "1"), element.get("maxOccurs", "1")
+    return least if least == most else f"{least} to {most}"
+
+
+def _since(node: etree._Element) -> str:
+    """Return the version in the comment right above an element or a type."""
+    before = node.getprevious()
+    while before is not None and before.tag is etree.Comment:
+        if found := _SINCE.search(before.text or ""):
+            return found[1]
+        before = before.getprevious()
+    return ""
+
+
+def _values(schema: etree._Element) -> Iterator[list[str]]:
+    for each in schema.iter(f"{_XS}simpleType"):
+        if each.get("name"):
+            yield [code(each.get("name")), "; ".join(_facets(each)), _since(each)]
+
+
+def _facets(node: etree._Element) -> Iterator[str]:
+    restriction = node.find(f"{_XS}restriction")
+    if restriction is None:
+        return
+    yield code(restriction.get("base").removeprefix("xs:"))
+    names = [f.get("value") for f in restriction.findall(f"{_XS}enumeration")]
+    if names:
+        yield "one of " + ", ".join(map(code, names))
+    for facet, word in (
+        *(("minInclusive", "at least"), ("maxInclusive", "at most")),
+        *(("minLength", "at least {} characters"), ("maxLength", "at most {} characters")),
+        ("pattern", "pattern"),
+    ):
+        found = restriction.find(f"{_XS}{facet}")
+        if found is not None:
+            value = found.get("value")
+            yield word.format(value) if "{}" in word else f"{word} {code(value)}"
+    comment = node.getprevious()
+    if comment is not None and comment.tag is etree.Comment:
+        text = re.sub(r"since \d+\.\d+;?", "", comment.text or "").strip()
+        if text and "\n" not in text and text != "Values":
+            yield prose(text)

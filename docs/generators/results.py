@@ -1,0 +1,168 @@
+"""The pages of results: what each shipped study answered, from the answers that are kept."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from dva_sim.cli.names import everything
+from dva_sim.experiments.report.kept_answers import KeptAnswer, all_kept
+from dva_sim.kernel.units import unit_of
+from dva_sim.kernel.wording import capital, number, quantity
+from dva_sim.simulation.labels import factor_name, level_name, measure_name
+from generators.markdown import ROOT, code, prose, shell, table
+from generators.markdown import page as page_of
+
+KEPT = ROOT / "experiments/answers"
+PICTURES = ROOT / "experiments/pictures"
+_HEAD = """\
+What the shipped studies answered, by which version and when. Each answer is kept in
+`experiments/answers` with the manifest of its run. `dva-sim answers` repeats a few runs of each
+study and reports answers that this version no longer gives.
+
+*Declared* means run as the study's file says; *confirmatory* means registered before the run.
+Intervals describe the simulated persons. They hold for real people as far as the models do:
+[operators and assumptions](../explanation/operators.md) says how far that is."""
+
+
+def paths() -> list[str]:
+    """Return the paths of all pages of results."""
+    return ["results/index.md", *(f"results/{name}.md" for name in questions())]
+
+
+def pages() -> Iterator[tuple[str, str]]:
+    """Yield the path and the text of the summary and of each study's page."""
+    kept = {answer.study: answer for answer in all_kept(KEPT)}
+    yield "results/index.md", _summary(kept)
+    for name, question in questions().items():
+        blocks = _answered(kept[name]) if name in kept else _open(name)
+        yield f"results/{name}.md", page_of(name, f"*{prose(question)}*", *blocks)
+
+
+def questions() -> dict[str, str]:
+    """Return the question of each shipped study, by name."""
+    return {each.name: each.description for each in everything("studies")["studies"]}
+
+
+def _summary(kept: dict[str, KeptAnswer]) -> str:
+    rows = (
+        [f"[{name}]({name}.md)", prose(question), *_found(kept.get(name))]
+        for name, question in questions().items()
+    )
+    names = "\n".join(questions())
+    return page_of(
+        "Results",
+        _HEAD,
+        table(["study", "question", "answer", "status", "version, date"], rows),
+        f"```{{toctree}}\n:hidden:\n\n{names}\n```",
+    )
+
+
+def _found(answer: KeptAnswer | None) -> list[str]:
+    if answer is None:
+        return ["not kept yet", "", ""]
+    return [_headline(answer), _status(answer), f"{answer.version}, {answer.date}"]
+
+
+def _headline(answer: KeptAnswer) -> str:
+    """Return the contrast at its last level if levels are quantities; else the first sentence."""
+    if answer.contrast is None or not answer.rows or isinstance(answer.rows[-1].level, str):
+        return prose(answer.answer.partition(". ")[0].removesuffix("."))
+    row, unit = answer.rows[-1], unit_of(answer.measure)
+    first, second = answer.contrast
+    where = f" ({_level(answer, -1)})" if answer.over else ""
+    return prose(
+        f"{first} minus {second} in {measure_name(answer.measure)}{where}: "
+        f"{quantity(row.mean, unit)} ({number(row.low)} to {number(row.high)})"
+    )
+
+
+def _status(answer: KeptAnswer) -> str:
+    stale = f", no longer given since {answer.stale_since}" if answer.stale_since else ""
+    return f"{answer.status}{stale}"
+
+
+def _open(study: str) -> Iterator[str]:
+    yield "No answer of this study is kept yet."
+    yield shell(_calls(study))
+
+
+def _answered(answer: KeptAnswer) -> Iterator[str]:
+    manifest = json.loads((KEPT / f"{answer.study}.manifest.json").read_text(encoding="utf-8"))
+    yield "## Answer"
+    yield f"**{prose(answer.answer)}**"
+    yield _picture(answer.study)
+    yield _band(answer)
+    if judged := [*answer.hypotheses, *answer.predictions]:
+        yield "## Predictions"
+        yield "Written down before the study was run."
+        yield table(["prediction", "outcome"], ([prose(text), out] for text, out in judged))
+    yield "## Conditions"
+    yield "The answer holds for these models and settings."
+    yield table(["", ""], _conditions(manifest))
+    yield "## Run"
+    yield (
+        f"{capital(_status(answer))}. dva-sim {answer.version}, commit {code(answer.commit[:12])}, "
+        f"{answer.date}, seed {answer.seed}, {answer.persons} persons, {answer.runs} runs, "
+        f"{answer.cpu_s / 60:.0f} minutes of CPU time."
+    )
+    yield shell(_calls(answer.study))
+
+
+def _calls(study: str) -> list[str]:
+    return [f"dva-sim run {study} --quick -o results/quick", f"dva-sim run {study}"]
+
+
+def _picture(study: str) -> str:
+    if not (PICTURES / f"{study}.png").exists():
+        return ""
+    return f"![The answer of {study}](../../experiments/pictures/{study}.png)"
+
+
+def _band(answer: KeptAnswer) -> str:
+    """Return the table of the contrast at each level, with its simultaneous band."""
+    if answer.contrast is None or not answer.over:
+        return ""
+    unit = unit_of(answer.measure)
+    head = f"{' minus '.join(answer.contrast)}{f' [{unit}]' if unit else ''}"
+    rows = (
+        [prose(_level(answer, n)), number(r.mean), f"{number(r.low)} to {number(r.high)}"]
+        for n, r in enumerate(answer.rows)
+    )
+    title = f"Measure: {code(answer.measure)}, {prose(measure_name(answer.measure))}."
+    return f"{title}\n\n{table([prose(factor_name(answer.over)), prose(head), '95 % band'], rows)}"
+
+
+def _level(answer: KeptAnswer, at: int) -> str:
+    return str(level_name(answer.over, answer.rows[at].level))
+
+
+def _conditions(manifest: dict[str, Any]) -> Iterator[list[str]]:
+    """Yield what was varied and what was held fixed, as the manifest has it."""
+    study = manifest["study"]
+    for factor, levels in study["factors"].items():
+        yield [f"varied: {code(factor)}", ", ".join(code(level) for level in levels)]
+    for key, level in ((study.get("answer") or {}).get("within") or {}).items():
+        yield [f"answer at {code(key)}", code(level)]
+    for part, scenario in manifest["scenarios"].items():
+        yield [f"part {code(part)}", prose(str(scenario.get("description") or ""))]
+        yield from _models(scenario)
+    if robustness := study.get("robustness"):
+        yield ["repeated over", code(json.dumps(robustness, ensure_ascii=False))]
+    for level, note in ((study.get("map") or {}).get("notes") or {}).items():
+        yield [f"extrapolated at {code(level)}", prose(note)]
+
+
+def _models(scenario: dict[str, Any]) -> Iterator[list[str]]:
+    for key in (
+        "site.name",
+        "robot.profile",
+        "phone.profile",
+        "operator.strategy",
+        "dispatch.policy",
+    ):
+        part, _, name = key.partition(".")
+        value = (scenario.get(part) or {}) if isinstance(scenario.get(part), dict) else {}
+        if value.get(name) is not None:
+            yield [code(key), code(value[name])]
