@@ -16,6 +16,7 @@ from generators import (
     measures,
     messages,
     plugins,
+    protocol,
     python_api,
     recordings,
     results,
@@ -34,6 +35,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "reference/exit-codes.md": exit_codes.page,
     "reference/recordings.md": recordings.page,
     "reference/console.md": console.page,
+    "reference/protocol.md": protocol.page,
     "reference/messages.md": messages.page,
     "reference/glossary.md": glossary.page,
 }

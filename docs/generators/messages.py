@@ -18,10 +18,17 @@ _PAYLOADS = (
     *("RobotStatus", "PersonStatus", "Mission", "TeleOp", "Sensor", "DevSub"),
     *("Access", "Event", "RobotHolder", "Dispatch", "Reply"),
 )
+_UNMARKED = {
+    **dict.fromkeys(("PersonStatus", "Access", "Event", "SensorInfo", "Permission"), "1.1"),
+    **dict.fromkeys(("SensorValue", "GoTo", "CancelMission", "Waypoint", "Frequency"), "1.1"),
+    **dict.fromkeys(("Tick", "SeenTick"), "1.1"),
+    "GetGrant / Level": "1.6",
+}
+"""Versions of elements and types that the schema does not mark."""
 _HEAD = """\
 Generated from [`protocol/dva.xsd`](../../protocol/dva.xsd), version {version}. Elements stand in
 the order of the tables. *Count* says how often an element may occur; *since* gives the first
-version that has it, 1.0 and 1.1 where it is empty. [The protocol](protocol.md) says what messages
+version that has it, 1.0 where it is empty. [The protocol](protocol.md) says what messages
 mean and when a receiver obeys them."""
 
 
@@ -52,21 +59,31 @@ def _section(name: str, node: etree._Element, schema: etree._Element) -> Iterato
     yield f"### {name}"
     if since := _since(node):
         yield f"Since version {since}."
-    yield table(["element", "type", "count", "since"], _rows(node, schema, ""))
+    yield table(["element", "type", "count", "since"], _rows(node, schema))
 
 
-def _rows(node: etree._Element, schema: etree._Element, above: str) -> Iterator[list[str]]:
-    """Yield a row for each element, those of an unnamed type below their parent."""
+def _rows(
+    node: etree._Element, schema: etree._Element, above: str = "", known: str = ""
+) -> Iterator[list[str]]:
+    """Yield a row for each element, those of an unnamed type below their parent.
+
+    Args:
+        node: Type, group or element that holds them.
+        schema: The whole schema, for groups that are referred to.
+        above: Path of the parent.
+        known: Version of the parent; empty for the first one.
+    """
     for each in node:
         if each.tag == f"{_XS}element":
-            name, type_ = f"{above}{each.get('name')}", each.get("type")
-            yield [code(name), _link(type_), _count(each), _since(each)]
-            yield from _rows(each, schema, f"{name} / ")
+            name = f"{above}{each.get('name')}"
+            since = max(known, _since(each), _UNMARKED.get(name, ""))
+            yield [code(name), _link(each.get("type")), _count(each), since]
+            yield from _rows(each, schema, f"{name} / ", since)
         elif each.tag == f"{_XS}group" and each.get("ref"):
             group = schema.find(f"{_XS}group[@name='{each.get('ref')}']")
-            yield from _rows(group, schema, above)
+            yield from _rows(group, schema, above, known)
         elif isinstance(each.tag, str):
-            yield from _rows(each, schema, above)
+            yield from _rows(each, schema, above, known)
 
 
 def _link(type_: str | None) -> str:
@@ -87,7 +104,7 @@ def _since(node: etree._Element) -> str:
         if found := _SINCE.search(before.text or ""):
             return found[1]
         before = before.getprevious()
-    return ""
+    return _UNMARKED.get(node.get("name"), "")
 
 
 def _values(schema: etree._Element) -> Iterator[list[str]]:
@@ -96,14 +113,18 @@ def _values(schema: etree._Element) -> Iterator[list[str]]:
             yield [code(each.get("name")), "; ".join(_facets(each)), _since(each)]
 
 
+def _word(value: etree._Element) -> str:
+    since = _since(value)
+    return code(value.get("value")) + (f" (since {since})" if since else "")
+
+
 def _facets(node: etree._Element) -> Iterator[str]:
     restriction = node.find(f"{_XS}restriction")
     if restriction is None:
         return
     yield code(restriction.get("base").removeprefix("xs:"))
-    names = [f.get("value") for f in restriction.findall(f"{_XS}enumeration")]
-    if names:
-        yield "one of " + ", ".join(map(code, names))
+    if words := [_word(each) for each in restriction.findall(f"{_XS}enumeration")]:
+        yield "one of " + ", ".join(words)
     for facet, word in (
         *(("minInclusive", "at least"), ("maxInclusive", "at most")),
         *(("minLength", "at least {} characters"), ("maxLength", "at most {} characters")),

@@ -6,7 +6,7 @@
  *   cc -O2 -DNOREDUCE -DNFAIR=4 -o pan pan.c && ./pan -a -f -m400000 -N drive_ends
  *
  * The robot obeys teleop_table.pml, which is taken from the program. Bounds: -DSESSIONS=3,
- * -DLETTERS=3. A mechanism is left out by -DNO_...; then a rule of docs/invariants.md must break.
+ * -DLETTERS=3. A mechanism is left out by -DNO_...; then a rule of docs/explanation/safety-rules.md must break.
  * Time passes in ticks of a second or so; only the order of the limits is that of the program.
  */
 #ifndef SESSIONS
