@@ -1,16 +1,17 @@
-"""The glossary: words of the program and words of reports, from the files that reports read."""
+"""The glossary: words of the program and words of reports, from the file that reports read."""
 
 from __future__ import annotations
 
-from dva_sim.experiments.report.glossary import TERMS
+from dva_sim.experiments.report.glossary import GLOSSARY
 from generators.markdown import page as page_of
 from generators.markdown import prose, sentence, table
 
 _HEAD = """\
-Each word has one meaning. A report links the words that it uses to the same explanations."""
+Each word has one meaning. Reports link the words that they use to the same explanations."""
 
 
 def page() -> str:
     """Return the page in Markdown."""
-    rows = sorted(([prose(t.name), sentence(t.means)] for t in TERMS), key=lambda r: r[0].lower())
+    terms = sorted(GLOSSARY, key=lambda term: term.name.lower())
+    rows = ([prose(term.name), sentence(term.means)] for term in terms)
     return page_of("Glossary", _HEAD, table(["word", "meaning"], rows))

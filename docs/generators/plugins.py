@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import ast
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from itertools import chain
+from typing import Any
 
 from dva_sim.cli.names import _key, _named
 from dva_sim.testing.promises import TRIALS, CheckedKind
-from generators.markdown import code, prose, sentence, shell, table
+from generators.markdown import code, prose, shell, table
 from generators.markdown import page as page_of
 
 _HEAD = """\
@@ -49,49 +50,50 @@ def _section(word: str, trial: CheckedKind) -> Iterator[str]:
         ],
     )
     yield shell([f"dva-sim check {word} mine.py:Mine"])
-    yield "The check fails if the class"
+    unless = "unless" if word == "transport" else "if"
+    yield f"The check fails {unless} the class ... (capitals stand for values)"
     yield "\n".join(f"- {prose(each)}" for each in broken_promises(trial))
 
 
 def broken_promises(trial: CheckedKind) -> list[str]:
     """Return the words for each promise that the check of a kind can find broken."""
-    tree = ast.parse(inspect.getsource(import_module(f"dva_sim.testing.{trial.module}")))
-    parts = {
-        each.name: each for each in tree.body if isinstance(each, (ast.FunctionDef, ast.ClassDef))
-    }
+    module = import_module(f"dva_sim.testing.{trial.module}")
+    kinds = (ast.FunctionDef, ast.ClassDef)
+    tree = ast.parse(inspect.getsource(module))
+    parts = {each.name: each for each in tree.body if isinstance(each, kinds)}
     reached = [f"check_{trial.kind}"]
     for name in reached:
         names = {n.id for n in ast.walk(parts[name]) if isinstance(n, ast.Name)}
         reached += [each for each in parts if each in names and each not in reached]
-    found = chain.from_iterable(_promises(part) for n, part in parts.items() if n in reached)
-    return list(dict.fromkeys(found))
+    cases = chain.from_iterable(_cases(parts[name]) for name in parts if name in reached)
+    found = (words for case in cases for words in _words(case.elts[0], vars(module)))
+    return list(dict.fromkeys(words for words in found if " " in words and words[0].isalpha()))
 
 
-def _promises(part: ast.AST) -> Iterator[str]:
-    """Yield the first words of each pair that a part yields, appends or returns in a tuple."""
+def _cases(part: ast.AST) -> Iterator[ast.Tuple]:
+    """Yield the pairs of a promise and a case that a part yields, appends or returns."""
     for node in ast.walk(part):
-        if isinstance(node, ast.Tuple) and len(node.elts) == 2:
-            text = _words(node.elts[0])
-            if " " in text and text[0].islower() and not _is_pair_of_numbers(node):
-                yield text
+        if isinstance(node, ast.Yield):
+            held = [node.value]
+        elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "append":
+            held = node.args
+        elif isinstance(node, ast.Tuple) and len(node.elts) == 1:
+            held = node.elts
+        else:
+            continue
+        yield from (pair for pair in held if isinstance(pair, ast.Tuple) and len(pair.elts) == 2)
 
 
-def _is_pair_of_numbers(node: ast.Tuple) -> bool:
-    return isinstance(node.elts[1], ast.Constant) and not isinstance(node.elts[1].value, str)
-
-
-def _words(node: ast.expr) -> str:
-    """Return a constant text, or a formatted one with the names of its values."""
+def _words(node: ast.expr, known: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the texts that an expression can be, with the names of values in capitals."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
-        return node.value
-    if isinstance(node, ast.JoinedStr):
-        return "".join(
+        yield node.value
+    elif isinstance(node, ast.Name) and isinstance(known.get(node.id), str):
+        yield known[node.id]
+    elif isinstance(node, ast.IfExp):
+        yield from (*_words(node.body, known), *_words(node.orelse, known))
+    elif isinstance(node, ast.JoinedStr):
+        yield "".join(
             str(v.value) if isinstance(v, ast.Constant) else ast.unparse(v.value).upper()
             for v in node.values
         )
-    return ""
-
-
-def sections() -> list[str]:
-    """Return the titles of the sections, one for each kind."""
-    return [sentence(trial.classes).rstrip(".") for trial in TRIALS.values()]

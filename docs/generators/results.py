@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from dva_sim.cli.names import everything
@@ -36,8 +37,20 @@ def pages() -> Iterator[tuple[str, str]]:
     kept = {answer.study: answer for answer in all_kept(KEPT)}
     yield "results/index.md", _summary(kept)
     for name, question in questions().items():
-        blocks = _answered(kept[name]) if name in kept else _open(name)
-        yield f"results/{name}.md", page_of(name, f"*{prose(question)}*", *blocks)
+        yield f"results/{name}.md", study_page(name, question, kept.get(name))
+
+
+def study_page(name: str, question: str, answer: KeptAnswer | None, folder: Path = KEPT) -> str:
+    """Return the page of a study in Markdown.
+
+    Args:
+        name: Name of the study.
+        question: Its question.
+        answer: Its kept answer, if there is one.
+        folder: Folder of kept answers and their manifests.
+    """
+    blocks = _open(name) if answer is None else _answered(answer, folder)
+    return page_of(name, f"*{prose(question)}*", *blocks)
 
 
 def questions() -> dict[str, str]:
@@ -88,8 +101,8 @@ def _open(study: str) -> Iterator[str]:
     yield shell(_calls(study))
 
 
-def _answered(answer: KeptAnswer) -> Iterator[str]:
-    manifest = json.loads((KEPT / f"{answer.study}.manifest.json").read_text(encoding="utf-8"))
+def _answered(answer: KeptAnswer, folder: Path) -> Iterator[str]:
+    manifest = json.loads((folder / f"{answer.study}.manifest.json").read_text(encoding="utf-8"))
     yield "## Answer"
     yield f"**{prose(answer.answer)}**"
     yield _picture(answer.study)

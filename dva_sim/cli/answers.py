@@ -20,11 +20,10 @@ if TYPE_CHECKING:
 @asks(
     studies=(argument("Only these studies.", "STUDY", of=list[str]), ()),
     keep=(several("Keep the answer of a results folder.", "FOLDER", "--keep"), ()),
-    page=(flag("--page", "Print all kept answers as the page docs/results.md."), False),
     mark=(flag("--mark", "Mark answers that are no longer given."), False),
     jobs=(Jobs, None),
 )
-def answers(studies: list[str], keep: list[str], page: bool, mark: bool, jobs: int | None) -> None:
+def answers(studies: list[str], keep: list[str], mark: bool, jobs: int | None) -> None:
     """Check which published answers this version still gives.
 
     A few runs of each study are repeated and compared with the answers kept beside the studies.
@@ -32,14 +31,8 @@ def answers(studies: list[str], keep: list[str], page: bool, mark: bool, jobs: i
     Examples:
         dva-sim answers  # all of them: a minute or two
         dva-sim answers --keep results/filters  # keep what a study has answered
-        dva-sim answers --page > docs/results.md  # write the page
     """
-    from dva_sim.experiments.report import answer_pages, kept_answers  # late: start-up
-
     folder = _folder()
-    if page:
-        print(answer_pages.answers_page(kept_answers.all_kept(folder)), end="")
-        return
     for name in keep:
         _keep(Path(name), folder, jobs)
     if not keep:

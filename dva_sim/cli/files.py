@@ -83,8 +83,7 @@ def plugins(as_json: Json = False) -> None:
         names.tell(names.plugin_lines())
 
 
-@asks(page=(flag("--page", "Print them as the page docs/assumptions.md."), False))
-def assumed(page: bool, as_json: Json = False) -> None:
+def assumed(as_json: Json = False) -> None:
     """List all assumed numbers about people and phones.
 
     Each is a scenario key that a study can vary as a factor.
@@ -98,8 +97,6 @@ def assumed(page: bool, as_json: Json = False) -> None:
 
     if as_json:
         print_json(listed.as_json())
-    elif page:
-        print(listed.as_page(), end="")
     else:
         names.tell(listed.lines())
 

@@ -178,7 +178,8 @@ def _fared(row: Row, people: list[dict[str, Any]]) -> str:
 def _violations(count: int) -> str:
     """A count of broken rules in words."""
     times = "once" if count == 1 else f"{count} times"
-    return "none was broken" if not count else f"broken {times}; see docs/invariants.md"
+    page = "docs/explanation/safety-rules.md"
+    return "none was broken" if not count else f"broken {times}; see {page}"
 
 
 # --- a shift -------------------------------------------------------------------------

@@ -34,7 +34,7 @@ BOUNDS: Final[dict[str, int]] = {
     "Trail._facts": 10_000,
     "Store._events": 10_000,
 }
-"""Bounds that are stated in docs/invariants.md, by class and attribute."""
+"""Bounds on containers of agents, by class and attribute."""
 KEPT_FOR_MEASURES: Final = frozenset({"DvaAgent.events", "DvaAgent.facts"})
 """What a run keeps of everything, to measure it afterwards; a DVA that lasts keeps none of it."""
 _ATOMS: Final = (str, bytes, int, float, complex, bool, type(None), type, ModuleType, FunctionType)

@@ -180,7 +180,7 @@ def connected(address: str) -> Iterator[zmq.Socket[bytes]]:
 def compare() -> None:
     """Tell what each takes, and the ratios.
 
-    Goal: 1.3 times the floor; docs/growth.md says what was found. Waiting at both ends in a poller,
+    Goal: 1.3 times the floor; Waiting at both ends in a poller,
     which serves all sockets and the next event, makes 1.2 of it by itself. The rest is what the
     floor leaves out: a time-out for each request, repetitions known by what they say, and a robot
     that looks who asks, queues, decides and moves, each time after a sleep in which it has left

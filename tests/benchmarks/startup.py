@@ -25,7 +25,7 @@ COMMANDS = {
     "list": "list",
     "plugins": "plugins",
     "assumed": "assumed",
-    "answers": "answers --page",
+    "answers": "answers --help",
     "schema": "schema scenario",
     "check": "check {root}/experiments/scenarios/fire-drill.yaml",
     "site": "site show hall -o {out}/site.png",

@@ -1,4 +1,4 @@
-"""Speed-up of a study by more workers. Overhead per run: docs/growth.py."""
+"""Speed-up of a study by more workers. Overhead per run: growth.py."""
 
 from __future__ import annotations
 

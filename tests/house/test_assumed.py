@@ -9,7 +9,7 @@ import pytest
 from helpers.paths import ROOT
 
 from dva_sim.kernel.yaml_files import load_yaml
-from dva_sim.simulation.scenario.assumptions import all_assumptions, as_page
+from dva_sim.simulation.scenario.assumptions import all_assumptions
 
 AGENTS = ROOT / "dva_sim" / "agents"
 ROOMS = ["control_room", "operator", "people", "tilt", "."]
@@ -103,8 +103,3 @@ def test_a_trait_has_one_band():
     shared = listed.keys() & bands.keys()
     assert len(shared) >= 3
     assert {key: listed[key] for key in shared} == {key: bands[key] for key in shared}
-
-
-def test_the_page_of_assumptions_is_the_one_that_the_program_writes():
-    """Mend it by `dva-sim assumed --page > docs/assumptions.md`."""
-    assert (ROOT / "docs" / "assumptions.md").read_text(encoding="utf-8") == as_page()

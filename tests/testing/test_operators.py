@@ -7,7 +7,6 @@ import sys
 import time
 
 import pytest
-from helpers.paths import ROOT
 from helpers.processes.search_settings import LONGER
 from helpers.wording import unnamed
 
@@ -113,16 +112,6 @@ def test_who_is_only_slow_is_warned(fewer):
     assert any(text.startswith("is slow: ") for text in outcome.warnings)
     (text,) = tried(check_operator, steers(lambda wanted, _: wanted), slow=0.0).warnings
     assert text.startswith("thinks slowly: ")
-
-
-@pytest.mark.system
-def test_the_operator_on_the_page_of_agents_keeps_its_promises(tmp_path):
-    page = (ROOT / "agents/README.md").read_text(encoding="utf-8")
-    blocks = [part.partition("```")[0] for part in page.split("```python\n")[1:]]
-    (code,) = [block for block in blocks if "class Cautious" in block]
-    (tmp_path / "mine.py").write_text(code, encoding="utf-8")
-    outcome = tried(check_operator, load_strategy("mine.py:Cautious", base=tmp_path), slow=60.0)
-    assert outcome.broken == ()
 
 
 def test_the_oracle_sees_nothing_and_so_there_is_nothing_to_try():

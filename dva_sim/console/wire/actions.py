@@ -2,7 +2,7 @@
 
 A new action is an entry of `ACTIONS`, a function in what it acts on (found there by its name), and
 whatever shows it on a page. Checks at the web, roles, patience, rows of the audit log, the page's
-constants (`python -m dva_sim.console.wire.generated`) and the table in `docs/console.md` follow.
+constants (`python -m dva_sim.console.wire.generated`) and the reference page of the console follow.
 """
 
 from __future__ import annotations

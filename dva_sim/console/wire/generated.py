@@ -1,9 +1,9 @@
-"""Parts of the pages and the documentation that are generated from the declarations.
+"""Parts of the pages that are generated from the declarations.
 
     python -m dva_sim.console.wire.generated
 
 writes `static/js/declared.js` (how long an answer is waited for, and limits), `static/js/lines.js`
-(the types of all that pages are told) and prints the table of actions in `docs/console.md`.
+(the types of all that pages are told).
 """
 
 from __future__ import annotations
@@ -16,21 +16,14 @@ from typing import Any, Final, Literal, NotRequired, get_args, get_origin, get_t
 
 from typing_extensions import is_typeddict
 
-from dva_sim.console.wire.actions import ACTIONS, Action, ActionPlace, Audit
+from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.arguments import FASTEST, LINK_LIMITS, MOST_PORT
 from dva_sim.console.wire.audit_answers import AuditCheck, AuditMeasures
-from dva_sim.console.wire.kinds import hints_of, words_of
 from dva_sim.console.wire.lines import ToPage
 from dva_sim.recordings.audit_log import AuditRow
 
 STATIC: Final = Path(__file__).parent.parent / "static"
 GRACE: Final = 5.0  # the web process has answered before a page gives up [s]
-_PLACES: Final = {
-    ActionPlace.WORLD: "world",
-    ActionPlace.ATTACHED: "attached",
-    ActionPlace.ROBOT: "robot alone",
-    ActionPlace.REPLAY: "recording",
-}
 
 
 def javascript() -> str:
@@ -117,28 +110,6 @@ def _in_javascript(hint: Any, found: dict[type, str]) -> str:
 FILES: Final = {"js/declared.js": javascript, "js/lines.js": line_types}
 
 
-def table() -> str:
-    """The actions for `docs/console.md`."""
-    head = "| action | | arguments | needs | where | audit log |\n|---|---|---|---|---|---|\n"
-    return head + "".join(map(_row, ACTIONS.values()))
-
-
-def _row(action: Action) -> str:
-    needed = action.arguments.__required_keys__  # type: ignore[attr-defined]
-    arguments = (
-        f"`{name}`{'' if name in needed else '?'}: {words_of(hint)}"
-        for name, hint in hints_of(action.arguments).items()
-    )
-    places = ", ".join(word for place, word in _PLACES.items() if place in action.at)
-    kept = {Audit.OWN: "yes", Audit.DVA: "the DVA's row"}
-    audit = f"no: {action.audit}" if isinstance(action.audit, str) else kept[action.audit]
-    cells = (
-        *(f"`{action.name}`", action.does, "; ".join(arguments)),
-        *(action.role.name.lower(), places, audit),
-    )
-    return f"| {' | '.join(cells)} |\n"
-
-
 def write(folder: Path = STATIC) -> None:
     """Write the files of the pages."""
     for name, text in FILES.items():
@@ -147,4 +118,3 @@ def write(folder: Path = STATIC) -> None:
 
 if __name__ == "__main__":
     write()
-    print(table(), end="")

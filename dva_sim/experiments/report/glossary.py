@@ -1,7 +1,7 @@
-"""The words of a report that not every reader knows, explained where they first stand.
+"""The glossary: words that not every reader knows, of reports and of the documentation.
 
-A page links each word, where it is first said, to the list at its foot. Only words that a report
-says are in its list.
+A report links each word, where it first occurs, to the list at its foot, which holds only the words
+that occur in it. The documentation lists all of them.
 """
 
 from __future__ import annotations
@@ -23,11 +23,13 @@ class Term:
         name: Term as the list has it.
         means: In one sentence, without its full stop.
         said: Pattern of how it is said in a text, if otherwise than its name.
+        in_reports: False for words that only the documentation explains.
     """
 
     name: str
     means: str
     said: str = ""
+    in_reports: bool = True
 
     @property
     def key(self) -> str:
@@ -49,11 +51,15 @@ def _all() -> Iterator[Term]:
     """Patterns by either of their names, and what stands in `words.yaml`."""
     for kind in PATTERNS.values():
         yield Term(kind.title, meaning_of(kind), _called(kind))
-    for name, said in load_yaml(Path(__file__).with_name("words.yaml")).data.items():
+    words = load_yaml(Path(__file__).with_name("words.yaml")).data
+    for name, said in words["reports"].items():
         yield Term(name, **said) if isinstance(said, dict) else Term(name, said)
+    for name, means in words["documentation"].items():
+        yield Term(name, means, in_reports=False)
 
 
-TERMS = tuple(_all())
+GLOSSARY = tuple(_all())
+TERMS = tuple(term for term in GLOSSARY if term.in_reports)
 
 
 def terms_in(texts: Iterable[str]) -> list[Term]:

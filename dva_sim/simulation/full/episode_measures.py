@@ -135,7 +135,7 @@ RUN_COLUMNS = (
     Measure("plugin_failures", "times that a class of the user's gave no answer that is one"),
     Measure(
         "violations",
-        "broken safety rules found, of S1 to S7; docs/invariants.md says how they are checked",
+        "broken safety rules found, of S1 to S7; see docs/explanation/safety-rules.md",
     ),
     Measure("simulated_s", "virtual time simulated"),
     *dispatch_measures.RUN_COLUMNS,

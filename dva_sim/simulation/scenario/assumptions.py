@@ -18,15 +18,6 @@ _PROFILES: dict[str, type[Config]] = {
     "bystander": BystanderProfile,
 }
 """Profiles by the part of a scenario that changes their medians."""
-_PAGE = """# Assumptions
-
-<!-- Written by `dva-sim assumed --page`; do not edit. -->
-
-These numbers about people and their phones were not measured by anybody whom we found. Each has a
-band of plausible values. Any of them is set like every key (`--set KEY=VALUE`, a line of a
-scenario, a factor of a study), and the screening of a study says which of them move its answer.
-A trait is the median of a distribution over persons.
-"""
 
 
 def all_assumptions() -> list[Assumption]:
@@ -50,20 +41,6 @@ def lines() -> Iterator[str]:
         yield group
         for name, each in members:
             yield f"  {name:<22} {_value(each):<32} {each.why}".rstrip()
-
-
-def as_page() -> str:
-    """The list as a page in Markdown."""
-    text = _PAGE
-    for group, members in _groups():
-        text += (
-            f"\n## `{group}`\n\n| key | default | band | reason for the band |\n|---|---|---|---|\n"
-        )
-        for name, each in members:
-            unit = f" {each.unit}" if each.unit else ""
-            band = f"{each.low:g} to {each.high:g}{unit}"
-            text += f"| `{name}` | {each.default:g}{unit} | {band} | {each.why} |\n"
-    return text
 
 
 def assumption_at(key: str) -> Assumption:

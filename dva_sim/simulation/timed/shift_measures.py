@@ -119,7 +119,7 @@ RUN_COLUMNS = (
     Measure("messages", "messages that the DVA took"),
     Measure(
         "violations",
-        "broken safety rules found, of S6 and S7; docs/invariants.md says how they are checked",
+        "broken safety rules found, of S6 and S7; see docs/explanation/safety-rules.md",
     ),
     Measure("simulated_s", "virtual time simulated"),
 )

@@ -1,6 +1,6 @@
 """Hazards: a growing danger, the field that it makes on a site, and how both are shown.
 
-Derive from `Hazard` and `HazardField` to make a kind of your own; worlds/HAZARDS.md says how.
+Derive from `Hazard` and `HazardField` to make a kind of your own (docs/explanation/hazards.md).
 
 What robots and people do changes nothing but when a source stops. So the fields shipped are solved
 once per process for each site, kind and space that they start in, step by step and only as far as

@@ -4,13 +4,13 @@ import json
 from dataclasses import replace
 
 import pytest
+from generators import results
 from helpers.studies.small_study import cheap, study_in
 from helpers.wording import unnamed
 
 from dva_sim.cli import answers as command
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.report import kept_answers
-from dva_sim.experiments.report.answer_pages import answers_page
 from dva_sim.kernel.errors import ConfigError, ExitCode
 
 
@@ -102,9 +102,11 @@ def test_only_a_whole_study_as_its_file_has_it_is_kept(tmp_path):
 
 
 def test_the_page_dates_each_answer(kept):
-    answer = replace(kept[0], stale_since="9.9.9")
-    page = answers_page([answer])
-    assert page.count(f"## {answer.study}") == 1
+    answer, manifest, folder = kept
+    answer = replace(answer, stale_since="9.9.9")
+    kept_answers.keep(answer, manifest, folder)
+    page = results.study_page(answer.study, answer.question, answer, folder)
+    assert page.startswith(f"# {answer.study}\n")
     assert unnamed(page, answer.question, answer.answer, answer.date, "since 9.9.9", "seed 3") == []
 
 

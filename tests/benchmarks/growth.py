@@ -1,7 +1,7 @@
-"""What a run, the DVA and a study cost as they grow: the tables of `docs/growth.md`.
+"""Costs of a run, the DVA and a study as they grow, as a table.
 
-    .venv/bin/python docs/growth.py robots               # all sizes of one kind
-    .venv/bin/python docs/growth.py rows --most 10000    # up to a size
+    .venv/bin/python tests/benchmarks/growth.py robots               # all sizes of one kind
+    .venv/bin/python tests/benchmarks/growth.py rows --most 10000    # up to a size
 
 Each size is measured in a process of its own: CPU seconds of what grows, without what every
 program costs before it begins, and the most memory that the process had.
