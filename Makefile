@@ -81,7 +81,7 @@ check: $(DEV)  ## lint, format, types, import contracts, prose
 	@$(BIN)/python tests/prose_lint.py
 
 docs: $(DOCS)  ## the documentation as web pages, in build/docs; needs no network
-	@$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet docs $(SITE)
+	@$(BIN)/python -m sphinx --fail-on-warning --quiet docs $(SITE)
 	@echo "Open $(SITE)/index.html"
 
 same-bytes: $(DEV)  ## whether results are those of another version: make same-bytes AGAINST=COMMIT

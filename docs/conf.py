@@ -5,6 +5,7 @@ from importlib.metadata import version as installed_version
 from pathlib import Path
 
 from sphinx.application import Sphinx
+from sphinx.environment import BuildEnvironment
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -40,3 +41,12 @@ html_show_sphinx = False
 def setup(app: Sphinx) -> None:
     """Write the generated pages before Sphinx looks for pages."""
     generators.write(Path(app.srcdir))
+    app.connect("env-get-outdated", _outdated)
+
+
+def _outdated(
+    _app: Sphinx, env: BuildEnvironment, added: set[str], changed: set[str], removed: set[str]
+) -> set[str]:
+    """Return all pages if the tree of pages has changed: each page shows it beside its text."""
+    has_changed = added or removed or any(name.endswith("index") for name in changed)
+    return set(env.found_docs) if has_changed else set()

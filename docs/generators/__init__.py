@@ -55,8 +55,12 @@ def paths() -> list[str]:
 
 
 def write(docs: Path) -> None:
-    """Write every page whose text has changed, so that Sphinx reads only those again."""
+    """Write every page whose text has changed, and remove those of studies that are gone."""
+    for file in (docs / "results").glob("*.md"):
+        if str(file.relative_to(docs)) not in paths():
+            file.unlink()
     for path, text in all_pages():
         file = docs / path
+        file.parent.mkdir(exist_ok=True)
         if not file.exists() or file.read_text(encoding="utf-8") != text:
             file.write_text(text, encoding="utf-8")

@@ -30,6 +30,79 @@ _PROFILES = {
     "BystanderProfile": "Bystanders: `agents/people`",
 }
 _BOUNDS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
+_PLAIN = {
+    "at": "Place, or name of one",
+    "at_s": "Time after the start of the run",
+    "capacity_wh": "Energy of a full battery [Wh]",
+    "count": "Number of them",
+    "description": "One line for lists and reports",
+    "every_s": "Period with which it repeats; left out: once",
+    "field_of_view_deg": "Horizontal angle of view",
+    "for_s": "Duration",
+    "frame_bytes": "Size of a frame",
+    "from_s": "Time at which it begins",
+    "heading_deg": "Heading, counter-clockwise from east",
+    "height_m": "Extent along y",
+    "high": "Upper end",
+    "high_s": "Upper end",
+    "horizon_s": "Length of the run",
+    "kind": "Selects this kind",
+    "latitude": "Latitude [deg]",
+    "law": "Selects this law",
+    "least_s": "Shortest delay",
+    "longitude": "Longitude [deg]",
+    "low": "Lower end",
+    "low_s": "Lower end",
+    "map": "ROS map, by path",
+    "mass_kg": "Mass [kg]",
+    "max_acceleration_mps2": "Greatest acceleration of the motors",
+    "max_age_s": "Age limit of a command, by the picture behind it",
+    "max_attempts": "Attempts after which an event is escalated",
+    "max_deceleration_mps2": "Greatest deceleration of the brakes",
+    "max_speed_mps": "Top speed",
+    "max_tilt_deg": "Largest tilt of the phone",
+    "max_tilt_speed_deg_s": "Fastest change of the tilt",
+    "max_turn_acceleration_rad_s2": "Greatest angular acceleration [rad/s^2]",
+    "max_turn_rate_rad_s": "Greatest turn rate",
+    "mean_s": "Mean",
+    "measure_s": "Time that is measured",
+    "median": "Median over persons",
+    "motor_time_constant_s": "Time constant of the motors",
+    "name": "Name, as it is referred to",
+    "phases": "Number of phases",
+    "plan": "GeoJSON file of the plan, relative to this file",
+    "population": "Population of persons, by name or path",
+    "profile": "Profile, by name or path",
+    "range_m": "Farthest distance at which something is seen",
+    "rate_hz": "Rate",
+    "reference_error_mps2": "Standard deviation of the calibrated reference over persons",
+    "resolution_m": "Side of a cell of the occupancy grid",
+    "rest": "Pause, as a number of seconds or a law",
+    "after": "Time until then, as a number of seconds or a law",
+    "sample_jitter": "Irregularity of samples, as a share of their period",
+    "sd_s": "Standard deviation",
+    "shape": "Shape parameter",
+    "share": "Share of all cases",
+    "speed_step_mps2": "Acceleration for one level of speed",
+    "spread": "Standard deviation of the logarithm over persons",
+    "squared_cv": "Squared coefficient of variation",
+    "task": "The task",
+    "transport": "The transport",
+    "tremor_deg": "Amplitude of the tremor",
+    "tremor_width_hz": "Bandwidth of the tremor",
+    "turn_step_mps2": "Acceleration for one degree per second of turn rate",
+    "walking_mean_mps": "Mean walking speed",
+    "walking_sd_mps": "Standard deviation of the walking speed over persons",
+    "warm_up_s": "Time before the measured part",
+    "warming_k": "Warming of the accelerometer during a run [K]",
+    "watchdog_s": "Time without a valid command after which the robot stops",
+    "width_m": "Extent along x",
+    "x_m": "Position, east",
+    "y_m": "Position, north",
+    "ceiling_m": "Height of rooms that do not state theirs",
+    "correlation_s": "Time constant of the correlation; 0: independent",
+}
+"""Meanings of keys that their models leave to the name."""
 _BEYOND = 2**53  # bounds of integers that only keep numbers storable
 
 
@@ -107,8 +180,18 @@ class Keys:
 
     def _row(self, key: str, value: Schema, model: Schema) -> list[str]:
         default = "required" if key in model.get("required", ()) else _default(value)
-        meaning = sentence(value.get("description", ""))
+        meaning = sentence(self._meaning(key, value))
         return [code(key), unit_of(key), self._type(value), default, meaning]
+
+    def _meaning(self, key: str, value: Schema) -> str:
+        """Return what a key says of itself, else what its part is, else what its name means."""
+        names = list(_referred(value))
+        part = self._defs.get(names[0], {}) if len(names) == 1 else {}
+        summary = str(part.get("description", "")).partition("\n\n")[0]
+        of_link = self._defs.get("LinkConfig", {}).get("properties", {}).get(key, {})
+        return str(
+            value.get("description") or summary or _PLAIN.get(key) or of_link.get("description", "")
+        )
 
     def _type(self, value: Schema) -> str:
         """Return the type with its bounds; a part as a link to its table."""
@@ -135,10 +218,9 @@ class Keys:
 
 
 def _default(value: Schema) -> str:
-    if "default" not in value or value["default"] in (None, {}, []):
+    if value.get("default") in (None, "", [], {}) or isinstance(value["default"], dict):
         return ""
-    text = json.dumps(value["default"], ensure_ascii=False)
-    return code(text) if len(text) <= 60 else "see the part"
+    return code(json.dumps(value["default"], ensure_ascii=False))
 
 
 def _bounds(value: Schema) -> str:

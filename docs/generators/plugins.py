@@ -12,7 +12,7 @@ from importlib import import_module
 from itertools import chain
 from typing import Any
 
-from dva_sim.cli.names import _key, _named
+from dva_sim.cli.names import key_of, named_as
 from dva_sim.testing.promises import TRIALS, CheckedKind
 from generators.markdown import code, prose, shell, table
 from generators.markdown import page as page_of
@@ -40,8 +40,8 @@ def _section(word: str, trial: CheckedKind) -> Iterator[str]:
     yield table(
         ["", ""],
         [
-            ["key", code(_key(plugins).partition(" ")[0]) + " " + _key(plugins).partition(" ")[2]],
-            ["named as", code(f"{plugins.key}: {_named(plugins)}")],
+            ["key", f"{code(plugins.key)} {key_of(plugins).partition(' ')[2]}"],
+            ["named as", code(f"{plugins.key}: {named_as(plugins)}")],
             ["folder", code(plugins.folder)],
             ["entry points", code(plugins.group)],
             ["base class", code(plugins.public)],

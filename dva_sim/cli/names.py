@@ -58,8 +58,11 @@ def plugin_lines() -> Iterator[str]:
 
 
 def _facts(word: str, plugins: Plugins[Any]) -> Iterator[tuple[str, str]]:
-    yield "key", _key(plugins)
-    yield "a file", f"{plugins.key}: {_named(plugins)}, looked for beside the configuration, here, "
+    yield "key", key_of(plugins)
+    yield (
+        "a file",
+        f"{plugins.key}: {named_as(plugins)}, looked for beside the configuration, here, ",
+    )
     yield "", f"and in {plugins.folder}"
     yield "entry points", f"{plugins.group}, for installed packages"
     yield "class", f"derived from {plugins.public}, with {plugins.needs}"
@@ -70,12 +73,14 @@ def _facts(word: str, plugins: Plugins[Any]) -> Iterator[tuple[str, str]]:
     yield "files there", ", ".join(_near_path(path) for path in plugins.files()) or "none"
 
 
-def _key(plugins: Plugins[Any]) -> str:
+def key_of(plugins: Plugins[Any]) -> str:
+    """Return the key that names a plug-in of a kind, and the file that has the key."""
     where = {"drive": "a robot profile", "figure": "a study, a list", "measure": "a study, a list"}
     return f"{plugins.key} of {where.get(plugins.kind, 'a scenario')}"
 
 
-def _named(plugins: Plugins[Any]) -> str:
+def named_as(plugins: Plugins[Any]) -> str:
+    """Return how a configuration writes the name of a user's plug-in."""
     return "[mine.py:Mine]" if plugins.kind in ("figure", "measure") else "mine.py:Mine"
 
 

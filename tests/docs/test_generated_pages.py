@@ -78,6 +78,11 @@ def test_every_key_is_there_once_for_each_part_that_has_it(kind, name):
     assert keys - first_cells(page(name)) == Counter()
 
 
+def test_every_key_has_a_meaning():
+    pages = "".join(map(page, ("scenario-keys", "study-keys", "profile-keys")))
+    assert re.findall(r"^\| `.*\|  \|$", pages, re.MULTILINE) == []
+
+
 def test_every_measure_is_there():
     found = first_cells(page("measures"))
     tables = [columns for model in MODELS.values() for columns in model.columns.values()]
