@@ -57,7 +57,7 @@ _PLAIN = {
     "mass_kg": "Mass [kg]",
     "max_acceleration_mps2": "Greatest acceleration of the motors",
     "max_age_s": "Age limit of a command, by the picture behind it",
-    "max_attempts": "Attempts after which an event is escalated",
+    "max_attempts": "Orders given for one event before it is escalated",
     "max_deceleration_mps2": "Greatest deceleration of the brakes",
     "max_speed_mps": "Top speed",
     "max_tilt_deg": "Largest tilt of the phone",
@@ -103,6 +103,7 @@ _PLAIN = {
     "correlation_s": "Time constant of the correlation; 0: independent",
 }
 """Meanings of keys that their models leave to the name."""
+_MANY = 4  # so many laws are named one by one
 _BEYOND = 2**53  # bounds of integers that only keep numbers storable
 
 
@@ -193,6 +194,11 @@ class Keys:
             value.get("description") or summary or _PLAIN.get(key) or of_link.get("description", "")
         )
 
+    def _keys_of(self, value: Schema) -> Schema:
+        """Return the keys of the part that a schema refers to."""
+        part = self._defs.get(str(value.get("$ref", "")).rpartition("/")[2], {})
+        return dict(part.get("properties", {}))
+
     def _type(self, value: Schema) -> str:
         """Return the type with its bounds; a part as a link to its table."""
         if "$ref" in value:
@@ -205,7 +211,13 @@ class Keys:
         if "const" in value:
             return code(value["const"])
         if options := value.get("anyOf") or value.get("oneOf") or value.get("allOf"):
-            kinds = [self._type(each) for each in options if each.get("type") != "null"]
+            options = [each for each in options if each.get("type") != "null"]
+            laws = [each for each in options if "law" in self._keys_of(each)]
+            if len(laws) > _MANY:
+                rest = [self._type(each) for each in options if each not in laws]
+                first = laws[0]["$ref"].rpartition("/")[2].lower()
+                return " or ".join([*rest, f"a [law](#{self._page}-{first})"])
+            kinds = [self._type(each) for each in options]
             return " or ".join(dict.fromkeys(kind for kind in kinds if kind))
         kind = value.get("type", "")
         if kind == "array":

@@ -25,18 +25,18 @@ class ExitCode(IntEnum):
 
     @property
     def meaning(self) -> str:
-        """In a few words, as help and README say it."""
+        """In a few words, as help and the documentation say it."""
         return _MEANINGS[self]
 
 
 _MEANINGS: Final = {
     ExitCode.OK: "done",
-    ExitCode.DOES_NOT_HOLD: "what was checked is invalid, or a live run broke a safety rule",
-    ExitCode.MISTAKE: "a mistake in the call or in a file, or what cannot be read or written",
-    ExitCode.RUNS_FAILED: "runs failed, which the same command tries again, or a class of yours",
+    ExitCode.DOES_NOT_HOLD: "a check failed, or a live run broke a safety rule",
+    ExitCode.MISTAKE: "usage error, invalid file, or a file that cannot be read or written",
+    ExitCode.RUNS_FAILED: "some runs failed (run again to retry), or a plug-in raised an error",
     ExitCode.GATE_FAILED: "a gate failed: `compare --fail-if` holds, or `validate` misses",
     ExitCode.INTERRUPTED: "stopped by Ctrl-C; what is finished is kept (`live`, `console`: 0)",
-    ExitCode.READER_GONE: "whoever read the output has gone, as in `| head`",
+    ExitCode.READER_GONE: "the reader of the output has ended, as in `| head`",
 }
 
 

@@ -1,13 +1,11 @@
 """Command line in this process: options, help and exit codes."""
 
-import re
 import shlex
 import subprocess
 import sys
 from itertools import takewhile
 
 import pytest
-from helpers.paths import ROOT
 from helpers.wording import unnamed
 from typer.main import get_command
 
@@ -137,10 +135,3 @@ def test_the_program_is_a_module_and_a_reader_that_goes_away_is_no_traceback():
     assert program.stderr.read() == b""
     assert program.wait() == ExitCode.READER_GONE
     program.stderr.close()
-
-
-def test_the_table_on_the_page_says_of_each_exit_code_what_the_help_says():
-    page = (ROOT / "README.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| (\d+) \| (.*) \|$", page, re.MULTILINE)
-    told = {int(code): meaning.replace("\\|", "|") for code, meaning in rows}
-    assert told == {int(code): code.meaning for code in ExitCode}
