@@ -134,8 +134,8 @@ def _picture(study: str) -> str:
 
 
 def _band(answer: KeptAnswer) -> str:
-    """Return the table of the contrast at each level, with its simultaneous band."""
-    if answer.contrast is None or not answer.over:
+    """Return the contrast at each level with its simultaneous band, or with its interval."""
+    if answer.contrast is None or not answer.rows:
         return ""
     unit = unit_of(answer.measure)
     head = f"{' minus '.join(answer.contrast)}{f' [{unit}]' if unit else ''}"
@@ -143,6 +143,10 @@ def _band(answer: KeptAnswer) -> str:
         [prose(_level(answer, n)), number(r.mean), f"{number(r.low)} to {number(r.high)}"]
         for n, r in enumerate(answer.rows)
     )
+    if not answer.over:
+        row = answer.rows[0]
+        found = f"{number(row.mean)} (95 % interval {number(row.low)} to {number(row.high)})"
+        return f"{code(answer.measure)}, {prose(head)}: {found}."
     title = f"Measure: {code(answer.measure)}, {prose(measure_name(answer.measure))}."
     return f"{title}\n\n{table([prose(factor_name(answer.over)), prose(head), '95 % band'], rows)}"
 
@@ -162,7 +166,8 @@ def _conditions(manifest: dict[str, Any]) -> Iterator[list[str]]:
         yield [f"part {code(part)}", prose(str(scenario.get("description") or ""))]
         yield from _models(scenario)
     if robustness := study.get("robustness"):
-        yield ["repeated over", code(json.dumps(robustness, ensure_ascii=False))]
+        told = (f"{key}: {code(value)}" for key, value in robustness.items() if value)
+        yield ["answer repeated over", "; ".join(told)]
     for level, note in ((study.get("map") or {}).get("notes") or {}).items():
         yield [f"extrapolated at {code(level)}", prose(note)]
 
