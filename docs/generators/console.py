@@ -15,8 +15,21 @@ from generators.markdown import code, prose, sentence, table
 from generators.markdown import page as page_of
 
 _HEAD = """\
-A program uses the console as a page does: it reads what pages show, and posts actions. It sends the
-console's token as `Authorization: Bearer TOKEN`."""
+A program uses the console as a page does: it reads what pages show and posts actions. It sends the
+token that `dva-sim console` printed. Each action has an id of the client's choice; the same id
+again does nothing twice, except an emergency.
+
+```console
+$ curl -H "Authorization: Bearer TOKEN" http://127.0.0.1:8765/api/state
+$ curl -H "Authorization: Bearer TOKEN" -H "Content-Type: application/json" \\
+       -d '{"id": "a-1", "action": "take", "arguments": {"robots": ["robot-1"]}}' \\
+       http://127.0.0.1:8765/api/actions
+```
+
+The answer holds `ok` and `text`. Actions that take something of their own, such as `take` or
+`guard_join`, also answer with a `key`: send it as `"key"` with each later action of that seat. A
+seat without a request for ten minutes is given up. To drive, open `/ws/state`, whose first line
+names the client and its key, then `/ws/drive?key=KEY`, and send `input` 25 times a second."""
 _ROLES = {
     Role.LOOK: "sees everything, changes nothing",
     Role.PHONE: "drives one robot from a phone, or is a guard's phone",

@@ -152,6 +152,7 @@ def test_every_action_and_route_of_the_console_is_there():
     assert len(paths) > 15
     fixed = [re.split(r"[{?]", path)[0].rstrip("/") for path in paths]
     assert [path for path in fixed if path not in text] == []
+    assert re.findall(r"^\| `(?:GET|POST|WS) .*\|  \|$", text, re.MULTILINE) == []
 
 
 def test_every_topic_of_a_recording_is_there(tmp_path):

@@ -161,7 +161,7 @@ class Pages:
         self._files = files
 
     async def index(self, request: Request) -> Response:
-        """`GET /` and others; a token in the address becomes a cookie and leaves the address."""
+        """`GET /`: the page; a token in the address becomes a cookie and leaves the address."""
         path, token = request.url.path, request.query_params.get("token")
         if path == "/" and request.scope[ROLE] is Role.PHONE:
             path = "/phone"
@@ -175,7 +175,7 @@ class Pages:
         return HTMLResponse(found.data if found else _NO_PAGE, headers=NOT_KEPT)
 
     async def file(self, request: Request) -> Response:
-        """`GET /static/NAME`."""
+        """`GET /static/NAME`: a file of the pages."""
         found = self._files.find(request.path_params["name"])
         if found is None:
             raise HTTPException(404)
@@ -185,13 +185,13 @@ class Pages:
         return Response(found.data, headers=headers, media_type=found.kind)
 
     async def health(self, _: Request) -> Response:
-        """`GET /healthz`: whether the simulation runs."""
+        """`GET /healthz`: 200 while the simulation runs, else 503."""
         runs = self._simulation.runs
         body = {"status": "ok" if runs else "the simulation does not run"}
         return JSONResponse(body, 200 if runs else 503, headers=NOT_KEPT)
 
     async def stream(self, request: Request) -> Response:
-        """`GET /camera/LABEL.mjpg`."""
+        """`GET /camera/LABEL.mjpg`: a stream of JPEGs of a robot's camera."""
         robot = self._robot(request)
         if not self._cameras.draws:
             return problem(503, "no picture: nobody draws")
@@ -203,7 +203,7 @@ class Pages:
         return PictureStream(self._cameras, viewer)
 
     async def still(self, request: Request) -> Response:
-        """`GET /camera/LABEL.jpg`."""
+        """`GET /camera/LABEL.jpg`: one picture of a robot's camera."""
         robot = self._robot(request)
         viewer = self._cameras.admit(robot, request.scope[ROLE])
         picture = None if viewer is None else await self._cameras.one(viewer)

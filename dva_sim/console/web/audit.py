@@ -46,7 +46,7 @@ class AuditPages:
         self._path = path
 
     async def rows(self, request: Request) -> Response:
-        """`GET /api/audit?after=N`: the rows after a number, up to a thousand."""
+        """`GET /api/audit?after=N`: rows of the audit log after a number, up to a thousand."""
         after = request.query_params.get("after", "0")
         if not after.isascii() or not after.isdigit() or len(after) > 12:
             return problem(400, "after should be a whole number")
@@ -64,15 +64,15 @@ class AuditPages:
         )
 
     async def check(self, _: Request) -> Response:
-        """`GET /api/audit/check`: whether the chain holds, and the first row that is wrong."""
+        """`GET /api/audit/check`: the first row at which the chain of hashes breaks, if any."""
         return await self._read(_checked)
 
     async def as_csv(self, _: Request) -> Response:
-        """`GET /api/audit.csv`."""
+        """`GET /api/audit.csv`: all rows of the audit log."""
         return await self._read(lambda path: _file("csv", "text/csv", csv_of(rows_of(path))))
 
     async def as_json(self, _: Request) -> Response:
-        """`GET /api/audit.json`."""
+        """`GET /api/audit.json`: all rows of the audit log."""
         return await self._read(
             lambda path: _file("json", "application/json", json_of(rows_of(path)))
         )

@@ -41,7 +41,7 @@ class LogRequests:
         self._logs = hub.simulation.state.logs
 
     async def lines(self, request: Request) -> Response:
-        """`GET /api/logs/NAME?before=N&...`: matching lines, in the form that pages get."""
+        """`GET /api/logs/NAME?before=N&...`: lines of a device's log that match."""
         log, before = self._log(request), request.query_params.get("before", "")
         if before and not (before.isascii() and before.isdigit() and len(before) < 12):
             return problem(400, "before should be a whole number")
@@ -56,7 +56,7 @@ class LogRequests:
         return JSONResponse({"lines": lines, "total": log.newest}, headers=NOT_KEPT)
 
     async def entry(self, request: Request) -> Response:
-        """`GET /api/logs/NAME/N`: one exchange whole."""
+        """`GET /api/logs/NAME/N`: one exchange, whole."""
         entry = self._log(request).entries.get(int(request.path_params["number"]))
         if entry is None:
             return problem(404, "this exchange is not kept any more")
@@ -64,7 +64,7 @@ class LogRequests:
         return JSONResponse(body, headers=NOT_KEPT)
 
     async def export(self, request: Request) -> Response:
-        """`GET /api/logs/NAME/export?...`: what matches, as an archive of messages."""
+        """`GET /api/logs/NAME/export?...`: lines that match, as an archive of messages."""
         log = self._log(request)
         try:
             wanted = LogFilter.of(_given(request))

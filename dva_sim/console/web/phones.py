@@ -58,18 +58,18 @@ class PhonePages:
         self._door, self._files = door, files
 
     async def about(self, _: Request) -> Response:
-        """`GET /api/phones`: the address, for who may drive."""
+        """`GET /api/phones`: the address for phones."""
         return JSONResponse({"address": self._door and self._door.address}, headers=NOT_KEPT)
 
     async def code(self, _: Request) -> Response:
-        """`GET /api/phones.svg`: the same, for a camera."""
+        """`GET /api/phones.svg`: the same address as a QR code."""
         if self._door is None:
             return _none()
         picture = svg(self._door.address)
         return Response(picture, headers=NOT_KEPT, media_type="image/svg+xml")
 
     async def trust(self, _: Request) -> Response:
-        """`GET /trust`: how to trust this console, for everybody."""
+        """`GET /trust`: how a phone comes to trust this console."""
         found = self._files.find("trust.html")
         if found is None or self._door is None:
             return _none()

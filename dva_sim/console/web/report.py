@@ -24,7 +24,7 @@ class StudyReport:
         self._path = path
 
     async def page(self, _: Request) -> Response:
-        """`GET /report`."""
+        """`GET /report`: the report of a study that is shown."""
         try:
             data = None if self._path is None else self._path.read_bytes()
         except OSError:

@@ -92,12 +92,12 @@ class Rest:
         self._hub, self._simulation = hub, hub.simulation
 
     async def state(self, _: Request) -> Response:
-        """`GET /api/state`."""
+        """`GET /api/state`: the state of the run, with units in the names."""
         body = state_of(self._simulation.state, len(self._hub.clients.here()))
         return JSONResponse(body, headers=NOT_KEPT)
 
     async def site(self, request: Request) -> Response:
-        """`GET /api/site`: the plan, which does not change."""
+        """`GET /api/site`: the plan of the site, which does not change."""
         scene = self._simulation.state.scene
         if scene is None or "site" not in scene:
             return problem(503, "nothing has begun")
@@ -110,7 +110,7 @@ class Rest:
         return response
 
     async def story(self, request: Request) -> Response:
-        """`GET /api/story?from=N`: lines from a number on, as far as they are kept."""
+        """`GET /api/story?from=N`: lines of the story from a number on, as far as they are kept."""
         state = self._simulation.state
         asked = request.query_params.get("from", "0")
         if not asked.isascii() or not asked.isdigit() or len(asked) > 9:
@@ -122,7 +122,7 @@ class Rest:
         return JSONResponse(body, headers=NOT_KEPT)
 
     async def action(self, request: Request) -> Response:
-        """`POST /api/actions`."""
+        """`POST /api/actions`: the answer to an action; repeating its id does nothing twice."""
         try:
             said, role = await body_of_request(request), request.scope[ROLE]
             name = said.get("action")
@@ -142,7 +142,7 @@ class Rest:
             return problem(400, str(error))
 
     async def emergency(self, request: Request) -> Response:
-        """`POST /api/emergency`: all robots, or some; before all else."""
+        """`POST /api/emergency`: stops all robots, or some, before anything else that waits."""
         try:
             said, role = await body_of_request(request), request.scope[ROLE]
             asked = asked_of("emergency", self._robots_of(said), self._simulation.labels)
