@@ -102,3 +102,13 @@ def test_links_lead_to_pages_and_to_places_on_them(site):
             if not file.exists() or (place and file in ids and place not in ids[file]):
                 broken.append(f"{page.relative_to(site)}: {link}")
     assert broken == []
+
+
+def test_every_make_verb_and_script_on_a_page_is_there():
+    verbs = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
+    texts = [path.read_text(encoding="utf-8") for path in WRITTEN]
+    asked = {verb for text in texts for verb in re.findall(r"`make ([a-z-]+)", text)}
+    scripts = {file for text in texts for file in re.findall(r"bin/python ([\w/]+\.py)", text)}
+    assert len(asked) > 3
+    assert asked - verbs == set()
+    assert [file for file in scripts if not (ROOT / file).exists()] == []

@@ -161,7 +161,7 @@ class MovingMedian(Filter):
 
 
 class OnePole(Filter):
-    """A first-order low-pass: the newest samples count most, older ones ever less.
+    """A first-order low-pass filter: older samples count less and less.
 
     Args:
         period: Mean time between two samples [s].

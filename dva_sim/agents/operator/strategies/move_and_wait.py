@@ -135,7 +135,7 @@ def _apart(route: Route, here: Pair, along: float, way: float) -> float:
 
 
 class MoveAndWait(Strategy):
-    """Makes one open-loop move after the other, and waits until it has seen each one's result.
+    """Makes an open-loop move, waits until its result is seen, and moves again.
 
     A move of a robot turns towards a place ahead and goes there straight, as far as the person's
     errors of heading and hand leave it near its way. A move of a cursor goes all the way to the

@@ -26,7 +26,7 @@ from dva_sim.kernel import options
 
 
 class Predictor(Strategy):
-    """Moves the picture on by the commands of the last delay, and steers by that.
+    """Extrapolates the picture by its own commands of the last delay, and steers by that.
 
     Its model is kinematics alone: what is asked for happens, at once. The delay is what the person
     takes it to be. Of each command the model makes the share `quality`; the share that is left of
@@ -145,7 +145,7 @@ class Truth(Generic[S]):
 
 @final
 class Oracle:
-    """`pursuit` from where present requests take effect: the reference without delay.
+    """`pursuit` with the true state and without delay: a reference, not a person.
 
     It is no `Strategy`, as it sees nothing. Nothing derives from it: it alone is told the truth.
 

@@ -43,11 +43,11 @@ LARGEST = 0.07  # source: Salvucci 2006: direction of the near point that counts
 
 
 class Pursuit(PurePursuit, Strategy):
-    """Aims at a point ahead on the route, as `PurePursuit` has it."""
+    """Steers towards a point ahead on the route (pure pursuit)."""
 
 
 class TwoPoint(Pursuit):
-    """Corrects the turn rate by how the directions of two points change.
+    """Corrects the turn rate by changes in the directions of a near and a far point.
 
     Speed, stopping and turning on the spot are those of `Pursuit`, and so is pointing.
     """
