@@ -21,7 +21,7 @@ _HEAD = """\
 
 def page() -> str:
     """Return the page in Markdown."""
-    program = get_command(app)
+    program: Any = get_command(app)
     context = _context(program, "dva-sim")
     blocks = [_HEAD, "## dva-sim", prose(program.help or ""), _options(program, context)]
     for title, commands in program.panels.items():

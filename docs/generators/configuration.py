@@ -221,7 +221,7 @@ class Keys:
             return " or ".join(dict.fromkeys(kind for kind in kinds if kind))
         kind = value.get("type", "")
         if kind == "array":
-            items = value.get("items") or next(iter(value.get("prefixItems", [])), {})
+            items: Schema = value.get("items") or next(iter(value.get("prefixItems", [])), {})
             return f"list of {self._type(items)}" if items else "list"
         if kind == "object":
             inner = value.get("additionalProperties")

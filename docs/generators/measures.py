@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 from dva_sim.kernel.measure import Measure
 from dva_sim.simulation.models import MODELS
@@ -29,8 +30,8 @@ def _covariates() -> Iterator[str]:
         "A study names these under `measures` to have them as columns, and under `covariates` to "
         "adjust its answer for them."
     )
-    shipped = {name: kind.about for name, kind in PLUGINS.shipped.items()}
-    yield _table(shipped.values())
+    shipped: list[Any] = list(PLUGINS.shipped.values())
+    yield _table(kind.about for kind in shipped)
 
 
 def _models() -> Iterator[str]:
@@ -40,7 +41,7 @@ def _models() -> Iterator[str]:
             yield _table(columns)
 
 
-def _table(columns: object) -> str:
+def _table(columns: Iterable[Measure]) -> str:
     return table(["column", "unit", "title", "better", "meaning"], map(_row, columns))
 
 

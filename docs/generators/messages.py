@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from typing import Any
 
 from lxml import etree
 
@@ -11,6 +12,7 @@ from dva_sim.protocol.limits import schema_file
 from generators.markdown import code, prose, table
 from generators.markdown import page as page_of
 
+Node = Any  # elements and comments; the stubs of lxml know elements alone
 _XS = "{http://www.w3.org/2001/XMLSchema}"
 _SINCE = re.compile(r"since (\d+\.\d+)")
 _KINDS = ("EmergencyMsg", "HBMsg", "RegMsg", "SimpleMsg")
@@ -34,7 +36,7 @@ mean and when a receiver obeys them."""
 
 def page() -> str:
     """Return the page in Markdown."""
-    schema = etree.parse(str(schema_file())).getroot()
+    schema: Node = etree.parse(str(schema_file())).getroot()
     types = {each.get("name"): each for each in schema if each.tag == f"{_XS}complexType"}
     blocks = [_HEAD.format(version=schema.get("version"))]
     for title, names in (
@@ -51,20 +53,18 @@ def page() -> str:
 
 def names() -> set[str]:
     """Return the names of all elements that the schema declares."""
-    schema = etree.parse(str(schema_file())).getroot()
+    schema: Node = etree.parse(str(schema_file())).getroot()
     return {each.get("name") for each in schema.iter(f"{_XS}element") if each.get("name")}
 
 
-def _section(name: str, node: etree._Element, schema: etree._Element) -> Iterator[str]:
+def _section(name: str, node: Node, schema: Node) -> Iterator[str]:
     yield f"### {name}"
     if since := _since(node):
         yield f"Since version {since}."
     yield table(["element", "type", "count", "since"], _rows(node, schema))
 
 
-def _rows(
-    node: etree._Element, schema: etree._Element, above: str = "", known: str = ""
-) -> Iterator[list[str]]:
+def _rows(node: Node, schema: Node, above: str = "", known: str = "") -> Iterator[list[str]]:
     """Yield a row for each element, those of an unnamed type below their parent.
 
     Args:
@@ -92,12 +92,12 @@ def _link(type_: str | None) -> str:
     return code(type_.removeprefix("xs:"))
 
 
-def _count(element: etree._Element) -> str:
+def _count(element: Node) -> str:
     least, most = element.get("minOccurs", "1"), element.get("maxOccurs", "1")
     return least if least == most else f"{least} to {most}"
 
 
-def _since(node: etree._Element) -> str:
+def _since(node: Node) -> str:
     """Return the version in the comment right above an element or a type."""
     before = node.getprevious()
     while before is not None and before.tag is etree.Comment:
@@ -107,18 +107,18 @@ def _since(node: etree._Element) -> str:
     return _UNMARKED.get(node.get("name"), "")
 
 
-def _values(schema: etree._Element) -> Iterator[list[str]]:
+def _values(schema: Node) -> Iterator[list[str]]:
     for each in schema.iter(f"{_XS}simpleType"):
         if each.get("name"):
             yield [code(each.get("name")), "; ".join(_facets(each)), _since(each)]
 
 
-def _word(value: etree._Element) -> str:
+def _word(value: Node) -> str:
     since = _since(value)
     return code(value.get("value")) + (f" (since {since})" if since else "")
 
 
-def _facets(node: etree._Element) -> Iterator[str]:
+def _facets(node: Node) -> Iterator[str]:
     restriction = node.find(f"{_XS}restriction")
     if restriction is None:
         return

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ast
 import inspect
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
 from itertools import chain
 from typing import Any
@@ -36,7 +36,7 @@ def _section(word: str, trial: CheckedKind) -> Iterator[str]:
     plugins = trial.load_plugins()
     shipped = sorted(plugins.shipped.keys() - plugins.hidden)
     yield f"## {trial.classes.capitalize()}"
-    yield prose(inspect.getdoc(plugins.base).partition("\n\n")[0])
+    yield prose((inspect.getdoc(plugins.base) or "").partition("\n\n")[0])
     yield table(
         ["", ""],
         [
@@ -74,7 +74,7 @@ def _cases(part: ast.AST) -> Iterator[ast.Tuple]:
     """Yield the pairs of a promise and a case that a part yields, appends or returns."""
     for node in ast.walk(part):
         if isinstance(node, ast.Yield):
-            held = [node.value]
+            held: Sequence[ast.AST | None] = [node.value]
         elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "append":
             held = node.args
         elif isinstance(node, ast.Tuple) and len(node.elts) == 1:
@@ -94,6 +94,8 @@ def _words(node: ast.expr, known: Mapping[str, Any]) -> Iterator[str]:
         yield from (*_words(node.body, known), *_words(node.orelse, known))
     elif isinstance(node, ast.JoinedStr):
         yield "".join(
-            str(v.value) if isinstance(v, ast.Constant) else ast.unparse(v.value).upper()
+            ast.unparse(v.value).upper()
+            if isinstance(v, ast.FormattedValue)
+            else ast.literal_eval(v)
             for v in node.values
         )

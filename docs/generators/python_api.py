@@ -17,8 +17,9 @@ bytes. Errors are listed under [exit codes](exit-codes.md)."""
 
 def page() -> str:
     """Return the page in Markdown, with directives for Sphinx's autodoc."""
-    functions = [name for name in dva_sim.__all__ if name[0].islower()]
-    classes = [name for name in dva_sim.__all__ if name[0].isupper()]
+    public = vars(dva_sim)["__all__"]
+    functions = [name for name in public if name[0].islower()]
+    classes = [name for name in public if name[0].isupper()]
     bases = [trial.load_plugins().public for trial in TRIALS.values()]
     checks = [f"dva_sim.testing.{t.module}.check_{t.kind}" for t in TRIALS.values()]
     return page_of(
