@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from dva_sim.cli.names import everything
-from dva_sim.experiments.report.kept_answers import KeptAnswer, all_kept
+from dva_sim.experiments.report.kept_answers import HISTORY, KeptAnswer, all_kept
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import capital, number, quantity
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
@@ -50,7 +51,26 @@ def study_page(name: str, question: str, answer: KeptAnswer | None, folder: Path
         folder: Folder of kept answers and their manifests.
     """
     blocks = _open(name) if answer is None else _answered(answer, folder)
-    return page_of(name, f"*{prose(question)}*", *blocks)
+    return page_of(name, f"*{prose(question)}*", *blocks, *_history(name, folder))
+
+
+def _history(study: str, folder: Path) -> Iterator[str]:
+    """Yield the table of earlier answers, level by level."""
+    file = folder / HISTORY
+    text = file.read_text(encoding="utf-8") if file.exists() else ""
+    rows = [
+        [line["version"], line["date"], prose(line["level"]), *_shown(line)]
+        for line in csv.DictReader(text.splitlines())
+        if line["study"] == study
+    ]
+    if rows:
+        yield "## Earlier answers"
+        yield table(["version", "date", "level", "difference", "95 % band"], rows)
+
+
+def _shown(line: dict[str, str]) -> list[str]:
+    mean, low, high = (number(float(line[key])) for key in ("mean", "low", "high"))
+    return [mean, f"{low} to {high}"]
 
 
 def questions() -> dict[str, str]:

@@ -1,5 +1,6 @@
 """Generated pages of the reference name everything that the program has."""
 
+import csv
 import json
 import re
 from collections import Counter
@@ -18,7 +19,7 @@ from dva_sim.cli.commands import name_of
 from dva_sim.cli.program import app, call
 from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.experiments.report.glossary import GLOSSARY
-from dva_sim.experiments.report.kept_answers import all_kept
+from dva_sim.experiments.report.kept_answers import HISTORY, all_kept
 from dva_sim.kernel.errors import ExitCode
 from dva_sim.network.patterns import PATTERNS
 from dva_sim.simulation.models import MODELS
@@ -201,3 +202,13 @@ def test_every_study_has_a_page_and_every_kept_answer_is_on_it():
         assert answer.date in told
         assert f"{answer.runs} runs" in told
         assert f"{answer.version}, {answer.date}" in summary
+
+
+def test_every_earlier_answer_is_on_the_page_of_its_study():
+    with (results.KEPT / HISTORY).open(encoding="utf-8") as file:
+        lines = Counter(line["study"] for line in csv.DictReader(file))
+    pages = dict(results.pages())
+    assert lines
+    for study, count in lines.items():
+        table = pages[f"results/{study}.md"].partition("## Earlier answers")[2]
+        assert table.count("\n| ") == count + 2
