@@ -47,6 +47,41 @@ def test_every_link_leads_to_a_file_and_to_a_heading(page):
     assert broken == []
 
 
+def tables(text):
+    """Tables of a text: for each the number of cells of each of its lines."""
+    lines = [line.strip() for line in re.sub(r"```.*?```", "", text, flags=re.DOTALL).splitlines()]
+    found = [[]]
+    for line in lines:
+        if line.startswith("|"):
+            found[-1].append(len(re.findall(r"(?<!\\)\|", line)) - 1)
+        elif found[-1]:
+            found.append([])
+    return [table for table in found if table]
+
+
+@pytest.mark.parametrize(
+    ("text", "counts"),
+    [("| a | b |\n|---|---|\n| 1 | 2 |", [[2, 2, 2]]), ("| a |\n|---|\n| `x|` |", [[1, 1, 2]])],
+)
+def test_a_pipe_within_a_cell_counts_as_a_cell(text, counts):
+    assert tables(text) == counts
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_every_line_of_a_table_has_as_many_cells_as_its_head(page):
+    found = tables(page.read_text(encoding="utf-8"))
+    assert [table for table in found if len(set(table)) > 1] == []
+
+
+def test_every_generated_table_is_whole():
+    broken = [
+        path
+        for path, text in generators.all_pages()
+        if any(len(set(table)) > 1 for table in tables(text))
+    ]
+    assert broken == []
+
+
 def test_the_specification_is_the_one_that_the_site_shows():
     shown = generators.PAGES["reference/protocol.md"]()
     assert headings(SPECIFICATION) > {"sessions", "keys", "a-client"}
