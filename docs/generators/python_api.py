@@ -9,6 +9,21 @@ import dva_sim
 from dva_sim.testing.promises import TRIALS
 from generators.markdown import page as page_of
 
+_READERS = ("read_recording", "read_lapse")
+_VALUES = {
+    "dva_sim.core.dispatch": (
+        *("Situation", "Task", "Responder", "Assignment", "Announcement", "Relocation"),
+    ),
+    "dva_sim.agents.operator.strategies": (
+        *("Intent", "View", "Route", "Person", "Reach", "PointView", "PathView"),
+    ),
+    "dva_sim.network.patterns": ("Line",),
+    "dva_sim.network.middleware": ("Rendezvous", "TransportEnd"),
+    "dva_sim.worlds.hazards": ("HazardField", "Conditions"),
+    "dva_sim.kernel.measure": ("Measure",),
+    "dva_sim.experiments.report.figures": ("StudyView", "Drawn"),
+}
+"""Classes of what plug-ins receive and return, by the package that they are imported from."""
 _HEAD = """\
 `import dva_sim` loads nothing else: a function imports what it needs when it is called. The
 functions take the options of the [commands](command-line.md) of the same name and write the same
@@ -32,6 +47,12 @@ def page() -> str:
         "## Base classes of plug-ins",
         "[Plug-ins](plugins.md) says where a file is looked for, and what each kind promises.",
         _directives("autoclass", bases, members=True),
+        "## Values that plug-ins receive and return",
+        _directives(
+            "autoclass", [f"{m}.{name}" for m, names in _VALUES.items() for name in names], True
+        ),
+        "## Recordings",
+        _directives("autofunction", [f"dva_sim.recordings.reading.{n}" for n in _READERS]),
         "## Checks for tests of your own",
         "`dva-sim check KIND NAME` calls these.",
         _directives("autofunction", checks),
