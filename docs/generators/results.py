@@ -18,6 +18,11 @@ from generators.markdown import page as page_of
 
 KEPT = ROOT / "experiments/answers"
 PICTURES = ROOT / "experiments/pictures"
+_FIXED = (
+    *("site.name", "robot.profile", "phone.profile", "operator.strategy", "operator.population"),
+    "dispatch.policy",
+)
+"""Keys whose values a page of results names, unless the study varies them."""
 _HEAD = """\
 What the shipped studies answered, by which version and when. Each answer is kept in
 `experiments/answers` with the manifest of its run. `dva-sim answers` repeats a few runs of each
@@ -178,13 +183,16 @@ def _level(answer: KeptAnswer, at: int) -> str:
 def _conditions(manifest: dict[str, Any]) -> Iterator[list[str]]:
     """Yield what was varied and what was held fixed, as the manifest has it."""
     study = manifest["study"]
+    varied = set(study["factors"])
+    for levels in study["treatments"].values():
+        varied.update(key for changes in levels.values() for key in changes)
     for factor, levels in study["factors"].items():
         yield [f"varied: {code(factor)}", ", ".join(code(level) for level in levels)]
     for key, level in ((study.get("answer") or {}).get("within") or {}).items():
         yield [f"answer at {code(key)}", code(level)]
     for part, scenario in manifest["scenarios"].items():
         yield [f"part {code(part)}", prose(str(scenario.get("description") or ""))]
-        yield from _models(scenario)
+        yield from _models(scenario, varied)
     if robustness := study.get("robustness"):
         told = (f"{key}: {code(value)}" for key, value in robustness.items() if value)
         yield ["answer repeated over", "; ".join(told)]
@@ -192,15 +200,11 @@ def _conditions(manifest: dict[str, Any]) -> Iterator[list[str]]:
         yield [f"extrapolated at {code(level)}", prose(note)]
 
 
-def _models(scenario: dict[str, Any]) -> Iterator[list[str]]:
-    for key in (
-        "site.name",
-        "robot.profile",
-        "phone.profile",
-        "operator.strategy",
-        "dispatch.policy",
-    ):
+def _models(scenario: dict[str, Any], varied: set[str]) -> Iterator[list[str]]:
+    """Yield the profiles and plug-ins of a scenario that no treatment changes."""
+    for key in _FIXED:
         part, _, name = key.partition(".")
-        value = (scenario.get(part) or {}) if isinstance(scenario.get(part), dict) else {}
-        if value.get(name) is not None:
-            yield [code(key), code(value[name])]
+        held = scenario.get(part)
+        value = held.get(name) if isinstance(held, dict) else None
+        if value is not None and key not in varied:
+            yield [code(key), code(value)]
