@@ -12,6 +12,7 @@ from dva_sim.cli.names import everything
 from dva_sim.experiments.report.kept_answers import HISTORY, KeptAnswer, all_kept
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import capital, number, quantity
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
 from generators.markdown import ROOT, code, prose, shell, table
 from generators.markdown import page as page_of
@@ -149,7 +150,11 @@ def _answered(answer: KeptAnswer, folder: Path) -> Iterator[str]:
 
 
 def _calls(study: str) -> list[str]:
-    return [f"dva-sim run {study} --quick -o results/quick", f"dva-sim run {study}"]
+    """Return the commands that run a study: how long it takes, its small version, all of it."""
+    file = next(e.file for e in everything("studies")["studies"] if e.name == study)
+    has_small = "quick" in load_yaml(Path(str(file))).data
+    small = [f"dva-sim run {study} --quick -o results/quick"] if has_small else []
+    return [f"dva-sim run {study} --dry-run", *small, f"dva-sim run {study}"]
 
 
 def _picture(study: str) -> str:

@@ -204,6 +204,14 @@ def test_every_study_has_a_page_and_every_kept_answer_is_on_it():
         assert f"{answer.version}, {answer.date}" in summary
 
 
+def test_a_page_offers_the_small_version_of_a_study_that_has_one():
+    for path, text in results.pages():
+        file = ROOT / "experiments" / f"{path.removeprefix('results/').removesuffix('.md')}.yaml"
+        if file.exists():
+            has_small = re.search(r"^quick:", file.read_text(encoding="utf-8"), re.MULTILINE)
+            assert ("--quick" in text) == bool(has_small), path
+
+
 def test_every_earlier_answer_is_on_the_page_of_its_study():
     with (results.KEPT / HISTORY).open(encoding="utf-8") as file:
         lines = Counter(line["study"] for line in csv.DictReader(file))
