@@ -1,4 +1,4 @@
-"""Draws `docs/pictures/console.png`: the console while a person drives two robots over 500 ms.
+"""Draws `docs/pictures/console.png`: the console while a person drives two robots, 1 s away.
 
 It needs the development environment and Chromium: `.venv/bin/python docs/console_picture.py`.
 """
@@ -57,7 +57,7 @@ def drive(page: Page) -> None:
     page.get_by_role("button", name="Stop", exact=True).click()
     expect(page.get_by_role("status", name="Mode")).to_have_text("robot-1 Idle, robot-2 Idle")
     page.get_by_label("Pattern of robot-1").select_option("req-rep")
-    page.get_by_role("button", name="500 ms").click()
+    page.get_by_role("button", name="1 s", exact=True).click()
     hold(page, "ArrowUp", lambda x, _: x > DOOR_M)
     page.keyboard.up("ArrowUp")
     hold(page, "ArrowLeft", lambda _, heading: heading > LOOKS_IN_RAD)
