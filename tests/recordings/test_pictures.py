@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from helpers.paths import ROOT
 from helpers.wording import unnamed
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -209,16 +208,6 @@ def test_lines_above_and_below_the_maps_do_not_meet(race, drill, name, inset):
     for number, box in enumerate(boxes):
         assert box.beyond(page) < 3, lines[number]
         assert not any(box.overlap(other) > 2 for other in boxes[number + 1 :]), lines[number]
-
-
-def test_the_film_of_the_first_page_is_small_and_as_wide_as_the_page_and_ends_with_both_robots():
-    film = ROOT / "experiments/pictures/one-second-away.gif"
-    assert film.stat().st_size < 1_000_000
-    with Image.open(film) as gif:
-        assert gif.width == 840
-        gif.seek(gif.n_frames - 1)
-        for side in halves(np.asarray(gif.convert("RGB"))):
-            assert pixels_of(side, colours.ROBOT_MODES["Teleoperation"]) > 40
 
 
 # --- what a picture shows ------------------------------------------------------------------
