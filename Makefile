@@ -12,7 +12,7 @@ DEMO := results/demo
 SITE := build/docs
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-extras test-long test-soak storms tools check docs same-bytes bench goals clean
+.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-extras test-long test-soak storms tools check docs release-check same-bytes bench goals clean
 
 # Compiled files are kept whatever a shell says: without them each program that a test starts
 # compiles all modules again.
@@ -26,7 +26,7 @@ help:  ## say what can be made
 
 setup: $(DEV)  ## the development environment, in .venv
 
-demo: $(RUNTIME)  ## one drive as picture and film, and the main study's small version: a minute
+demo: $(RUNTIME)  ## one drive as picture and film, and the main study's small version: two minutes
 	@$(BIN)/dva-sim demo -o $(DEMO)
 
 console: $(RUNTIME)  ## drive robots yourself, on a page in the browser; Ctrl-C ends it
@@ -83,6 +83,9 @@ check: $(DEV)  ## lint, format, types, import contracts, prose
 docs: $(DOCS)  ## the documentation as web pages, in build/docs; needs no network
 	@$(BIN)/python -m sphinx --fail-on-warning --quiet docs $(SITE)
 	@echo "Open $(SITE)/index.html"
+
+release-check: $(DEV)  ## the wheel, built, installed in an empty environment and tried
+	@$(BIN)/python tests/release_check.py
 
 same-bytes: $(DEV)  ## whether results are those of another version: make same-bytes AGAINST=COMMIT
 	@$(BIN)/python tests/same_bytes.py --against $(or $(AGAINST),HEAD)

@@ -33,7 +33,7 @@ _INTRODUCTION: Final = """\
 An operator drives a robot to a fire by tilting a phone. Commands go to the robot by REQ/REP, which
 waits for an answer to each, or by PUB/SUB, of which the robot obeys the newest ("latest-wins").
 What does that change if the network is late? First one drive, with one second of delay each way;
-then the small version of the study that asks it: about a minute on two cores, 70 s of CPU time.
+then the small version of the study that asks it: one to two minutes on two cores.
 """
 
 

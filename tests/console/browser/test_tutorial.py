@@ -1,0 +1,22 @@
+"""The page for driving has what the tutorial tells one to press and to look at."""
+
+import re
+
+from helpers.paths import ROOT
+from playwright.sync_api import expect
+
+TUTORIAL = (ROOT / "docs/tutorials/drive.md").read_text(encoding="utf-8")
+DESK = TUTORIAL.partition("## Drive\n")[2].partition("## Tilt your phone")[0]
+
+
+def test_everything_that_the_tutorial_names_in_bold_is_on_the_page(fake, shared):
+    page = shared(fake("--robots", "2", "--people", "4", "--site", "caparica").drive, "drive")
+    named = set(re.findall(r"\*\*([^*]+)\*\*", DESK)) - {"REQ/REP"}
+    assert len(named) > 10
+    page.get_by_role("button", name="robot-2 beside it").click()
+    expect(page.get_by_text(re.compile("^Latency"))).to_be_visible()
+    shown = re.sub(r"\s+", " ", page.locator("body").inner_text())
+    pressed = {"robot-2 beside it"}  # which is there no more
+    assert [name for name in named - pressed if name not in shown] == []
+    patterns = page.get_by_label("Pattern of robot-1").locator("option").all_text_contents()
+    assert {"REQ/REP", "latest-wins PUB/SUB"} <= set(patterns)
