@@ -57,7 +57,7 @@ class Block(NamedTuple):
 
     @property
     def is_parsed_only(self) -> bool:
-        """Whether the block is only parsed."""
+        """The block is parsed and not run."""
         return self.order.startswith("parse")
 
 
