@@ -32,6 +32,8 @@ def version_faults(root: Path) -> list[str]:
     read = lambda name: (root / name).read_text(encoding="utf-8")  # noqa: E731
     version = tomllib.loads(read("pyproject.toml"))["project"]["version"]
     faults = []
+    if f'\n__version__ = "{version}"\n' not in read("dva_sim/__init__.py"):
+        faults.append(f"dva_sim/__init__.py has another version than {version}")
     if f"\nversion: {version}\n" not in read("CITATION.cff"):
         faults.append(f"CITATION.cff has another version than {version}")
     if not re.search(
