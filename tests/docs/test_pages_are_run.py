@@ -14,8 +14,19 @@ LENGTH = {"tutorials": (700, 1200), "how-to": (100, 550)}  # words
 OVER_A_LINK = ("bad-link", "own-transport")  # real packets: Linux, and the rights to make networks
 
 
+WHOLE_STUDIES = ("first-answer", "own-study", "own-policy")
+
+
 @pytest.mark.system
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(
+            page, id=page.stem, marks=[pytest.mark.soak] if page.stem in WHOLE_STUDIES else []
+        )
+        for page in PAGES
+    ],
+)
 def test_a_page_does_what_it_says(page, tmp_path):
     if page.stem in OVER_A_LINK:
         need_link()
