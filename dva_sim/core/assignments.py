@@ -73,19 +73,21 @@ class Rules:
     Attributes:
         escalate_after: An event that has waited so long for somebody is escalated [s]. 0: at
             once if nobody is free; infinite: never.
-        containment: Whether a confirmed event also needs a person who deals with it.
+        containment: True if a confirmed event also needs a person to contain it.
         most_waiting: More events than that do not wait: the newest is escalated at once.
         merge_distance: Reports of one kind nearer than this are one event [m]; 0: never.
         max_attempts: Orders given for one event before it is escalated.
-        order_limit: Who has not settled an event so long after the order gives it back [s].
+        order_limit: Time limit of an order; a responder who has not settled the event by then gives
+            it back [s].
         depart_within: So does who has taken an order up and not set out after this [s].
         still_within: And who is on the way and has not moved for so long [s].
-        arrived_within: Who says that it is there counts as on the way until it has told a
-            position so near the event [m].
-        bid_within: How long bids are taken [s].
-        operator_span: How many robots one operator may have in hand at once.
-        decide_within: How long the policy waits for a person, where it asks first [s].
-        declined_pause: Who declines an order, or is not reached, is not asked again for [s].
+        arrived_within: Distance for a confirmed arrival [m]: a responder counts as under way until
+            its reported position is this near the event.
+        bid_within: Time for which bids are taken [s].
+        operator_span: Maximum number of robots that one operator handles at once.
+        decide_within: Time that the policy waits for a person, where it asks first [s].
+        declined_pause: Pause before the next request to a responder who declined an order or was
+            not reached [s].
     """
 
     escalate_after: float = 120.0

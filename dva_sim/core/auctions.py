@@ -18,9 +18,9 @@ class RunningAuction:
     """One task on offer.
 
     Attributes:
-        until: When bids are no longer taken [s].
-        asked: Who may still answer; nobody once the time is up.
-        arrival: When each bidder would be there [s].
+        until: End of the bidding [s].
+        asked: Devices that may still bid; none after the end.
+        arrival: Expected arrival of each bidder [s].
     """
 
     until: float
@@ -33,7 +33,7 @@ class Auctions:
     """All auctions under way, by number of the event.
 
     Attributes:
-        bid_within: How long bids are taken [s].
+        bid_within: Time for which bids are taken [s].
     """
 
     bid_within: float

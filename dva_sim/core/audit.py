@@ -20,24 +20,24 @@ class Fact:
     """One decision.
 
     Attributes:
-        time: When, by the DVA's clock [s].
+        time: Time by the DVA's clock [s].
         author: Id of the device that decided; the DVA's for its policy and its rules.
-        label: What that is called: of the policy its name, of a rule `rule`.
-        role: Of the author, if it is a control room: `look`, `drive`, `dispatch`, `supervise`.
-        action: What was decided: `acknowledge`, `assign`, `take_off`, `false_alarm`, `escalate`,
+        label: Label of the author: of the policy its name, of a rule `rule`.
+        role: Role of the author, if it is a control room: `look`, `drive`, `dispatch`, `supervise`.
+        action: Kind of decision: `acknowledge`, `assign`, `take_off`, `false_alarm`, `escalate`,
             `note`, `set_dispatch`, `revoke`, `raise`, `take`, `take_over`, `give_back`, `expire`.
         event: Number of the event that it is about.
         device: Id of the guard or robot that it is about.
         operator: Id of the device that drives that robot.
         task: `confirm`, `contain` or `stand_by`.
-        arrival_in: When that one would be there, as expected [s from then].
-        mode: How orders are given from then on: `automatic` or `ask_first`.
-        text: What a note says, or where an event was raised.
-        cause: Why, in words of the author.
+        arrival_in: Expected arrival of the device [s from then].
+        mode: New dispatch mode: `automatic` or `ask_first`.
+        text: Text of a note, or place where an event was raised.
+        cause: Reason in words of the author.
         code: `messages.OK`, or why it was refused.
-        outcome: What came of it, in words; of a refusal its reason.
+        outcome: Result in words; for a refusal its reason.
         advised: Id of whom the policy would have sent; None: nobody, or that is no matter here.
-        advised_in: When that one would be there, as expected [s from then].
+        advised_in: Expected arrival of the advised device [s from then].
         waited: Since the event was first reported [s].
     """
 
@@ -127,8 +127,8 @@ class AuditTrail:
     """The facts that nobody has taken yet, oldest first.
 
     Attributes:
-        keeps: Whether facts are wanted at all.
-        lost: How many were forgotten, as nobody took them in time.
+        keeps: True to keep facts at all.
+        lost: Number of facts dropped because nobody took them in time.
     """
 
     keeps: bool = True

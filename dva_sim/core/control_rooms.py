@@ -66,10 +66,10 @@ class ControlRooms:
     """Answers control rooms.
 
     Args:
-        dispatcher: What the policy would do, and all orders.
-        handovers: Who holds which robot.
-        roles: What each control room may do.
-        access: Who may drive what.
+        dispatcher: Dispatcher with the policy and all orders.
+        handovers: Handovers of robots.
+        roles: Roles of the control rooms.
+        access: Rules of access to robots.
     """
 
     def __init__(

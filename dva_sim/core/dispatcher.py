@@ -46,7 +46,7 @@ class Advised:
     Attributes:
         device: Id of the guard or robot.
         task: `confirm`, `contain` or `stand_by`.
-        arrival_in: When that would be there, as expected [s from now].
+        arrival_in: Expected arrival of the device [s from now].
     """
 
     device: str
@@ -59,18 +59,18 @@ class Dispatcher:
 
     Args:
         policy: Advises.
-        travel: How far it is from whom to where.
+        travel: Travel times and distances.
         orders: Gives the orders.
-        rng: Luck of policies that use it.
-        ground: What is known of the place.
-        roles: What control rooms may do.
-        name: What the policy is called.
+        rng: Random generator passed to policies.
+        ground: Knowledge of the site.
+        roles: Roles of the control rooms.
+        name: Name of the policy.
 
     Attributes:
-        auctions: Who has bid what.
+        auctions: Auctions under way.
         situations: Gathers what the policy is shown.
-        questions: What the policy asks a person first.
-        last_failure: What the policy did wrong last, in words.
+        questions: Open questions of the policy to people.
+        last_failure: Latest failure of the policy, in words.
     """
 
     def __init__(

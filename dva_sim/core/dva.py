@@ -38,28 +38,28 @@ class Dva:
 
     Args:
         policy: Advises who goes where.
-        travel: How far it is, and how long it takes.
-        rules: What holds whatever the policy says.
-        rng: Luck of policies that use it.
-        sessions: Who may act on what, and who has to be told.
-        ground: What is known of the place.
-        access: Who may ask for what.
-        patrols: Which robots go round while nothing happens.
-        sensing: Which sensors of robots the DVA heeds.
+        travel: Travel times and distances.
+        rules: Rules that hold for any policy.
+        rng: Random generator passed to policies.
+        sessions: Permissions, and pending notices about their end.
+        ground: Knowledge of the site.
+        access: Rules of access to robots.
+        patrols: Patrols of idle robots.
+        sensing: Robot sensors that the DVA uses.
         supervisors: Ids of the operators that may take a robot from its holder.
-        roles: What each control room may do.
-        ask_first: Whether the policy asks a person before it sends anybody.
-        policy_name: What the policy is called.
-        audit: Whether facts are kept of what is decided.
+        roles: Roles of the control rooms.
+        ask_first: True if the policy asks a person before it sends anybody.
+        policy_name: Name of the policy.
+        audit: True to keep facts about decisions.
 
     Attributes:
-        registry: Who is there.
-        book: What happens.
-        orders: Who has to do what.
-        dispatcher: Decides who goes.
+        registry: Registered devices.
+        book: Events.
+        orders: Current orders.
+        dispatcher: Dispatcher that chooses responders.
         control_rooms: Answers those where people decide.
-        trail: What was decided, to be taken by whoever keeps it.
-        counters: How often what happened.
+        trail: Decisions, to be taken by whoever records them.
+        counters: Counters by name.
         refused: Messages that were refused.
     """
 

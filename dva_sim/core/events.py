@@ -52,24 +52,24 @@ class Event:
     Attributes:
         number: The DVA's number for it.
         kind: `fire`, `gas_leak` or `flood`.
-        position: Where it was first reported.
+        position: Position in the first report.
         severity: 0 to 1, the highest reported.
-        needs_containment: Whether it is over only when somebody has dealt with it.
-        reports: How many reports were merged into it.
+        needs_containment: True if it is over only once somebody has contained it.
+        reports: Number of merged reports.
         sources: Confidence of each device that reported it and has not taken that back.
         responder: Device that goes there to confirm it: a guard or a robot.
         operator: Device that drives the robot, if a robot goes.
         actor: Guard that deals with it once it is confirmed, or stands by to.
-        taken_up: Whether its present order to look was answered with OK.
-        act_taken_up: The same of the order to deal with it, or to stand by.
+        taken_up: True if its present order to look was accepted.
+        act_taken_up: True if its present order to contain it, or to stand by, was accepted.
         attempts: Orders taken up for it.
-        preemptions: How often its responder was sent elsewhere.
+        preemptions: Number of times its responder was redirected.
         waiting_since: Since when it has waited for somebody [s]; an order that nobody took
             up does not end the wait.
         failed: Responders that set out and gave the order back.
         sent: Everybody who was ever ordered there; only they can tell what they found.
         times: Time of each step in `STEPS` and `ACT_STEPS` that was taken [s].
-        handling: What was decided on it.
+        handling: Decisions on the event.
     """
 
     number: int
@@ -127,8 +127,8 @@ class EventBook:
         merge_distance: Reports of one kind nearer than this are one event [m].
         open: Open events by number, oldest first.
         closed: The last that were closed.
-        total: How many there ever were.
-        counts: How many stand in each state; they add up to `total` (S6).
+        total: Number of events ever opened.
+        counts: Number of events in each state; they add up to `total` (S6).
     """
 
     merge_distance: float = 8.0

@@ -11,9 +11,9 @@ class Choice(NamedTuple):
 
     Attributes:
         author: Id of the device; the DVA's for its policy and its rules.
-        label: What that is called.
-        action: As in `audit.Fact`.
-        time: When [s].
+        label: Label of the author.
+        action: Kind of decision, as in `audit.Fact`.
+        time: Time [s].
         reason: In words; may be empty.
         device: About whom; empty: about nobody.
     """
@@ -38,12 +38,12 @@ class Handling:
     """Decisions on one event.
 
     Attributes:
-        decisions: How often something was decided: who acts on an older number acts too late.
+        decisions: Number of decisions; a decision made on an older number is too late.
         last: The last of it.
-        acknowledged: Who has seen it first.
+        acknowledged: First acknowledgement.
         note: The newest.
-        taken_off: Who is not to be sent there by the policy any more.
-        expected: Of each that was sent: when that was [s], and the way that was expected [s].
+        taken_off: Devices that the policy may no longer send there.
+        expected: Time of the order [s] and expected travel time [s], by device.
         advised: Id of whom the policy has sent or would have sent last; empty: nobody.
     """
 

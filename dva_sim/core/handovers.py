@@ -46,7 +46,7 @@ class Handovers:
     """All handovers of the DVA; at most one of each robot.
 
     Attributes:
-        orders: Who has to do what.
+        orders: Current orders.
         supervisors: Ids of the devices that may take a robot from its holder.
         under_way: By robot.
     """

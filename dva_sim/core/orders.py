@@ -23,9 +23,9 @@ class Orders:
     """All orders of the DVA.
 
     Attributes:
-        engaged: What each device is working on.
-        counters: How often what happened.
-        trail: What was decided.
+        engaged: Current task of each device.
+        counters: Counters by name.
+        trail: Trail of decisions.
     """
 
     rules: Rules

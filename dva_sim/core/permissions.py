@@ -22,8 +22,8 @@ class AccessRule:
     Attributes:
         holders: Labels of the devices it is about; empty: all.
         robots: Labels of the robots it is about; empty: all.
-        levels: What they may ask for.
-        sensors: Which sensors they may read; None: all.
+        levels: Levels that they may request.
+        sensors: Sensors that they may read; None: all.
         since: From when on [s].
         until: Up to when [s]; what is still held then is taken back.
     """

@@ -14,10 +14,9 @@ class Question:
     """Proposal about an event that waits for an answer.
 
     Attributes:
-        event: Which.
         device: Id of the guard or robot that it would send.
         task: `confirm`, `contain` or `stand_by`.
-        expected: When that would be there [s].
+        expected: Expected arrival of the proposed device [s].
         until: It is sent by itself if nobody has decided by then [s].
     """
 
@@ -35,9 +34,9 @@ class Questions:
     What the policy would do may change while it waits; the time that is left does not.
 
     Attributes:
-        within: How long a question waits [s].
-        asks: Whether the policy asks first.
-        switched: Who has last changed that.
+        within: Time that a question waits [s].
+        asks: True if the policy asks first.
+        switched: Latest change of the mode.
     """
 
     within: float

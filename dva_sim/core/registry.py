@@ -25,11 +25,11 @@ class DeviceEntry:
     """One registered device.
 
     Attributes:
-        device: As it stands on the device list.
+        device: Device as in the device list.
         last_heard: Time of its last message of any kind [s].
-        position: Where it was last known to be.
+        position: Last known position.
         mode: Last known mode of a robot.
-        silent: Whether it has been quiet for longer than the time-out.
+        silent: True if it has been silent for longer than the time-out.
         registrations: MessageID and timestamp of its last ones.
         free_from: Until then it is given no order, because it declined one [s].
         place: In order of registration, from 0.
@@ -66,9 +66,10 @@ class Registry:
     """All devices by id.
 
     Attributes:
-        silent_after: How long a device may be quiet before it counts as gone [s].
-        forget_after: How long before it is forgotten, unless something of it is open [s].
-        most: How many devices there may be.
+        silent_after: Time of silence after which a device counts as gone [s].
+        forget_after: Time of silence after which it is forgotten, unless it is involved in
+            something open [s].
+        most: Maximum number of devices.
         entries: In order of registration.
         version: Grows whenever somebody comes, goes silent, returns, is forgotten, or is called
             otherwise.

@@ -29,7 +29,7 @@ class Roles:
     """Role of each control room: by configuration, or by the process that runs the DVA.
 
     Attributes:
-        known: By id of the device; whoever is not there may look.
+        known: Role by id of the device; others may look.
     """
 
     known: dict[str, ControlRoomRole] = field(default_factory=dict)

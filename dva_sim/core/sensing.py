@@ -33,7 +33,7 @@ class SensorAlarm:
     """Meaning of a high value of a sensor.
 
     Attributes:
-        kind: Of the event that it speaks for: `fire`, `gas_leak` or `flood`.
+        kind: Kind of event that it indicates: `fire`, `gas_leak` or `flood`.
         threshold: From here on, in the unit of the sensor.
     """
 
@@ -46,9 +46,9 @@ class Sensing:
     """Known sensors of the robots, and the values that the DVA uses.
 
     Attributes:
-        alarms: What it heeds, by the name of the sensor.
-        rate_hz: How often it wants each value [Hz].
-        known: What robots have said that they have.
+        alarms: Alarm levels by name of the sensor.
+        rate_hz: Rate at which each value is requested [Hz].
+        known: Sensors that robots have reported.
     """
 
     alarms: Mapping[str, SensorAlarm] = field(default_factory=dict)

@@ -30,10 +30,9 @@ class Sessions:
     """Permissions, and the word about their end.
 
     Attributes:
-        permissions: Who may act on what.
         untold: By session: what a robot has not said to have heard yet. Until then it may
             still obey whom it should not.
-        changes: How often `untold` has changed.
+        changes: Number of changes of `untold`.
         reserved: Robots that are being handed over: held, as far as others are concerned.
     """
 
@@ -81,7 +80,7 @@ class Sessions:
         Args:
             robot: Id of the robot.
             holder: Id of the device; None: the holder.
-            to_read: Whether one that is only for sensors will do.
+            to_read: True if a permission to read sensors is sufficient.
         """
         known = self.permissions
         reads = known.observers.get((robot, holder or "")) if to_read else None
@@ -224,9 +223,9 @@ class Grant:
         robot: Id of the robot.
         holder: Id of the device that may act.
         level: `teleoperation`, `missions`, `both` or `sensors`.
-        session: Fencing token: a robot obeys only the highest it was told.
+        session: Fencing token: a robot obeys only the highest it has received.
         sensors: Sensors that the holder may subscribe to.
-        address: Where the holder is found.
+        address: Address of the holder.
     """
 
     robot: str
@@ -246,7 +245,7 @@ class Permissions:
         draw: Gives `LOW_BITS` random bits.
         count: Sessions handed out so far, from any start that is higher than in an earlier
             life of the DVA: it makes sessions grow.
-        changes: How often a grant was made, or ended.
+        changes: Number of grants made or ended.
         own: Id of the DVA, which may hold robots itself: its grants yield to all others.
     """
 

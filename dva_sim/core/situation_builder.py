@@ -62,11 +62,11 @@ class SituationBuilder:
     """Knows who can go, what there is to do, and how far it is.
 
     Attributes:
-        policy: What it wants to see, it is shown.
-        travel: How far it is from whom to where.
-        orders: Who is at what.
-        ground: What is known of the place.
-        auctions: Who has bid what.
+        policy: Policy, which declares what it needs to see.
+        travel: Travel times and distances.
+        orders: Current orders.
+        ground: Knowledge of the site.
+        auctions: Auctions under way.
     """
 
     policy: Policy

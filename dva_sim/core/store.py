@@ -65,7 +65,7 @@ class Store:
 
     Attributes:
         past: Added to the DVA's time it gives the time that is kept [s].
-        keeps_time: How often that is written while events are open [s].
+        keeps_time: Interval at which the time is written while events are open [s].
         between_writes: Called before each statement that writes, and after the last; it may raise.
 
     Raises:

@@ -21,8 +21,8 @@ class Start:
     Attributes:
         device: Its id.
         kind: `guard` or `robot`.
-        position: Where it is.
-        under_way: Whether it has set out already, to somewhere else: it needs no mobilisation.
+        position: Current position.
+        under_way: True if it is already travelling elsewhere: it needs no mobilisation.
     """
 
     device: str
@@ -58,7 +58,7 @@ class SiteKnowledge:
     Attributes:
         preference: Place of each device on the list for events at a position, from 0;
             infinite for who is not on it. None if there are no lists.
-        stations: Where guards may wait.
+        stations: Waiting places for guards.
         reach: From each station to each zone [s], shape `(stations, zones)`.
         demand: Share of events expected in each zone, shape `(zones,)`.
     """

@@ -26,8 +26,8 @@ class Coverage(Policy):
     an end. Who is on its way to a station counts as being there, and is left to arrive.
 
     Args:
-        gain_s: What a move must bring [s of expected response].
-        there_s: Who is no further from a station than that counts as standing there [s].
+        gain_s: Smallest gain that justifies a move [s of expected response].
+        there_s: Distance from a station that counts as being there [s].
 
     References:
         R. L. Church and C. S. ReVelle, Theoretical and empirical links between the p-median,

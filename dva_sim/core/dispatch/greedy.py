@@ -15,8 +15,8 @@ class Free:
     """Responders available in one decision: each idle one once, robots while operators last.
 
     Attributes:
-        robots: Which responders are robots, shape `(responders,)`.
-        operators: How many robots can still be sent.
+        robots: True for responders that are robots, shape `(responders,)`.
+        operators: Number of robots that can still be sent.
     """
 
     def __init__(self, situation: Situation) -> None:
@@ -30,7 +30,7 @@ class Free:
         """The place of the cheapest, the first of equals; None if nobody is left who can.
 
         Args:
-            cost: Of each responder, shape `(responders,)`; infinite means never.
+            cost: Cost of each responder, shape `(responders,)`; infinite means never.
         """
         if not self._any:
             return None
@@ -72,7 +72,7 @@ def serve(tasks: Iterable[int], cost: Floats, free: Free) -> list[Assignment]:
     Args:
         tasks: Places of tasks, in the order in which they may choose.
         cost: Shape `(tasks, responders)`; infinite means never.
-        free: Who is left; those who are sent are taken from it.
+        free: Free responders; those sent are removed.
     """
     chosen = []
     for task in tasks:

@@ -27,8 +27,8 @@ class BatchOptimal(Policy):
     No more robots are sent than operators are free.
 
     Args:
-        objective: What is added up: `eta` [s] or `distance` [m].
-        ageing_per_s: What a second of waiting is worth, in units of the objective per second.
+        objective: Cost to minimise: `eta` [s] or `distance` [m].
+        ageing_per_s: Value of a second of waiting, in units of the objective per second.
 
     References:
         D. F. Crouse, On implementing 2D rectangular assignment algorithms, IEEE Trans.
@@ -74,9 +74,9 @@ class OperatorAware(BatchOptimal):
     A task that no person is left for gets a robot in any case.
 
     Args:
-        operator_worth_s: How much earlier than a person a robot must be [s]; with 0 it is the
+        operator_worth_s: Time by which a robot must be faster than a person [s]; with 0 it is the
             least total ETA with at most as many robots as there are operators.
-        ageing_per_s: As of `BatchOptimal`.
+        ageing_per_s: Value of a second of waiting, as in `BatchOptimal`.
     """
 
     def __init__(self, operator_worth_s: float = 30.0, ageing_per_s: float = 1.0) -> None:
@@ -95,8 +95,8 @@ def match(cost: Floats, robots: NDArray[np.bool_], operators: int) -> list[tuple
 
     Args:
         cost: Shape `(tasks, responders)`; infinite means never.
-        robots: Which columns are robots.
-        operators: How many robots can be sent.
+        robots: True for columns that are robots.
+        operators: Number of robots that can be sent.
     """
     from scipy.optimize import linear_sum_assignment
 

@@ -22,7 +22,7 @@ class Instance:
     """A day as it will be: events, and units that go out from their base and return to it.
 
     Attributes:
-        release: When each event becomes known [s], not falling, shape `(events,)`.
+        release: Time at which each event becomes known [s], ascending, shape `(events,)`.
         arrival: From being sent from the base to being there [s], shape `(events, units)`;
             infinite where a unit cannot go.
         busy: From being sent to being back and free again [s], same shape.
@@ -45,8 +45,8 @@ class OraclePlan:
 
     Attributes:
         tours: Events of each unit in its order, counted from 0.
-        start: When somebody is sent to each event [s]; infinite if nobody can go.
-        release: As of the instance.
+        start: Departure time for each event [s]; infinite if nobody can go.
+        release: Release times of the instance.
         total: Sum of response times [s], of those events that somebody can go to.
     """
 

@@ -24,11 +24,11 @@ class Task:
         event: The DVA's number of the event.
         kind: `fire`, `gas_leak` or `flood`.
         stage: `confirm`: go and look. `contain`: a person goes and deals with it.
-        due: Whether it can be done now. A `contain` task before the confirmation is not:
-            who is given it stands by outside until then.
+        due: True if it can be done now. A `contain` task before the confirmation is not due: its
+            responder stands by outside until then.
         severity: 0 (harmless) to 1, the highest reported.
-        confidence: That there is something at all, 0 to 1.
-        detected: When it was first reported [s].
+        confidence: Confidence that the event is real, 0 to 1.
+        detected: Time of the first report [s].
         waiting_since: Since when it has waited for somebody [s].
         engaged: Place in `Situation.responders` of who is under way to it; only a policy
             that `preempts` is shown such tasks.
@@ -89,7 +89,7 @@ class Situation:
     Attributes:
         now: [s]
         tasks: Open tasks, longest detected first.
-        responders: Who can go, in order of registration: guards, then robots.
+        responders: Available responders in order of registration: guards, then robots.
         distance: Path length [m], shape `(tasks, responders)`; infinite where there is no way,
             or where the responder cannot do the task.
         eta: Expected time to arrival [s], same shape: mobilisation plus travel.
@@ -97,8 +97,8 @@ class Situation:
             infinite if it is not on it. Empty if no lists are configured.
         bids: Arrival that each responder has offered [s from now], same shape; nan where there
             is no bid. Empty unless the policy `auctions`.
-        operators: How many robots operators can take on; each robot that is sent takes one.
-        cover: Where guards could wait; None unless the policy `relocates`.
+        operators: Number of robots that operators can take on; each robot sent takes one.
+        cover: Waiting places for guards; None unless the policy `relocates`.
     """
 
     now: float
@@ -161,7 +161,6 @@ class Policy:
         """Return the advice for now; tasks without advice wait.
 
         Args:
-            situation: What is known.
-            rng: The run's luck for policies that want some; use no other.
+            rng: Random generator of the run for policies; use no other.
         """
         raise NotImplementedError

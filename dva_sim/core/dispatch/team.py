@@ -29,7 +29,7 @@ class HazardTeam(Policy):
 
     Args:
         dangerous: Kinds of events that people should not look at first.
-        extra_s: How much later than a person a robot may be [s].
+        extra_s: Time by which a robot may be slower than a person [s].
     """
 
     def __init__(

@@ -22,8 +22,8 @@ class PriorityEta(Policy):
     served within one severity.
 
     Args:
-        ageing_per_s: What a second of waiting adds to the severity [1/s]. With 0.002 a
-            harmless event (0) passes the worst one (1) after 500 s.
+        ageing_per_s: Severity that a second of waiting adds [1/s]. With 0.002 a harmless event (0)
+            passes the worst one (1) after 500 s.
     """
 
     def __init__(self, ageing_per_s: float = 0.002) -> None:
@@ -48,8 +48,8 @@ class Preemptive(Policy):
 
     Args:
         margin: By how much the severity must be higher than that of what is left behind.
-        gain_s: How much earlier than anybody idle the redirected one must be there [s].
-        ageing_per_s: As of `PriorityEta`; it orders the tasks, and takes nobody away.
+        gain_s: Time by which the redirected responder must be faster than any idle one [s].
+        ageing_per_s: As in `PriorityEta`; it orders the tasks, but redirects nobody.
     """
 
     preempts = True
