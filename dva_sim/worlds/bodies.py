@@ -46,7 +46,7 @@ class Contacts:
     Attributes:
         count: Contacts begun so far.
         touching: Shapes that it touches now.
-        last: When it last ceased to touch one [s].
+        last: Time at which it last ceased to touch one [s].
     """
 
     def __init__(self) -> None:
@@ -68,7 +68,7 @@ class Jam:
     """Detector of a jammed robot, fed with every tick in which the robot strains against something.
 
     Attributes:
-        count: How often it became so.
+        count: Number of jams.
     """
 
     def __init__(self) -> None:
@@ -109,11 +109,11 @@ class AskedFor(Generic[T]):
     What was asked for first still has its tick, however soon something newer follows.
 
     Args:
-        first: What holds at the beginning.
+        first: Initial request.
 
     Attributes:
-        now: What holds.
-        coming: What will, and from which tick on.
+        now: Current request.
+        coming: Future requests, each with its first tick.
     """
 
     __slots__ = ("coming", "now")
@@ -150,7 +150,7 @@ class Ticks:
         dt: Length of a tick [s], a whole number of microseconds.
 
     Attributes:
-        space: What the shapes of bodies, and what holds them, belong to.
+        space: Pymunk space of the bodies.
     """
 
     def __init__(self, dt: float) -> None:
@@ -208,9 +208,9 @@ class Body:
     """Base class of everything that moves.
 
     Attributes:
-        name: Of the robot or person.
+        name: Name of the robot or person.
         kind: `ROBOT` or `PERSON`.
-        radius: Of the circle around it [m].
+        radius: Radius of the enclosing circle [m].
         impulse: Impulse of its contacts so far [N s]; of people only that with robots.
     """
 
@@ -302,12 +302,12 @@ class Lock:
     whoever is leant against creep away. Nothing draws the body back to where it was.
 
     Args:
-        space: That the body is in.
-        body: Of the robot.
+        space: Space of the body.
+        body: Body of the robot.
         arm: On which the grip holds against turning [m].
 
     Attributes:
-        closed: Whether it holds.
+        closed: True while the wheels are locked.
     """
 
     def __init__(self, space: pymunk.Space, body: pymunk.Body, arm: float) -> None:
@@ -338,7 +338,7 @@ class RobotBody(Body):
 
     Attributes:
         spec: Mass, size, limits.
-        motors: What they do; how sharply they can turn, and what a user's own got wrong.
+        motors: Motors, with their turning radius and the failures of a user's class.
         distance: Way covered so far [m].
         work: Done by the motors against inertia and what is in the way, without braking [J].
     """

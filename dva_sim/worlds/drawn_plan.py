@@ -41,7 +41,7 @@ def make_plan(features: Iterable[Feature], ceiling: float = CEILING) -> tuple[Fl
 
     Args:
         features: In the order of the file.
-        ceiling: Of rooms that do not say [m].
+        ceiling: Default ceiling height of rooms [m].
 
     Raises:
         ConfigError: a property that does not suit its kind.

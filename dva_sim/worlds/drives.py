@@ -29,9 +29,9 @@ class Drive:
         spec: Mass, size and limits of the robot.
 
     Attributes:
-        turning_radius: Of the sharpest curve it can drive [m]; 0: it turns on the spot.
-        failures: How often it gave no answer that is one; only drives of users do that.
-        first_failure: What was wrong with it first, in a line.
+        turning_radius: Radius of the sharpest curve it can drive [m]; 0: it turns on the spot.
+        failures: Number of missing or invalid answers; only users' drives have any.
+        first_failure: First failure, in one line.
     """
 
     turning_radius = 0.0
@@ -208,14 +208,14 @@ class DriveSpec:
 
     Attributes:
         mass: [kg]
-        radius: Of the circular footprint, or of a circle around the corners [m].
+        radius: Radius of the circular footprint, or of a circle around the corners [m].
         max_speed: Forward only [m/s].
         max_turn_rate: Either way [rad/s].
         max_acceleration: [m/s^2]
         max_deceleration: [m/s^2]
         max_turn_acceleration: Either way [rad/s^2].
-        motor_time_constant: How fast speed follows the set point [s].
-        corners: Of a convex footprint, x ahead, y to the left [m]; none: a circle.
+        motor_time_constant: Time constant of the speed [s].
+        corners: Corners of a convex footprint, x ahead, y to the left [m]; none: a circle.
         drive: Makes the motors.
     """
 

@@ -34,8 +34,8 @@ class GeoFrame:
     geographic coordinates one-to-one near the origin.
 
     Attributes:
-        latitude: Of the origin [deg].
-        longitude: Of the origin [deg].
+        latitude: Latitude of the origin [deg].
+        longitude: Longitude of the origin [deg].
 
     References:
         EPSG Guidance Note 7-2, "Geographic/topocentric conversions".

@@ -38,7 +38,7 @@ class Feature:
     Attributes:
         kind: A key of `KINDS`.
         shape: Shapely geometry [m].
-        properties: As written in the file.
+        properties: Properties as written in the file.
         fail: Makes an error at the feature's place in its file.
     """
 

@@ -29,9 +29,8 @@ class Lidar:
     """A kind of lidar; one serves all robots that carry it.
 
     Args:
-        world: Where.
         rays: Per scan, evenly all around, the first one ahead.
-        reach: What is farther is not seen [m].
+        reach: Range [m].
     """
 
     def __init__(self, world: World, rays: int = 36, reach: float = 8.0) -> None:

@@ -124,7 +124,7 @@ def lay_out(width: float, depth: float, rng: np.random.Generator) -> Layout:
     Args:
         width: West to east [m], at least 24.
         depth: South to north [m], at least 12.
-        rng: Source of luck.
+        rng: Random generator.
     """
     width, depth = tenths(width), tenths(depth)
     wings = max(1, int(depth / STOREY + 0.65))
@@ -209,7 +209,7 @@ class Use(NamedTuple):
     """Use of a room.
 
     Attributes:
-        name: As people call it.
+        name: Name for people.
         door: Width of its door [m].
         detectors: Kinds of those in it.
         furniture: Rectangles that stand in a cell.

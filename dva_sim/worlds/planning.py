@@ -43,7 +43,6 @@ class Planner:
     is solved once per process.
 
     Args:
-        site: Where.
         clearance: Radius that must fit [m].
     """
 
@@ -60,9 +59,9 @@ class Planner:
 
         Args:
             start: From where.
-            goal: Where to.
-            avoid: What the plan of the site does not show, but stands there now. A way around
-                it costs a new map, some hundredths of a second: ask only when blocked.
+            goal: Destination [m].
+            avoid: Obstacles that the plan of the site does not show. A path around them needs a new
+                map, some hundredths of a second: ask only when blocked.
 
         Returns:
             Points about `STEP` apart, shape `(n, 2)`, or None if there is no way.
@@ -101,10 +100,10 @@ class Roadmap:
     So a door stays passable, and is passed in its middle, wherever it lies on the lattice.
 
     Args:
-        grid: How the cells lie.
+        grid: Grid of the cells.
         clearance: Radius that must fit [m].
         sight: From where it can be walked straight to a node.
-        room: How far from what is not free each cell is, if not as the grid has it [m].
+        room: Clearance of each cell, if other than the grid's [m].
     """
 
     def __init__(

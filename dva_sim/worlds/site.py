@@ -57,10 +57,10 @@ class Site(FloorPlan):
 
     Attributes:
         name: Name of the site or of the map.
-        frame: Where on earth its plane lies.
+        frame: Location of its plane on earth.
         extent: xmin, ymin, xmax, ymax of everything [m].
-        grid: What is free, occupied and unknown.
-        ceiling: Of rooms that do not say [m].
+        grid: Free, occupied and unknown cells.
+        ceiling: Default ceiling height of rooms [m].
     """
 
     name: str
@@ -162,7 +162,7 @@ class Site(FloorPlan):
         """A random free point that a robot can reach, or somebody slimmer if so asked.
 
         Args:
-            rng: Source of luck.
+            rng: Random generator.
             clearance: Radius that must fit at the point [m]; on the way there no more than a
                 robot's has to, or doors would part the site.
             room: Only inside this room.
@@ -234,7 +234,7 @@ def map_site(
         seed: Chooses the places; robot 1 stands at the same place however many there are.
         robots: Number of robot bases.
         guards: Number of guard posts.
-        radius: Of the largest robot [m].
+        radius: Radius of the largest robot [m].
 
     Raises:
         ConfigError: the map is missing or not valid, or has no room for so many.
@@ -254,12 +254,11 @@ def with_places(site: Site, seed: int, robots: int, guards: int, radius: float =
     """A site with a base for each robot and a post for each guard, however few are drawn.
 
     Args:
-        site: Where.
         seed: Chooses the places that are not drawn; who stands where does not depend on how
             many more there are of the same kind.
         robots: Number of robots.
         guards: Number of guards.
-        radius: Of the largest robot [m].
+        radius: Radius of the largest robot [m].
 
     Raises:
         ConfigError: not so many fit; the message tells how many do.
@@ -346,7 +345,6 @@ class _Places:
     """Free places apart from each other, until none is left.
 
     Args:
-        site: Where.
         clearance: Radius that must fit at each [m].
         apart: The least distance between two [m].
         taken: Places that are taken already.

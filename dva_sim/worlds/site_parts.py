@@ -226,17 +226,17 @@ class FloorPlan:
         walls: Segments x1, y1, x2, y2, opened at the doors, shape `(n, 4)` [m].
         rooms: Named parts of the floor and of the ground outdoors; none on a bare map.
         doors: Openings in the walls, shape `(n, 4)` [m]; exits are not among them.
-        robot_bases: Where robots start.
-        guard_posts: Where guards wait.
-        operator_desks: Where operators sit.
+        robot_bases: Starting poses of robots.
+        guard_posts: Waiting poses of guards.
+        operator_desks: Seats of operators.
         detectors: Smoke, heat, CO, gas and water detectors.
         solids: Corners `(k, 2)` [m] of filled obstacles such as shelves.
-        door_heights: Of each door [m]; 2.1 m where nothing is said.
+        door_heights: Height of each door [m]; 2.1 m by default.
         exits: Ways to safety.
         zones: Parts of the floor with a rule or a purpose.
         cameras: Fixed cameras.
         base_stations: Antennas.
-        wifi: Where the radio link has a quality of its own.
+        wifi: Areas with a radio quality of their own.
     """
 
     walls: Points
@@ -260,8 +260,8 @@ class Compartment:
     """A body of air: what fills with smoke, gas or water by itself.
 
     Attributes:
-        name: Of its room; on a bare map the number of a block of the floor.
-        area: Of its floor, solids among it [m^2].
+        name: Name of its room; on a bare map the number of a block of the floor.
+        area: Area of its floor, solids included [m^2].
         ceiling: Height [m].
         polygon: Corners `(k, 2)` [m], or None where only its cells are known (bare maps).
     """

@@ -15,7 +15,6 @@ def floor_tint(room: Room, tints: dict[str, str]) -> str:
     """The colour of a room's floor; rooms of one purpose have one colour.
 
     Args:
-        room: Which.
         tints: Those of the rooms before it, by purpose; a new one is added.
     """
     if room.outdoor:

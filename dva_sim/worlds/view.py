@@ -77,11 +77,11 @@ def draw_site(
     Everything lies below `zorder` 5; robots and people belong above.
 
     Args:
-        ax: Where; its limits are set to the site.
-        site: What.
+        ax: Axes to draw on; their limits are set to the site.
+        site: Site to draw.
         labels: Names, zones and equipment too, not only ground, walls, doors and exits.
-        coverage: Where the radio link is not good, as a faint layer.
-        views: What fixed cameras see, as a faint layer.
+        coverage: Draw areas of poor radio, as a faint layer.
+        views: Draw the views of fixed cameras, as a faint layer.
         scale: A bar below the site that tells lengths.
         small_marks: Detectors, cameras, antennas and guard posts among the equipment.
         least: Names that would have to be smaller than this are left out [pt].
@@ -252,10 +252,10 @@ def write_poster(site: Site, file: Path, coverage: bool, width: int) -> None:
     """Draw a site into an image file.
 
     Args:
-        site: What.
-        file: Where; its suffix gives the format.
+        site: Site to draw.
+        file: Output file; its suffix gives the format.
         coverage: Show where the radio link is not good.
-        width: Of the picture [pixels].
+        width: Width of the picture [pixels].
 
     Raises:
         ConfigError: the file cannot be written.

@@ -38,14 +38,13 @@ class Floors:
     """Colours of the floor in rows of pixels.
 
     Args:
-        site: Whose floors.
         rooms: Its rooms.
-        fall: How far below the axis of the lens each row looks, per metre ahead `(h,)`.
-        eye_height: Of the lens [m].
+        fall: Slope of each row below the axis of the lens, per metre ahead `(h,)`.
+        eye_height: Height of the lens [m].
 
     Attributes:
         daylight: Light of each row where the sky is above it `(h, 1)`.
-        depth: How far ahead each row meets floor or ceiling `(h, 1)` [m].
+        depth: Distance ahead at which each row meets floor or ceiling `(h, 1)` [m].
     """
 
     def __init__(self, site: Site, rooms: RoomGrid, fall: Floats, eye_height: float) -> None:
@@ -80,8 +79,8 @@ class Floors:
         """Colours of all pixels `(h, w)`.
 
         Args:
-            pose: Of the lens [m, rad].
-            slopes: How far to the right each column looks, per metre ahead `(w,)`.
+            pose: Pose of the lens [m, rad].
+            slopes: Slope of each column to the right, per metre ahead `(w,)`.
         """
         cos, sin = math.cos(pose.heading), math.sin(pose.heading)
         x0, y0 = self._rooms.origin

@@ -43,7 +43,6 @@ class Camera:
     The lens is a pinhole with square pixels that looks along the heading, level.
 
     Args:
-        site: Where.
         width: Pixels across.
         height: Pixels down.
         field_of_view: Across [rad].
@@ -82,10 +81,10 @@ class Camera:
         """Return the picture of the camera, `(height, width, 3)`, red, green and blue.
 
         Args:
-            pose: Of the lens [m, rad].
+            pose: Pose of the lens [m, rad].
             figures: Robots and people around; not the one that carries the camera.
-            hazards: What goes on.
-            smoke: Where it is, if there is any.
+            hazards: Active hazards.
+            smoke: Smoke on the site, if any.
             water: Its depth on the floor [m], if there is any.
             time: Lets flames flicker and water ripple [s].
         """

@@ -31,16 +31,13 @@ def pack(colours: Any) -> Colours:
 class RoomGrid:
     """The rooms of a site on a grid, numbered from 1; 0 is outside all.
 
-    Args:
-        site: Whose.
-
     Attributes:
         cell: Side of a cell [m].
         origin: x, y of the first cell [m].
-        numbers: Which room each cell belongs to `(rows, columns)`, from south to north.
+        numbers: Room number of each cell `(rows, columns)`, from south to north.
         palette: Colours of rooms, 0 to 1 `(n, 3)`.
-        accent: Which of them each room has.
-        outdoor: Whether the sky is above each room.
+        accent: Accent colour of each room.
+        outdoor: True for rooms under the open sky.
     """
 
     def __init__(self, site: Site) -> None:

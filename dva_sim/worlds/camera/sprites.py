@@ -37,9 +37,9 @@ class Sprite(NamedTuple):
 
     Attributes:
         colours: Red, green, blue `(3, rows, columns)`, the top row first, 0 to 255.
-        cover: How much of what is behind it hides, `(rows, columns)`, 0 to 1.
+        cover: Opacity of each texel, `(rows, columns)`, 0 to 1.
         size: Width and height [m].
-        glows: Whether it needs no light.
+        glows: True if it needs no light.
     """
 
     colours: NDArray[np.float32]
@@ -52,8 +52,8 @@ def view_of(heading: float, bearing: float) -> str:
     """Return the side of a figure that a lens sees.
 
     Args:
-        heading: Of the figure [rad].
-        bearing: Of the line from the lens to the figure [rad].
+        heading: Heading of the figure [rad].
+        bearing: Bearing of the figure from the lens [rad].
     """
     return VIEWS[round((heading - bearing - math.pi) / (math.pi / 2)) % 4]
 
@@ -267,9 +267,9 @@ class Figure(NamedTuple):
         kind: `robot`, `guard` or `bystander`.
         x: East [m].
         y: North [m].
-        heading: Where it faces [rad].
-        number: Tells persons apart by their looks.
-        lying: Whether a person lies on the floor.
+        heading: Heading [rad].
+        number: Number that selects a person's looks.
+        lying: True for a person lying on the floor.
     """
 
     kind: str
@@ -284,8 +284,7 @@ def sprite_of(figure: Figure, bearing: float) -> Sprite:
     """Return the sprite of a figure as seen from the lens.
 
     Args:
-        figure: Who.
-        bearing: Of the line from the lens there [rad].
+        bearing: Bearing of the figure from the lens [rad].
     """
     view = view_of(figure.heading, bearing)
     if figure.kind == "robot":

@@ -36,10 +36,10 @@ class Hits(NamedTuple):
     """Surfaces met by columns, one entry for each pair `(n,)`.
 
     Attributes:
-        column: Which column of the picture.
-        surface: Which surface.
-        depth: How far ahead of the lens, along its axis [m].
-        along: Where on the surface, from its first end [m].
+        column: Column of the picture.
+        surface: Number of the surface.
+        depth: Distance ahead of the lens, along its axis [m].
+        along: Position on the surface, from its first end [m].
     """
 
     column: Ints
@@ -55,19 +55,16 @@ class Hits(NamedTuple):
 class Surfaces:
     """Walls, door frames, lintels and the sides of solids.
 
-    Args:
-        site: Whose.
-
     Attributes:
         ends: x1, y1, x2, y2 of each, shape `(n, 4)` [m].
         kind: `WALL`, `FRAME`, `LINTEL`, `SOLID` or the `LEAF` of a shut door; the last one is
             `NOTHING`, without height.
         low: Height of the lower edge [m].
         high: Height of the upper edge [m].
-        light: How bright its orientation makes it, 0 to 1.
-        door: Which door a lintel belongs to, -1 for others.
+        light: Brightness due to its orientation, 0 to 1.
+        door: Door of a lintel, -1 for other surfaces.
         length: [m].
-        dark_ends: Where the shade of a corner begins and ends `(n, 2)` [m]; doors make none.
+        dark_ends: Ends of the shade of a corner `(n, 2)` [m]; doors make none.
     """
 
     def __init__(self, site: Site) -> None:
@@ -115,8 +112,8 @@ class Surfaces:
         """Return what the columns meet: the nearest wall of each, and what stands before it.
 
         Args:
-            pose: Of the lens [m, rad].
-            slopes: How far to the right per metre ahead each column looks, rising `(w,)`.
+            pose: Pose of the lens [m, rad].
+            slopes: Slope of each column to the right, per metre ahead, ascending `(w,)`.
 
         Returns:
             The nearest wall of each column, `NOTHING` where there is none; and all lower or

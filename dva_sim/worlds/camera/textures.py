@@ -43,12 +43,11 @@ class Uprights:
     """Textures of everything upright on a site.
 
     Args:
-        site: Whose.
         surfaces: Its upright parts.
         rooms: Its rooms.
 
     Attributes:
-        colours: Of all painted columns, each `TEXELS` from the floor up, in one row.
+        colours: Colours of all painted columns, each `TEXELS` from the floor up, in one row.
     """
 
     def __init__(self, site: Site, surfaces: Surfaces, rooms: RoomGrid) -> None:
@@ -60,7 +59,7 @@ class Uprights:
 
         Args:
             hits: Surfaces and places on them.
-            pose_xy: Of the lens [m]; it sees one side.
+            pose_xy: Position of the lens [m]; it sees one side.
             far: x and y of the hits [m].
         """
         kind = self._surfaces.kind[hits.surface]

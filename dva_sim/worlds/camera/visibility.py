@@ -27,7 +27,7 @@ class Rays(NamedTuple):
         x: East of the lens, per metre ahead `(w,)`.
         y: North of it.
         length: Length of a ray per metre ahead `(w,)`.
-        origin: Of the lens [m].
+        origin: Position of the lens [m].
     """
 
     x: Floats
@@ -56,7 +56,7 @@ class SmokeView(NamedTuple):
 
     Attributes:
         mean: Extinction coefficient K, the mean from floor to ceiling [1/m].
-        layer: The same within the layer, which is denser the thinner it is [1/m].
+        layer: Extinction within the layer, which is denser the thinner it is [1/m].
     """
 
     mean: Raster
@@ -73,11 +73,10 @@ def add_smoke(
 
     Args:
         scene: Red, green, blue `(3, h, w)`, changed in place.
-        depth: Of each pixel, along the axis of the lens `(h, w)` [m].
-        rays: Where the columns look.
-        fall: How far below the axis each row looks, per metre ahead `(h,)`.
-        smoke: Where it is.
-        heights: Of the lens and of the ceiling [m].
+        depth: Depth of each pixel, along the axis of the lens `(h, w)` [m].
+        rays: Directions of the columns.
+        fall: Slope of each row below the axis, per metre ahead `(h,)`.
+        heights: Heights of the lens and of the ceiling [m].
     """
     whole, depth, fall = depth, depth[::2], fall[::2]
     step = REACH / SAMPLES
@@ -131,7 +130,7 @@ def add_firelight(scene: Floats, gap2: Floats, lit: Any, strength: float) -> Non
     Args:
         scene: Red, green, blue `(3, h, w)`, changed in place.
         gap2: Squared distance of every second row's places from the fire `(h / 2, w)` [m^2].
-        lit: Which of them lie in the room of the fire `(h / 2, w)`.
+        lit: True for pixels in the room of the fire `(h / 2, w)`.
         strength: 0 to 1.
     """
     light = np.float32(strength) / (np.float32(1.0) + gap2 * np.float32(1.0 / GLOW_REACH**2))

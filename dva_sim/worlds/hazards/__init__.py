@@ -82,7 +82,7 @@ def make_hazard(
         kind: See `find_hazard`.
         position: Its middle [m].
         start: [s]
-        settings: What else belongs to its kind: `growth`, `gas`, `rate`, `inflow`, ...
+        settings: Parameters of its kind: `growth`, `gas`, `rate`, `inflow`, ...
 
     Raises:
         ConfigError: a kind or setting that is not known, or a value that it cannot have.

@@ -32,7 +32,7 @@ class Mesh:
     """Nodes and the borders between them.
 
     Attributes:
-        area: Of each node, shape `(n,)` [m^2].
+        area: Area of each node, shape `(n,)` [m^2].
         a: Node on one side of each border, shape `(k,)`.
         b: Node on the other side.
         shape: Length of each border over the distance between its nodes.
@@ -81,7 +81,7 @@ def make_mesh(grid: OccupancyGrid, free: NDArray[np.bool_], cell: float = CELL) 
 
     Args:
         grid: Gives the cells.
-        free: Which of them hold air, shape `(rows, columns)`.
+        free: True for cells that hold air, shape `(rows, columns)`.
         cell: Side of a coarse cell [m].
     """
     from scipy.sparse import coo_array
@@ -123,8 +123,8 @@ def _borders(pairs: Integers, middles: Floats, count: int, block: int) -> Floats
 
     Args:
         pairs: Nodes on both sides of each edge, shape `(2, k)`.
-        middles: Of the nodes along the axis that the edges are crossed in [cells].
-        count: How many nodes there are.
+        middles: Centres of the nodes along the axis that the edges are crossed in [cells].
+        count: Number of nodes.
         block: Side of a coarse cell [cells].
 
     Returns:

@@ -27,11 +27,11 @@ class Spaces:
     """Bodies of air with a level floor, and the openings between them.
 
     Attributes:
-        area: Of the floors, shape `(n,)` [m^2].
+        area: Area of the floors, shape `(n,)` [m^2].
         ceiling: Heights, shape `(n,)` [m].
         a: Index of the space on one side of each opening, shape `(k,)`.
         b: On the other side; `n` stands for outdoors.
-        width: Of the openings [m].
+        width: Width of the openings [m].
         top: Height of their lintels [m].
     """
 
@@ -73,7 +73,7 @@ class SitePoints:
     """Points of a picture, and what lies there.
 
     Args:
-        building: Where.
+        building: Building of the points.
         points: Shape `(..., 2)` [m].
 
     Attributes:
@@ -127,10 +127,10 @@ class _Cut(NamedTuple):
 
     Attributes:
         first: Index of its first part.
-        parts: How many there are.
+        parts: Number of parts.
         axis: 0 if rows are cut, 1 for columns.
-        low: Where it begins [cells].
-        length: Of a part [cells].
+        low: Start of the cut [cells].
+        length: Length of a part [cells].
     """
 
     first: int
@@ -144,8 +144,8 @@ class _Parting:
     """Compartments cut into parts no longer than `LONGEST`.
 
     Attributes:
-        area: Of the parts [m^2].
-        ceiling: Of the parts [m].
+        area: Area of the parts [m^2].
+        ceiling: Ceiling height of the parts [m].
         cuts: Two parts and the width between them [m], for each cut.
         labels: The part of each cell.
     """

@@ -15,13 +15,13 @@ class Conditions(NamedTuple):
     """The air at a place, at the height of a person's mouth and eyes; water on its floor.
 
     Attributes:
-        temperature: Of the air [deg C].
+        temperature: Temperature of the air [deg C].
         heat_flux: Radiant heat [kW/m^2].
-        extinction: Of light by smoke [1/m].
+        extinction: Extinction of light by smoke [1/m].
         co: Carbon monoxide [ppm].
         gas: Fuel gas, share of the volume, 0 to 1.
         water: Depth [m].
-        explosive: The same gas, as a share of its lower explosive limit: at 1 it can explode.
+        explosive: Gas concentration as a share of its lower explosive limit: at 1 it can explode.
     """
 
     temperature: float = AMBIENT

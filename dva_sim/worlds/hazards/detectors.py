@@ -67,8 +67,8 @@ class DetectorAlarm(NamedTuple):
     """Response of a detector to a hazard that begins at 0.
 
     Attributes:
-        sounds: Whether it sounds at an age [s], so long after it was last asked [s]; it is asked
-            at growing ages.
+        sounds: Predicate of an age [s], and the time since the last query [s]: True if it sounds.
+            Ages ascend.
         reached: Before this age it does not sound, whatever `sounds` says [s].
         at_latest: At this age it sounds, whatever `sounds` says [s].
     """

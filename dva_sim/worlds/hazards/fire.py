@@ -189,7 +189,7 @@ def jet_warmth(heat: Floats, distance: float, ceiling: float) -> Floats:
 
     Args:
         heat: Heat release [kW].
-        distance: Of the detector from the fire's axis [m].
+        distance: Distance of the detector from the fire's axis [m].
         ceiling: Height [m].
     """
     if distance <= 0.18 * ceiling:
@@ -294,8 +294,7 @@ class FireField(SolvedField):
     """Radiant heat of a fire, and its smoke.
 
     Args:
-        fire: What burns.
-        site: Where; its walls hide the flames.
+        site: Site, whose walls hide the flames.
     """
 
     def __init__(self, fire: Fire, site: Site) -> None:

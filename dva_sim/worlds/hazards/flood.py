@@ -136,7 +136,7 @@ def over_weir(above: Floats, below: Floats, width: Floats) -> Floats:
     Args:
         above: Water over the crest on the higher side [m]; none where negative.
         below: On the lower side [m].
-        width: Of the crest [m].
+        width: Width of the crest [m].
     """
     head = np.maximum(above, 0.0)
     drowned = np.clip(below / np.maximum(head, 1e-12), 0.0, 1.0)
@@ -150,12 +150,7 @@ def _water(building: Building, inflow: float, room: int) -> tuple[March, Step]:
 
 
 class FloodField(SolvedField):
-    """Water on the floors: one level in each space; where it comes, first a spreading film.
-
-    Args:
-        flood: What flows.
-        site: Where.
-    """
+    """Water on the floors: one level in each space; where it comes, first a spreading film."""
 
     def __init__(self, flood: Flood, site: Site) -> None:
         super().__init__(flood, site)

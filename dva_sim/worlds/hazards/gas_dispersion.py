@@ -37,7 +37,6 @@ class Air:
     """Air flow between the cells of a mesh.
 
     Args:
-        mesh: Where.
         diffusivity: [m^2/s]
         loss: Fresh air, in volumes per second.
         draught: A steady flow through the rooms, if there is one.

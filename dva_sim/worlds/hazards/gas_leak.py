@@ -73,14 +73,14 @@ class GasLeak(Hazard):
     Attributes:
         gas: One of `GASES`.
         rate: Gas set free [m^3/s]; 0 stands for a serious leak of that gas.
-        diffusivity: Of the stirred air [m^2/s].
+        diffusivity: Eddy diffusivity of the air [m^2/s].
         air_changes: Fresh air per hour, in volumes of the room.
         draught: Air blown in at one place indoors and sucked off at another [m^3/s].
-        supply_x: Where it is blown in [m]; the same for y.
-        exhaust_x: Where it is sucked off [m]; the same for y.
+        supply_x: Position of the supply [m]; the same for y.
+        exhaust_x: Position of the exhaust [m]; the same for y.
         wind: Outdoors [m/s].
-        wind_heading: Where it blows to, counter-clockwise from east [rad].
-        stability: Of the air outdoors, A to F.
+        wind_heading: Direction that the wind blows to, counter-clockwise from east [rad].
+        stability: Stability class of the air outdoors, A to F.
 
     References:
         K.-C. Cheng et al., Environ. Sci. Technol. 45 (2011) 4016: 0.001 to 0.013 m^2/s in calm
@@ -191,12 +191,7 @@ def _gas(air: Air, node: int, rate: float) -> March:
 
 
 class LeakField(SolvedField):
-    """Gas from a leak: on the mesh indoors, a plume outdoors.
-
-    Args:
-        leak: What leaks.
-        site: Where.
-    """
+    """Gas from a leak: on the mesh indoors, a plume outdoors."""
 
     def __init__(self, leak: GasLeak, site: Site) -> None:
         super().__init__(leak, site)

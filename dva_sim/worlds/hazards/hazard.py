@@ -49,19 +49,19 @@ class Hazard(Config, defer_build=False):  # its signature, which tells the setti
 
     Args:
         position: Its middle [m].
-        start: When it begins [s].
-        settings: What else belongs to its kind.
+        start: Start time [s].
+        settings: Parameters of its kind.
 
     Attributes:
-        reported_as: What messages call it, and so all who know it by messages: `fire`,
-            `gas_leak` or `flood`. They deal with it as with one of those.
-        title: What people call it.
+        reported_as: Kind used in messages, and so by everybody who gets them: `fire`, `gas_leak` or
+            `flood`. It is handled as one of these.
+        title: Name for people.
         detectors: Kinds of detector that notice it.
-        shows: What pictures show of it over the floor, some of `QUANTITIES`.
-        colour: Of its mark, as `#rrggbb`.
-        mark: Of its source, as matplotlib names markers.
-        shines: Whether it is seen through smoke, as flames are.
-        contained_by: How a guard deals with it: `valve`, or `extinguisher`.
+        shows: Quantities that pictures show over the floor, some of `QUANTITIES`.
+        colour: Colour of its mark, as `#rrggbb`.
+        mark: Mark of its source, as matplotlib names markers.
+        shines: True if it is visible through smoke, as flames are.
+        contained_by: Tool of a guard to contain it: `valve`, or `extinguisher`.
 
     Raises:
         ConfigError: an unknown setting, or a value that it cannot have.
@@ -140,12 +140,8 @@ class HazardField:
     Only `at` has to be defined: everything else follows from it, if slowly. Nothing may depend
     on what was asked before.
 
-    Args:
-        hazard: What happens.
-        site: Where.
-
     Attributes:
-        until: When its source was stopped [s].
+        until: Time at which its source was stopped [s].
     """
 
     def __init__(self, hazard: Hazard, site: Site) -> None:
@@ -198,7 +194,7 @@ class March:
         paces: Until which age, in which steps [s].
 
     Attributes:
-        hazy: Whether a state impairs anybody's sight, by its number: as far as that was asked.
+        hazy: True for states that impair sight, by number, as far as queried.
     """
 
     def __init__(self, state: Floats, step: Step, paces: Paces = PACES) -> None:
@@ -235,7 +231,6 @@ class SolvedField(HazardField):
     """A field that is solved step by step: shared until the source stops, then this run's own.
 
     Attributes:
-        building: Where.
         room: Index of the space that it starts in, or `NOWHERE`.
     """
 

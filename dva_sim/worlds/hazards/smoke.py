@@ -69,7 +69,7 @@ class SmokeLayers:
 
     Args:
         spaces: The building.
-        heat: What the fire releases at an age [s], in [kW].
+        heat: Heat release of the fire at an age [s], in [kW].
         room: Index of the space that it burns in.
     """
 

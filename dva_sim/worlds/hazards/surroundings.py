@@ -24,7 +24,7 @@ class Raster(NamedTuple):
     Attributes:
         values: From south to north and west to east, shape `(rows, columns)`.
         extent: West, east, south, north [m], as matplotlib's `imshow` takes it.
-        unit: Of the values.
+        unit: Unit of the values.
     """
 
     values: NDArray[np.float64]
@@ -38,8 +38,7 @@ class Surroundings:
     Two fires do not know of each other: their smoke adds up, the hotter air counts.
 
     Args:
-        site: Where.
-        hazards: What happens there; what is reported and not there is not among them.
+        hazards: Real hazards; false alarms are not among them.
     """
 
     def __init__(self, site: Site, hazards: Sequence[Hazard]) -> None:
