@@ -56,22 +56,22 @@ class AgentDevice:
     Attributes:
         id_tag: Its id on the wire.
         label: Its name for people, as in `robot-1`.
-        device_type: As in its registration.
-        address: As in its registration.
+        device_type: Type in its registration.
+        address: Address in its registration.
         dva: Id of the DVA.
-        network: Where messages travel.
+        network: Transport of the messages.
         clock: The run's clock.
-        recorder: Told what happens.
+        recorder: Recorder of the run.
         frame: Between longitude/latitude on the wire and metres inside.
-        timeout: Of a request on the acknowledged channel [s].
-        attempts: Of the same.
+        timeout: Time-out of a request on the acknowledged channel [s].
+        attempts: Number of attempts of such a request.
         labels: Names of all devices by id, for the timeline.
-        time_of_day: When the run starts [s since midnight], and whether timestamps are exact.
-        silent: Whether it sends nothing at all, as it has no power.
-        withdrawn: Whether it publishes nothing and lets its registration lapse, so that the DVA
-            counts it as silent and sends nobody to it; it answers as before.
-        meanwhile: What it does while the DVA is silent, in words.
-        dva_watch: Whether the DVA is there.
+        time_of_day: Start of the run [s since midnight], and True for exact timestamps.
+        silent: True if it sends nothing at all, for lack of power.
+        withdrawn: True if it publishes nothing and lets its registration lapse, so that the DVA
+            counts it as silent and sends nobody to it; it still replies.
+        meanwhile: Description of what it does while the DVA is silent.
+        dva_watch: Watch on the DVA's heartbeats.
     """
 
     id_tag: str
@@ -118,7 +118,7 @@ class AgentDevice:
 
         Args:
             then: Called when the DVA has answered for the first time.
-            hears_dva: Whether to listen to its heartbeats.
+            hears_dva: True to listen to the DVA's heartbeats.
         """
         self._register(then, self._life)
         self._begin_to_beat(hears_dva)
@@ -356,9 +356,10 @@ class AgentDevice:
         """Let `handler` take a message that was admitted, once, and answer it.
 
         Args:
-            request: What it came by.
-            message: What it says.
-            handler: What answers; None: the message waits, and is concluded later.
+            request: Request that carried the message.
+            message: Content of the request.
+            handler: Handler that returns the reply; None: the message waits, and is concluded
+                later.
             at_once: It is refused as it arrives: who sends such, is listened to less and less.
         """
         note = self._nuisances.bad if at_once else self._nuisances.good

@@ -19,7 +19,7 @@ class DvaWatch:
     is judged by requests alone.
 
     Attributes:
-        heard: When its newest word came [s]; None: never.
+        heard: Time of the DVA's latest message [s]; None: never.
         beats: True once a heartbeat of it has come.
         unanswered: True while the newest request has failed.
         silent: True if it was silent at the last look.

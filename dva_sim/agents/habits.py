@@ -340,10 +340,10 @@ class WalkingHabits(Sparse):
         berth_m: Gap kept to other bodies where there is room.
         keeps_right_m2: Handicap of passing on the left, against the square of the miss.
         look_ahead_m: Look-ahead on the way.
-        look_past_m: The same where others are and no wall stands between.
+        look_past_m: Look-ahead where others are and no wall stands between.
         astray_m: Distance from the way beyond which it plans another.
         arrived_m: Distance from the end within which it is there.
-        crowded_m: The same where others keep it from coming nearer.
+        crowded_m: Arrival distance where others keep it from coming nearer.
         braking_s: Time by which the way left is divided, for the highest speed before the end.
         nearer_m: Way below which it has made no progress.
         tired_s: Time without progress after which it looks for a way around.
@@ -492,8 +492,8 @@ class PhoneHabits(Config):
     Attributes:
         sample_jitter: Standard deviation of the time of a sample, as a share of the time between
             two.
-        tremor_deg: Of the hand, as apparent tilt, standard deviation.
-        tremor_width_hz: Of the resonance of the tremor, between its half-power frequencies.
+        tremor_deg: Tremor of the hand, as apparent tilt, standard deviation.
+        tremor_width_hz: Width of the tremor's resonance, between its half-power frequencies.
         max_tilt_deg: Farthest that the hand tilts the phone away from rest.
         max_tilt_speed_deg_s: Fastest that it does.
         warming_k: Standard deviation of the temperature in a session, against the calibration's.

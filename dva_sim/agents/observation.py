@@ -32,10 +32,10 @@ class SeenHazard(NamedTuple):
 
     Attributes:
         kind: `fire`, `gas_leak` or `flood`.
-        x: Where it is, judged from the picture and the map [m].
-        y: The same to the north [m].
+        x: Position to the east, judged from the picture and the map [m].
+        y: Position to the north [m].
         distance: From the camera [m].
-        angle: How large it looks: the angle that it fills [rad].
+        angle: Apparent size: the angle that it fills [rad].
         contrast: Share of its contrast that the smoke before it leaves.
     """
 
@@ -52,14 +52,14 @@ class Observation(NamedTuple):
 
     Attributes:
         tick: The robot's own clock when it was taken [ms]; it agrees with no other clock.
-        x: Where the robot is, judged from the picture and the map [m].
-        y: The same to the north [m].
-        heading: Where it points [rad].
-        speed: How fast the picture says it goes [m/s].
-        turn_rate: How fast the picture says it turns [rad/s].
-        hazards: What burns, leaks or floods in view.
-        visibility: How far the camera sees what does not shine, through the smoke before it
-            [m]; `CLEAR` where there is none.
+        x: Position of the robot to the east, judged from the picture and the map [m].
+        y: Position to the north [m].
+        heading: Heading [rad].
+        speed: Speed seen in the picture [m/s].
+        turn_rate: Turn rate seen in the picture [rad/s].
+        hazards: Fires, leaks and floods in view.
+        visibility: Distance at which the camera sees what does not shine, through the smoke before
+            it [m]; `CLEAR` without smoke.
     """
 
     tick: int
@@ -131,7 +131,7 @@ class Cameras(NamedTuple):
     """Sources of robots' pictures, and the addresses where an operator's screen finds them.
 
     Attributes:
-        url: Of a robot's camera, by its label and address.
+        url: Function that returns the URL of a robot's camera, by its label and address.
         topic: On which its frames are published, by that URL; None: it shows nothing of use.
     """
 

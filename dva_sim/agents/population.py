@@ -47,21 +47,21 @@ class Population(Config):
         crossover_rad_s: Gain of turning towards a target.
         caution: Share of the look-ahead that the robot may cover during the whole delay.
         pace: Share of the robot's top speed that the person cares to drive.
-        confirm_look_s: How long an event in plain view is looked at until the person is sure, on
-            average: its criterion; who is in haste takes less, and is wrong more often.
+        confirm_look_s: Mean time for which an event in plain view is looked at until the person is
+            sure: its criterion. A hasty person takes less, and is wrong more often.
         reading_s: From an order on the screen to acting on it.
-        position_error_m: How well the robot's place is judged from the picture.
-        heading_error_rad: The same for its heading.
+        position_error_m: Error of the robot's position, as judged from the picture.
+        heading_error_rad: Error of the robot's heading, as judged from the picture.
         reaction_s: From the sight of a new goal to the first movement, the perceptual delay in it.
         margin: Gain x delay of the loops that the person closes stays below this; pi/2 is the
             limit of stability.
         motor_noise: Standard deviation of what the hand does, as a share of it.
         pointing_rad_s: Gain of bringing a cursor to its target, however short the delay.
-        sensitivity: How well a second in plain view tells an event from none, in standard
+        sensitivity: Discrimination of an event from none per second in plain view, in standard
             deviations [1/sqrt(s)].
-        search_s: How long the person looks around at a place before it says that nothing is
+        search_s: Time that the person looks around at a place before reporting that nothing is
             there.
-        patience_s: How long it goes on without getting anywhere, or without seeing anything.
+        patience_s: Time that it continues without progress, or without seeing anything.
         switch_s: From turning to another robot's picture to understanding it.
         tempo: Time that everything takes which the person does itself, against the median person.
         waits_from_s: New delay at which half of its movements are followed by a wait.
@@ -143,7 +143,7 @@ def with_medians(profile: P, medians: Mapping[str, float], whose: str) -> P:
     """Return the profile with other medians; the spreads between persons stay.
 
     Args:
-        profile: Whose fields are traits, or numbers that all persons share.
+        profile: Profile whose fields are traits, or numbers that all persons share.
         medians: By the name of the trait, such as `{"margin": 0.4}`.
         whose: Part of a scenario that names them.
 

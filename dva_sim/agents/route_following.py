@@ -70,7 +70,7 @@ class _Place:
     Attributes:
         leg: On which piece.
         along: The way to there [m].
-        x: Of who is there, who may be beside the route [m].
+        x: Position, which may be beside the route [m].
         y: Likewise.
         offset: Distance from the route [m]; infinite: not looked for yet.
     """
@@ -110,10 +110,10 @@ class _Line:
         """The place of who is here [m] and was at another; found once for all who ask together.
 
         Args:
-            last: Where it was.
+            last: Previous place.
             x: Position [m].
             y: Position [m].
-            reach: How far ahead, beyond what one may have come [m].
+            reach: Largest progress beyond the distance moved [m].
         """
         if last is not self._last or x != self._found.x or y != self._found.y:
             self._last, self._found = last, self._nearest(last, x, y, reach)
@@ -167,11 +167,11 @@ class Route:
 
     Args:
         points: Corners, shape `(n, 2)` [m], n >= 2.
-        reach: How far ahead, beyond what one may have come [m]. A corner may be cut by so much of
-            the route; where laps lie on each other, it should be well below a lap.
+        reach: Largest progress beyond the distance moved [m]. A corner may be cut by this much of
+            the route; where laps overlap, it should be well below a lap.
 
     Attributes:
-        points: As given.
+        points: Points as given.
         length: Whole way [m].
     """
 
@@ -199,7 +199,7 @@ class Route:
             x: Position [m].
             y: Position [m].
             heading: Heading [rad].
-            look_ahead: How far ahead on the route the target lies [m].
+            look_ahead: Distance of the target ahead on the route [m].
         """
         place = self._go_to(x, y)
         tx, ty = self.point_at(place.along + look_ahead)
@@ -239,7 +239,7 @@ class View(NamedTuple):
     Attributes:
         now: The driver's own clock [s].
         seen: The newest frame perceived, as the driver judges it.
-        delay: What the driver takes the whole delay to be, from an intent to its effect seen [s].
+        delay: Whole delay from an intent to its visible effect, as the driver perceives it [s].
     """
 
     now: float
@@ -267,7 +267,7 @@ class Reach:
     Attributes:
         speed: At most [m/s].
         turn_rate: At most, either way [rad/s].
-        radius: Of its sharpest curve [m]; 0: it turns on the spot.
+        radius: Radius of its sharpest curve [m]; 0: it turns on the spot.
     """
 
     speed: float
@@ -304,7 +304,7 @@ class PurePursuit:
     look-ahead, the person slows down instead. Where the route bends sharply it stops to turn.
 
     Args:
-        person: Whose gain, caution and pace it steers with.
+        person: Person with gain, caution and pace.
         reach: Limits of the robot.
     """
 
@@ -318,8 +318,8 @@ class PurePursuit:
 
         Args:
             route: The way to go.
-            view: What is seen, and when.
-            stop_before: Where to stop: so far before the end of the route [m].
+            view: Current observation and its time.
+            stop_before: Distance from the end of the route at which to stop [m].
         """
         person, reach, seen, habits = self.person, self.reach, view.seen, self._steering_habits
         delay = view.delay if view.delay > SHORTEST else SHORTEST
@@ -346,10 +346,10 @@ class PurePursuit:
 
         Args:
             route: The way to go.
-            view: What is seen, and when.
+            view: Current observation and its time.
             ahead: The point ahead.
-            look: How far ahead on the route it lies [m].
-            speed: As fast as one may [m/s].
+            look: Distance of the point ahead on the route [m].
+            speed: Speed limit [m/s].
         """
         distance = ahead.distance
         curvature = 2.0 * math.sin(ahead.bearing) / (distance if distance > 0.2 else 0.2)

@@ -22,17 +22,17 @@ class ControlRoomAgent:
         device: Its identity and ways to talk; of type `ControlRoom`.
 
     Attributes:
-        events: How each event stood when it was last told of, by number.
-        told_at: When that was [s].
-        devices: Who is registered, by id, as of the last list.
-        dispatch: How orders are given, and the own role; None: not told yet.
-        orders: What it drives robots for, as it wanted, by event.
-        on_event: Told of each change of an event.
-        on_list: Told when the DVA has told all events that there are.
-        on_dispatch: Told when orders are given otherwise.
-        on_record: Told of each decision.
-        gives_up: Whether it gives a robot up that another asks for.
-        on_message: Told of what the DVA says to it: a session that is over, an order that is.
+        events: Latest published state of each event, by number.
+        told_at: Time of that publication [s].
+        devices: Registered devices by id, from the latest list.
+        dispatch: Dispatch mode and own role; None until the first publication.
+        orders: Orders for robots that it drives at its own wish, by event.
+        on_event: Callback for each change of an event.
+        on_list: Callback once the DVA has sent all current events.
+        on_dispatch: Callback for each change of the dispatch mode.
+        on_record: Callback for each decision.
+        gives_up: True if it gives up a robot that somebody else asks for.
+        on_message: Callback for messages of the DVA to it: a session has ended, an order is over.
     """
 
     def __init__(self, device: AgentDevice) -> None:

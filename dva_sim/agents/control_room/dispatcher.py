@@ -26,9 +26,9 @@ class Turned:
     """Actions taken on an event.
 
     Attributes:
-        acknowledged: Whether it has been acknowledged, by whomever.
-        looks: How often it has been looked at: each look takes a time of its own.
-        tries: How often a decision was refused in a row.
+        acknowledged: True once anybody has acknowledged it.
+        looks: Number of looks so far: each look takes a time of its own.
+        tries: Number of decisions refused in a row.
     """
 
     acknowledged: bool = False
@@ -40,8 +40,8 @@ class ScriptedDispatcher:
     """Somebody at a control room.
 
     Args:
-        room: What it sees and acts by.
-        profile: How it works.
+        room: Control room that it sees and acts by.
+        profile: Working habits.
         luck: A random stream by name: each delay and each whim has its own.
     """
 

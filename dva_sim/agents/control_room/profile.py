@@ -19,13 +19,13 @@ class Overrule(Config):
     """Condition under which a person overrules the policy; omitted keys match anything.
 
     Attributes:
-        kind: Of the event.
-        severity_from: Of the event, as reported, 0 to 1.
-        confidence_below: That there is something at all, 0 to 1.
-        advised: Whom the policy would send: a `robot` or a `guard`.
+        kind: Kind of the event.
+        severity_from: Lowest reported severity of the event, 0 to 1.
+        confidence_below: Upper bound of the confidence that the event is real, 0 to 1.
+        advised: Kind of responder advised by the policy: a `robot` or a `guard`.
         sends: The earliest there of this kind instead, if any can go; `nobody`: it is a false
             alarm; `others`: it is escalated.
-        share: How often it does so where all this holds.
+        share: Share of such cases in which the person overrules.
     """
 
     kind: EventKind | None = None
@@ -40,10 +40,10 @@ class DispatcherProfile(Config):
     """A person at a control room who acknowledges events and decides on them, one at a time.
 
     Attributes:
-        role: What it may do: `look`, `drive`, `dispatch` or `supervise`.
+        role: Role: `look`, `drive`, `dispatch` or `supervise`.
         acknowledge_s: From when it turns to an event until it has acknowledged it.
         decide_s: From then, or from the DVA's question, until it has decided.
-        overrules: When it decides otherwise than the policy: the first that holds counts.
+        overrules: Conditions for overruling the policy: the first that holds counts.
     """
 
     role: RoleName = "dispatch"

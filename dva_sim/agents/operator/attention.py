@@ -41,7 +41,7 @@ class Screen(Protocol):
 
     Attributes:
         waits_since: From when on the robot has waited for a judgement [s]; None: it does not.
-        log: Told when it is looked at.
+        log: Log of the drive, which counts looks.
     """
 
     waits_since: float | None
@@ -66,7 +66,7 @@ def next_screen(
         current: Place of the one that is looked at, if any is.
         since: From when on it was [s].
         waits: From when on each robot has waited for a judgement [s]; None: it does not.
-        seen: When each was looked at last [s].
+        seen: Time of the latest look at each [s].
         glance: Time for which one that only drives is looked at [s].
     """
     waiting = [(time, place) for place, time in enumerate(waits) if time is not None]
@@ -85,8 +85,8 @@ class Attention:
 
     Args:
         clock: The run's clock.
-        switch: What it takes to find into another screen [s].
-        habits: Of the person.
+        switch: Time to find into another screen [s].
+        habits: Habits of the person.
         noise: Standard normal numbers, one for each look.
     """
 
@@ -167,13 +167,13 @@ class OperatorSetup:
 
     Attributes:
         pattern: Makes what carries the commands of a drive of a robot, by its id.
-        window: How many commands may be unanswered at once, where the pattern allows several.
+        window: Maximum number of unanswered commands, where the pattern allows several.
         rate_hz: Wanted commands per second.
-        timeout: Of a request [s].
-        attempts: Of a request.
+        timeout: Time-out of a request [s].
+        attempts: Number of attempts of a request.
         truth: The true state of a robot by id, if the strategy is the oracle; else None.
-        guarded: Whether a collision guard may hold a robot back.
-        heeds: Whether the app acts on being refused; see `CommandSender`.
+        guarded: True if a collision guard may hold a robot back.
+        heeds: True if the app reacts to refusals; see `CommandSender`.
         topic: On which a camera's frames are published, by its URL; see `Cameras`.
     """
 
@@ -193,18 +193,17 @@ class DriverSeat:
 
     Args:
         device: Identity and ways to talk.
-        person: Who it is.
         phone: The phone in the hand.
-        strategy: How the person drives a robot that can do so much.
-        reach: What a robot can do, by its id.
+        strategy: Function that makes the person's strategy for a robot with these limits.
+        reach: Limits of a robot, by its id.
         planner: The person knows the building.
         setup: Pattern, rate, time-outs.
-        rng: Luck of this person's judgement.
-        looks: Luck of its looks at an event, by a name for each time that it goes there.
+        rng: Random generator of this person's judgement.
+        looks: Random generators of its looks at an event, by a name for each visit.
 
     Attributes:
-        delay: What the person has learnt of the delay.
-        attention: Which robot's picture it looks at.
+        delay: The person's estimate of the delay.
+        attention: Choice of the robot's picture to look at.
     """
 
     def __init__(

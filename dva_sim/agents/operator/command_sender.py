@@ -36,19 +36,19 @@ class CommandSender:
         pattern: This drive's.
         drive: Log of this drive; names the robot.
         session: Session of this drive.
-        phone: What makes commands of the tilt.
+        phone: Source of commands from the tilt.
         rate_hz: Wanted commands per second.
-        timeout: Of a command that is to be answered [s].
-        attempts: Of the same.
-        window: How many of those may be unanswered at once.
+        timeout: Time-out of a command that needs a reply [s].
+        attempts: Number of attempts of such a command.
+        window: Maximum number of such commands without a reply.
         seen_tick: The newest robot tick on the screen [ms], if there is any.
-        on_lost: Told why, when nobody answers any more.
-        on_refused: Told why, when nobody obeys any more.
-        heeds: Whether the app acts on being refused.
+        on_lost: Callback with the reason when nobody replies any more.
+        on_refused: Callback with the reason when nobody obeys any more.
+        heeds: True if the app reacts to refusals.
 
     Attributes:
         drive: The log of this drive.
-        failures: How often a pattern of a user raised an error.
+        failures: Number of errors raised by a user's pattern.
         first_failure: The first of those, in a line.
     """
 

@@ -27,12 +27,12 @@ class DelayEstimate:
     Nobody tells a person the delay: this is all that it knows.
 
     Args:
-        start: When the drive or the trial begins [s].
-        guess: What the person expects at first: what it learnt before [s].
+        start: Start of the drive or the trial [s].
+        guess: Initial estimate, learnt before [s].
         step: Resolution of the guess [s].
         scale: For each of the two channels, the difference that counts one, in its unit; left
             out: those of driving.
-        habits: Of the person.
+        habits: Habits of the person.
         hand: Lag of the hand, which is felt: only the rest is learnt from the picture [s].
 
     Attributes:
@@ -76,7 +76,7 @@ class DelayEstimate:
 
         Args:
             now: [s]
-            one: Of the motion; see `intend`.
+            one: First component of the motion; see `intend`.
             other: Likewise.
             over: The time up to `now` over which the motion was summed [s].
         """
@@ -182,9 +182,9 @@ class PeriodEstimate:
 
         Args:
             now: [s]
-            one: Of the motion; see `intend`.
+            one: First component of the motion; see `intend`.
             other: Likewise.
-            delay: What the person takes the whole delay to be [s].
+            delay: Whole delay as the person perceives it [s].
         """
         self._delay = delay
         for channel, motion in zip(self._channels, (one, other), strict=True):
@@ -250,8 +250,9 @@ class _Channel:
     """Speed or turn rate: whether it is asked for and seen, and the move that is followed.
 
     Attributes:
-        move: That is followed; None: what began when something else still moved tells nothing.
-        moves: Whether motion is seen.
+        move: Move that is followed; None: a move that began while another was still seen teaches
+            nothing.
+        moves: True while motion is seen.
     """
 
     def __init__(self) -> None:
@@ -264,7 +265,7 @@ class _Channel:
         Args:
             now: [s]
             delay: After which the last move should have been seen [s].
-            asks: Whether motion is asked for.
+            asks: True if motion is requested.
         """
         lost, last = 0.0, self.move
         if asks and not self._asks:
@@ -282,8 +283,8 @@ class Timing:
     """Misjudgement of a time by a person: a share of it that changes from moment to moment.
 
     Args:
-        habits: How much, and how fast that changes.
-        rng: Luck of it.
+        habits: Habits that set the size and speed of the errors.
+        rng: Random generator of the errors.
 
     References:
         J. Gibbon: Scalar expectancy theory and Weber's law in animal timing. Psychological Review
@@ -306,7 +307,7 @@ class Timing:
         """Return the perceived delay at a moment [s]: only its new part is misjudged.
 
         Args:
-            delay: As it was learnt [s].
+            delay: Learnt delay [s].
             usual: To which the person is used [s].
             now: [s]
         """

@@ -77,7 +77,7 @@ class CloseQuarters:
             now: [s]
             seen: The frame, as the person judges it.
             asked: Speed that the person asks for [m/s].
-            delay: What the person takes the whole delay to be [s].
+            delay: Whole delay as the person perceives it [s].
         """
         here, habits = (seen.x, seen.y), self._habits
         if self._from is not None and math.dist(here, self._from) > habits.clear_m:
@@ -120,10 +120,10 @@ class Teleoperation(Work):
     """One drive by tilting the phone: direct control, or coordinated if the robot has a guard.
 
     Args:
-        seat: Who drives, with what.
-        order: Where to, and why.
-        log: What is measured of it.
-        on_end: Told once how it ended: the drive, the outcome, and why.
+        seat: Person and equipment.
+        order: Order with destination and reason.
+        log: Log of the drive.
+        on_end: Callback at the end, once: the drive, the outcome, and the reason.
     """
 
     at_once = 1  # two hands, one phone
@@ -256,9 +256,10 @@ class Teleoperation(Work):
         """Return the command to give; the guard's narrow mode is for those who know it holds them.
 
         Args:
-            seen: What is seen now.
-            delay: What the whole delay is taken to be [s].
-            usual: How the person drives otherwise, told where to stop before the end of the way.
+            seen: Current observation.
+            delay: Perceived whole delay [s].
+            usual: The person's usual way of driving, given where to stop before the end of the
+                route.
         """
         careful, keep = self._close_quarters, self._keep_off(seen)
         if careful is None:

@@ -30,7 +30,7 @@ class Console:
     Attributes:
         setup: Pattern, rate, time-outs, as of simulated operators.
         phone: Turns what a person wants into commands.
-        reach: What a robot can do, by its id.
+        reach: Limits of a robot, by its id.
     """
 
     setup: OperatorSetup
@@ -42,8 +42,8 @@ class Gathered:
     """One answer made of several: all must be good, else only what failed is said.
 
     Args:
-        count: How many are to come.
-        said: Told once all have.
+        count: Number of expected answers.
+        said: Callback once all have come.
 
     Attributes:
         failed: Called before, if one was not good.

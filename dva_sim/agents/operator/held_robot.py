@@ -37,23 +37,23 @@ class HeldRobot:
     Args:
         device: The person's.
         robot: By its id.
-        console: What the person works with by now.
+        console: Current equipment of the person.
         tilt: Gives what makes commands of what the person wants, for the next drive.
-        alert: Told what the person has to know.
-        let_go: Told that the robot is in these hands no longer.
-        wanted: Tells whether the person has a robot in hand by now, by its id.
+        alert: Callback with messages for the person.
+        let_go: Callback once the person no longer controls the robot.
+        wanted: Predicate: True if the person controls a robot by now, by its id.
 
     Attributes:
-        phase: Where it stands.
-        session: Of the permission; 0: none.
-        log: Of the newest drive.
+        phase: Current phase.
+        session: Session of the permission; 0: none.
+        log: Log of the newest drive.
         frame: The newest picture that has arrived.
-        arrived: When it did [s].
-        drawn: When the picture was taken that the person's page has drawn last [s]; before the
-            first one, when the drive began. None: the page does not say what it draws.
-        event: What the next drives are for; 0: no event.
+        arrived: Arrival time of that picture [s].
+        drawn: Capture time of the picture last drawn by the person's page [s]; before the first
+            one, the start of the drive. None: the page does not report it.
+        event: Event of the next drives; 0: no event.
         last: The newest input.
-        level: Of the permission that was asked for.
+        level: Level of the requested permission.
         app: Makes the commands of the newest drive.
     """
 
@@ -209,7 +209,7 @@ class HeldRobot:
         picture, whatever has arrived here since.
 
         Args:
-            captured_ms: When the picture was taken [ms]; None: none is drawn yet.
+            captured_ms: Capture time of the picture [ms]; None: none is drawn yet.
         """
         if not self._ticks:
             return  # a robot without a camera is driven in sight

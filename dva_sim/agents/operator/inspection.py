@@ -56,15 +56,15 @@ class Evidence:
     rare.
 
     Args:
-        sensitivity: Of the person: how well a second in plain view tells an event from none, in
-            standard deviations [1/sqrt(s)].
-        look: How long an event in plain view is looked at until the person is sure [s]; the
-            criterion is what that adds up to.
+        sensitivity: Sensitivity of the person: how well a second in plain view tells an event from
+            none, in standard deviations [1/sqrt(s)].
+        look: Time for which an event in plain view is looked at until the person is sure [s]; it
+            sets the criterion.
         luck: Standard normal numbers, one for each look.
-        habits: Of the person.
+        habits: Habits of the person.
 
     Attributes:
-        level: Of the evidence.
+        level: Level of the evidence.
         criterion: From this level on, the person is sure.
     """
 
@@ -89,8 +89,8 @@ class Evidence:
         """Look for some time [s].
 
         Args:
-            duration: What the look is worth.
-            clear: How much what is seen looks like the event, from 0 (not at all) to 1.
+            duration: Effective length of the look.
+            clear: Similarity of what is seen to the event, from 0 (none) to 1.
             contrast: Share of the contrast that smoke leaves.
         """
         weight = math.sqrt(contrast)
@@ -110,10 +110,9 @@ class Looking:
     smoke refutes nothing: it waits, and in the end gives up.
 
     Args:
-        kind: Of the event.
-        place: Where it is said to be [m].
+        kind: Kind of the event.
+        place: Reported position [m].
         planner: The person knows the building.
-        person: Who looks.
         luck: Standard normal numbers, one for each look.
         arrived: Called once, when the event or its place is before the robot.
     """
@@ -177,9 +176,9 @@ class Looking:
         """At the place: look around for a while, if anything can be seen, then say so.
 
         Args:
-            gap: How long the person has been looking since the last picture [s].
+            gap: Looking time since the last picture [s].
             seen: The picture.
-            nothing: Whether the event is not in it.
+            nothing: True if the event is not in the picture.
         """
         if not self.at_place:
             return None

@@ -32,12 +32,12 @@ class OperatorAgent:
     """A person with a phone in the control room.
 
     Args:
-        seat: Who it is, and what is at hand.
-        kind: How it has robots look at events: `Teleoperation`, or `Supervision` of missions.
-        span: How many orders it has in hand at most.
+        seat: Person and equipment.
+        kind: Way in which robots look at events: `Teleoperation`, or `Supervision` of missions.
+        span: Maximum number of orders handled at once.
 
     Attributes:
-        works: What is under way, also while it is wound up, by robot.
+        works: Work under way or being wound up, by robot.
     """
 
     def __init__(self, seat: DriverSeat, kind: type[Work] = Teleoperation, span: int = 1) -> None:

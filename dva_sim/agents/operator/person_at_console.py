@@ -27,18 +27,18 @@ class PersonAgent:
     """A seat of a console, with or without somebody in it.
 
     Args:
-        device: Who it is on the wire.
-        console: What it works with.
+        device: Device of the seat on the network.
+        console: Equipment.
         tilt: Gives what makes commands of what the person wants, for the next drive; if not given,
             what is wanted enters as tilt.
 
     Attributes:
-        console: As given; another counts from the next drive on.
-        attended: Whether somebody sits there.
+        console: Equipment; a new one counts from the next drive on.
+        attended: True if the seat is taken.
         order: The newest order of the DVA, until it is settled or declined.
-        robots: What is in hand, by id.
-        alert: What the person has to know, in words.
-        on_robot: Told of each robot that is taken, to be watched.
+        robots: Robots under control, by id.
+        alert: Message for the person.
+        on_robot: Callback for each robot taken, so that it is watched.
     """
 
     def __init__(

@@ -29,13 +29,13 @@ class LineConfig(Config):
     """One number to compare with.
 
     Attributes:
-        what: What it is, in words.
+        what: Description of the number.
         unit: Empty for a plain number.
-        target: As published, if a single number was.
-        low: What passes begins here; left out, anywhere below `high`.
-        high: What passes ends here.
+        target: Published value, if a single number was.
+        low: Lower end of the passing band; by default anything below `high`.
+        high: Upper end of the passing band.
         above: The whole Monte Carlo interval has to lie above this, where the sign is what counts.
-        below: The same the other way round.
+        below: The whole Monte Carlo interval has to lie below this.
         beside: Shown beside what is compared, never counted: it has a target and no band.
     """
 
@@ -66,8 +66,8 @@ class CheckConfig(Config):
     """One published result.
 
     Attributes:
-        metric: What was measured.
-        tag: How sure its numbers are; the file says what the letters mean.
+        metric: Quantity that was measured.
+        tag: Certainty of its numbers; the file explains the letters.
         source: The publication, or the derivation.
         lines: Its numbers, by name; each is a verdict of its own.
     """
@@ -82,12 +82,12 @@ class SupportConfig(Config):
     """Range of delays that published data cover.
 
     Attributes:
-        strategies: Whom they speak of.
-        steering: What people did there: `closed`, they steered by what they saw; `waiting`, they
-            moved and waited.
+        strategies: Strategies that the data cover.
+        steering: Behaviour observed there: `closed`, steering by what was seen; `waiting`, moving
+            and waiting.
         low_s: From.
         high_s: To.
-        why: Whose data.
+        why: Source of the data.
     """
 
     strategies: tuple[str, ...]
@@ -101,7 +101,7 @@ class CurveConfig(Config):
     """Points that people gave, drawn beside what is simulated.
 
     Attributes:
-        what: What they are.
+        what: Description of the points.
         source: The publication.
         x: Conditions.
         y: Values.
@@ -128,8 +128,8 @@ class TargetFile(Config):
     """The file of targets.
 
     Attributes:
-        description: What it is.
-        tags: What the letters of a tag mean.
+        description: Description of the file.
+        tags: Meanings of the letters of a tag.
         checks: Published results by their short name.
         curves: Points of people by the name of the figure.
         support: Delays that published data cover.
@@ -162,10 +162,10 @@ class SplitFile(Config):
     """Split of the checks: lists of checks by publication.
 
     Attributes:
-        description: What it is.
-        rule: When the whole passes.
-        strategy: How the persons of every task drive unless asked otherwise.
-        strategy_why: Why that one.
+        description: Description of the file.
+        rule: Rule by which the whole passes.
+        strategy: Default strategy of the persons in all tasks.
+        strategy_why: Reason for that strategy.
         exact: Answers that nobody measured on persons.
         fit: May influence parameters; shown, never counted.
         held_out: May influence nothing; counted.
@@ -216,17 +216,17 @@ class TargetLine:
 
     Attributes:
         check: Short name of the published result.
-        name: Of the line within it.
-        metric: What the publication measured.
-        what: What this line is.
-        source: Where its numbers come from.
-        tag: How sure they are.
-        kind: Whether it counts.
-        publication: As the split groups checks.
+        name: Name of the line within the check.
+        metric: Quantity that the publication measured.
+        what: Description of the line.
+        source: Source of its numbers.
+        tag: Certainty of the numbers.
+        kind: Kind of line, which decides if it counts.
+        publication: Publication, by which the split groups checks.
         unit: Empty for a plain number.
-        target: As published, if a single number was.
-        low: What passes begins here; None: anywhere below `high`.
-        high: What passes ends here; None: anywhere above `low`.
+        target: Published value, if a single number was.
+        low: Lower end of the passing band; None: anywhere below `high`.
+        high: Upper end of the passing band; None: anywhere above `low`.
         above: The whole interval lies above this; None: it need not.
         below: The whole interval lies below this; None: it need not.
     """
@@ -348,7 +348,7 @@ def ranges(strategy: str, steering: str | None = None) -> tuple[tuple[float, flo
     """Delays of the loop at which people were watched, each from and to [s].
 
     Args:
-        strategy: Of the operators.
+        strategy: Strategy of the operators.
         steering: `closed` or `waiting`: only of people who steered so.
     """
     supports = supports_of(strategy)

@@ -27,9 +27,9 @@ class Refusals:
 
     Attributes:
         me: Id of the device that drives.
-        codes: How often commands were answered with each code but OK.
+        codes: Number of replies other than OK to commands, by code.
         last: The code that ended it.
-        late: Whether every command has come late for `LATE_FOR`.
+        late: True if every command has come late for `LATE_FOR`.
     """
 
     me: str
@@ -47,7 +47,7 @@ class Refusals:
         """A command was answered: why nobody obeys any more, or nothing.
 
         Args:
-            code: Of the reply; None if it cannot be read, or answers something else.
+            code: Code of the reply; None if it cannot be read, or belongs to something else.
             now: Time [s].
         """
         if code == m.OK:
@@ -69,9 +69,9 @@ class Refusals:
 
         Args:
             holder: Id of the device that may act; None: nobody.
-            code: How its newest command fared, or would; None: as it should.
+            code: Code that its newest command got, or would get; None: OK.
             now: Time [s].
-            sent: How many commands were sent so far: of none, nothing new can be said.
+            sent: Number of commands sent so far; without any, nothing new can be concluded.
         """
         code = m.OK if code is None else code
         ours, goes_on, self._sent = holder == self.me, sent > self._sent, sent

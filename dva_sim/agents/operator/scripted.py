@@ -36,13 +36,13 @@ class ScriptedOperator:
 
     Args:
         device: Identity and ways to talk.
-        script: Makes the script; told the operator, whom it may ask for `seen_tick`.
+        script: Function that makes the script for the operator, which it may ask for `seen_tick`.
 
     Attributes:
-        transcript: What was asked and answered: the name of the message, and the reply code;
-            -1 if there was no reply.
-        done: Whether the script has ended.
-        asked: How many requests were made.
+        transcript: Requests and replies: the name of the message, and the reply code; -1 without a
+            reply.
+        done: True once the script has ended.
+        asked: Number of requests.
     """
 
     def __init__(self, device: AgentDevice, script: Callable[[ScriptedOperator], Script]) -> None:
@@ -120,8 +120,8 @@ def drill(operator: ScriptedOperator, commands: int = 200) -> Script:
     """A whole session: find a robot, drive it, stop it by emergency, be refused, drive again.
 
     Args:
-        operator: Who follows the script.
-        commands: How many commands the first drive has.
+        operator: Operator that follows the script.
+        commands: Number of commands in the first drive.
     """
     dva = operator.device.dva
     robot, session = yield from _take_a_robot(dva)

@@ -34,15 +34,15 @@ def watch(
     """Ask a robot where its camera is, and watch it.
 
     Args:
-        device: Whose screen it is.
+        device: Device with the screen.
         robot: By its id.
-        session: Of the permission.
+        session: Session of the permission.
         topic: On which the frames of a URL are published; see `Cameras`.
         on_frame: Takes each frame.
-        seen: Told once it is watched.
-        blind: Told the URL, if there is nothing to see there.
-        wanted: Whether it still is.
-        unreachable: Told that the robot does not answer.
+        seen: Callback once it is watched.
+        blind: Callback with the URL, if there is nothing to see there.
+        wanted: Predicate: True while it is still wanted.
+        unreachable: Callback if the robot does not reply.
     """
 
     def answered(reply: m.Reply) -> None:
@@ -74,16 +74,16 @@ def start(
     """Ask a robot to begin, again and again while it may not know of the permission yet.
 
     Args:
-        device: Who asks.
+        device: Device that sends the request.
         robot: By its id.
-        body: What is asked.
-        session: Of the permission, as it is by then.
-        wanted: Whether it still is.
-        begun: Told that the robot agrees.
-        refused: Told why it does not.
-        lost: Told that it does not answer.
+        body: Content of the request.
+        session: Current session of the permission.
+        wanted: Predicate: True while it is still wanted.
+        begun: Callback once the robot agrees.
+        refused: Callback with the reason for a refusal.
+        lost: Callback if it does not reply.
         waits: Takes the reply that refuses, each time before it is asked again.
-        tries: Which one this is.
+        tries: Number of this attempt.
     """
     if not wanted():
         return
@@ -138,10 +138,10 @@ def give_back_unanswered(
     Who is alive keeps what it was granted, so the DVA is asked until it says what that was.
 
     Args:
-        device: Whose permission.
-        robot: Of the robot.
-        level: As in the request.
-        is_wanted: Whether the robot is wanted again: as long as it is, nothing is given back.
+        device: Device with the permission.
+        robot: Id of the robot.
+        level: Level as in the request.
+        is_wanted: Predicate: while the robot is wanted again, nothing is given back.
     """
 
     def answered(reply: m.Reply) -> None:

@@ -25,20 +25,21 @@ class Work:
     """One order to look at an event through a robot, in whatever way it is controlled.
 
     Args:
-        seat: Who works, with what.
-        order: Where to, and why.
-        log: What is measured of it.
-        on_end: Told once how it ended: the work, the outcome, and why.
+        seat: Person and equipment.
+        order: Order with destination and reason.
+        log: Log of the drive.
+        on_end: Callback at the end, once: the work, the outcome, and the reason.
 
     Attributes:
-        at_once: How many of its kind one person does at once; None: as many as it may.
-        level: Of the permission that it needs.
-        verb: What the person does with the robot, in words.
-        wish: What the person shall do with it, in words.
-        session: Of the permission; 0 before there is one.
-        granted: Whether there ever was one.
+        at_once: Number of works of this kind that one person does at once; None: no limit of its
+            own.
+        level: Level of the permission that it needs.
+        verb: Verb for the person's action on the robot.
+        wish: Request to the person, in words.
+        session: Session of the permission; 0 before there is one.
+        granted: True once a permission was granted.
         picture: The robot's camera, once it is watched.
-        over: Whether it has ended.
+        over: True once it has ended.
         waits_since: From when on the robot has waited for a judgement [s]; None: it does not.
     """
 

@@ -64,23 +64,23 @@ class BystanderAgent(OnFoot):
     """One bystander.
 
     Args:
-        name: As in `bystander-1`.
+        name: Name as in `bystander-1`.
         clock: The run's.
-        occupant: Who it is.
+        occupant: Properties of the person.
         walking: Its legs.
         planner: It knows the building.
-        places: Where it works; it begins at the first [m].
-        refuges: Where it is safe [m].
-        luck: Decides where it walks while nothing is wrong, and when.
-        air: What it is like at a place [m] and time [s].
-        sees: Whether flames can be seen from a place [m] at a time [s].
+        places: Working places; it begins at the first [m].
+        refuges: Safe places [m].
+        luck: Random generator of its walks in normal times.
+        air: Conditions at a place [m] and time [s].
+        sees: Predicate: True if flames are visible from a place [m] at a time [s].
         leaves: Called when it is out: its body goes.
-        tell: Told in words what happens to it.
+        tell: Callback with descriptions of what happens to it.
 
     Attributes:
-        activity: What it does now.
-        leaves_at: When it sets out to leave [s]; infinite until it is alarmed.
-        out_at: When it was out [s]; infinite until then.
+        activity: Current activity.
+        leaves_at: Time of setting out to leave [s]; infinite until it is alarmed.
+        out_at: Time of reaching the outside [s]; infinite until then.
     """
 
     def __init__(
@@ -205,9 +205,9 @@ def draw_places(
     """Places of one person [m]: rooms by their area, anywhere in them.
 
     Args:
-        site: Where; on a bare map, which has no rooms, anywhere.
-        rng: Source of luck.
-        count: How many.
+        site: Site of the places; on a bare map, which has no rooms, anywhere.
+        rng: Random generator.
+        count: Number of places.
         taken: The first place is not near any of these [m].
 
     Raises:

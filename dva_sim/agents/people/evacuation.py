@@ -112,10 +112,10 @@ def choose_escape(
 
     Args:
         planner: Knows the site.
-        here: Where one is; who stands in bad air goes through no worse to the first good place.
-        refuges: Where one is safe, whatever it is like right there: outdoors is beyond [m].
+        here: Current position; a person in bad air goes through no worse to the first good place.
+        refuges: Safe places, regardless of the conditions there: outdoors is beyond [m].
         limits: Each says how much of what one bears a place is; the strictest first.
-        habits: Of the person.
+        habits: Habits of the person.
     """
     for k in range(len(limits)):
         escape = _keeping(planner, here, refuges, limits[k:], habits)
@@ -205,12 +205,12 @@ class Exposure:
 
     Args:
         clock: The run's.
-        walking: Where the person is; smoke and water slow it down.
-        air: What it is like at a place [m] and time [s].
+        walking: Motion of the person; smoke and water slow it down.
+        air: Conditions at a place [m] and time [s].
 
     Attributes:
-        dose: Of heat and poison, so far.
-        conditions: What it was like when it was looked at last.
+        dose: Dose of heat and poison so far.
+        conditions: Conditions at the latest check.
     """
 
     def __init__(self, clock: Clock, walking: Walking, air: AirAt = clean_air) -> None:
@@ -285,8 +285,8 @@ class WayOut:
         clock: The run's.
         planner: It knows the building.
         walking: The person's legs.
-        exposure: What it goes through, and what it keeps off.
-        refuges: Where it is safe now [m].
+        exposure: Exposure of the person, and the conditions it avoids.
+        refuges: Currently safe places [m].
     """
 
     def __init__(
@@ -354,7 +354,7 @@ class OnFoot:
 
     Args:
         walking: Its legs.
-        exposure: What it goes through.
+        exposure: Exposure of the person.
     """
 
     def __init__(self, walking: Walking, exposure: Exposure) -> None:

@@ -39,12 +39,12 @@ class GuardAgent(OnFoot):
 
     Args:
         device: Identity and ways to talk.
-        walker: How this guard walks and works.
+        walker: Walking and working properties.
         planner: The guard knows the building.
         walking: Its legs; where they stand first is its post.
-        is_there: Whether something of a kind really is near a place [m].
-        contain: Told of what kind is dealt with near a place [m].
-        air: What it is like at a place [m] and time [s].
+        is_there: Predicate: True if a hazard of a kind really is near a place [m].
+        contain: Callback with the kind and place of a contained event [m].
+        air: Conditions at a place [m] and time [s].
         refuges: Ways out, where it is safe whatever the air there [m].
         smoke: Optical depth of the smoke between two places now.
     """

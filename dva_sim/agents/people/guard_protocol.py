@@ -24,8 +24,8 @@ class Errand:
     """Somewhere to go.
 
     Attributes:
-        place: Where.
-        order: What is to be done there; None: wait.
+        place: Destination.
+        order: Order to carry out there; None: wait.
     """
 
     place: m.Position
@@ -37,9 +37,9 @@ class GuardDecision(NamedTuple):
 
     Attributes:
         code: Reply code; anything but OK means that nothing has changed.
-        text: Why, for people.
-        changed: Whether there is another errand now, or none any more.
-        bid_on: What to offer for.
+        text: Reason in words.
+        changed: True if the errand has changed or ended.
+        bid_on: Task to bid on.
     """
 
     code: int
@@ -55,10 +55,10 @@ class GuardProtocol:
     Attributes:
         dva: Id of the DVA: only its orders count.
         mobilisation: From an order to the first step [s], for who was waiting.
-        is_at: Whether the guard stands at a place.
-        errand: What the guard is on now; None while it waits.
-        ready_at: When the guard can set out, or could [s].
-        unfit: Why the guard takes no orders now; empty while it does.
+        is_at: Predicate: True if the guard stands at a place.
+        errand: Current errand; None while it waits.
+        ready_at: Time at which the guard can set out, or could [s].
+        unfit: Reason why the guard takes no orders now; empty while it does.
     """
 
     dva: str

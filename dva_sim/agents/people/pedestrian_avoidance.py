@@ -64,12 +64,12 @@ def velocity(
     """The velocity to want now [m/s].
 
     Args:
-        me: Who walks.
-        heading: Where to, if nobody were there [rad].
-        speed: How fast, if nobody were there [m/s].
-        others: Who is near.
+        me: Person who walks.
+        heading: Desired heading without others [rad].
+        speed: Desired speed without others [m/s].
+        others: People and robots nearby.
         room: Distance to the nearest wall at many points `(n, 2)` [m].
-        habits: Of the person.
+        habits: Habits of the person.
     """
     angles = heading + FAN
     ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -165,7 +165,7 @@ class Courtesy:
 
     Args:
         doors: On the way, in its order.
-        habits: Of the person.
+        habits: Habits of the person.
     """
 
     def __init__(self, doors: list[Door], habits: WalkingHabits = USUAL) -> None:
@@ -176,9 +176,9 @@ class Courtesy:
         """The door that this person lets somebody else through first.
 
         Args:
-            me: Who walks.
-            gone: How far along the way [m].
-            near: Who else is near.
+            me: Person who walks.
+            gone: Distance covered along the path [m].
+            near: Other people nearby.
             now: [s]
         """
         habits = self._habits
@@ -213,10 +213,9 @@ def beside(
     """A place to wait beside the way through a door [m]: right of it if one fits, else left.
 
     Args:
-        door: Which.
-        me: Who waits; it stays where it is if there is no such place.
+        me: Person who waits; it stays where it is if there is no such place.
         room: Distance to the nearest wall at many points `(n, 2)` [m].
-        habits: Of the person.
+        habits: Habits of the person.
     """
     _, (ux, uy) = _towards(door, me)
     back, side = habits.waits_before_m, habits.waits_aside_m
@@ -238,8 +237,8 @@ def past(
 
     Args:
         robot: Stands there.
-        along: Where the way leads, as a unit vector.
-        me: Who squeezes past.
+        along: Direction of the path, as a unit vector.
+        me: Person who squeezes past.
         room: Distance to the nearest wall at many points `(n, 2)` [m].
         sideways: Half the depth of the person [m].
     """

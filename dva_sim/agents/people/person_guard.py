@@ -44,16 +44,16 @@ class PersonGuard(OnFoot):
     Args:
         device: Identity and ways to talk.
         walker: At what pace the DVA may expect it.
-        planner: Of the site's ways.
+        planner: Planner of the site.
         walking: Its body; where it stands first is its post.
         put: Puts that body somewhere else [m].
-        contain: Told of what kind is dealt with near a place [m].
-        air: What it is like at a place [m] and time [s].
+        contain: Callback with the kind and place of a contained event [m].
+        air: Conditions at a place [m] and time [s].
 
     Attributes:
-        attended: Whether somebody plays it.
-        answered: Whether the person has accepted the order.
-        alert: What the person has to know, in words.
+        attended: True if a person plays it.
+        answered: True once the person has accepted the order.
+        alert: Message for the person.
     """
 
     def __init__(

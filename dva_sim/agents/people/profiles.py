@@ -74,9 +74,9 @@ class Walker:
         look: From arrival to being sure [s].
         contain: From arrival until a leak or flood is over [s].
         extinguish: From arrival until a fire is out [s].
-        usual_mobilisation: What the guard itself expects of getting ready [s]: as long as
-            guards usually need. How long it takes this time shows when it is over.
-        habits: As of all guards.
+        usual_mobilisation: Time that the guard expects for getting ready [s], which is the usual
+            one. The actual time shows only when it is over.
+        habits: Habits of all guards.
     """
 
     speed: float
@@ -107,7 +107,7 @@ class BystanderProfile(PaceProfile):
     Attributes:
         premovement_s: From the alarm, or from noticing the danger, to the first step outwards.
         moving_share: Share of the people who change their place now and then.
-        stay_s: How long those stay at a place.
+        stay_s: Length of a stay at a place.
         habits: Numbers that are the same for all bystanders, none of them measured.
 
     References:
@@ -135,9 +135,9 @@ class Occupant:
     Attributes:
         speed: Walking [m/s].
         premovement: From the alarm to the first step [s].
-        moves: Whether it changes its place now and then.
-        stay: How long it then stays at a place [s].
-        habits: As of all bystanders.
+        moves: True if it changes its place now and then.
+        stay: Length of a stay at a place [s].
+        habits: Habits of all bystanders.
     """
 
     speed: float

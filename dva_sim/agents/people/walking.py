@@ -54,7 +54,7 @@ class Walk:
     """One walk of one person.
 
     Attributes:
-        goal: Where to [m].
+        goal: Destination [m].
         arrived: Called at its end.
         blocked: Called when it is given up.
         is_far_enough: From where on it need not be gone to its end.
@@ -83,15 +83,15 @@ class Walking:
     Args:
         clock: The run's.
         planner: The person knows the building.
-        ground: Where others are.
+        ground: World with all others.
         body: Its own.
-        speed: Of free walking [m/s].
+        speed: Free walking speed [m/s].
         doors: Ends of the doors, shape `(n, 4)` [m].
-        habits: Of the person; left out: the usual ones.
+        habits: Habits of the person; by default the usual ones.
 
     Attributes:
-        habits: Of the person.
-        heading: Where the person looks [rad].
+        habits: Habits of the person.
+        heading: Direction of view [rad].
         pace: Share of the free speed that smoke and water leave.
     """
 
@@ -137,7 +137,7 @@ class Walking:
         """Walk somewhere; what was under way before is forgotten.
 
         Args:
-            goal: Where to [m].
+            goal: Destination [m].
             arrived: Called there.
             blocked: Called if somebody is in the way for good.
             is_far_enough: From where on the way need not be gone to its end.

@@ -63,8 +63,8 @@ class Blocked(NamedTuple):
     """No lane is free.
 
     Attributes:
-        by: Who is in the way.
-        distance: How far it is until there [m].
+        by: The nearest obstacle in the lane.
+        distance: Distance to it [m].
         gap: The smallest gap to anybody on that lane [m].
         lane: The lane that leaves the others most room.
     """
@@ -80,7 +80,7 @@ class Avoidance:
     """Finds ways past others.
 
     Attributes:
-        name: Of this robot.
+        name: Name of this robot.
         radius: Its own [m].
         room_at: Distance to the nearest wall at points `(n, 2)` [m].
     """
@@ -110,9 +110,9 @@ class Avoidance:
 
         Args:
             route: The planned way.
-            along: How far one has come on it [m].
-            here: Where one is [m].
-            others: Who is near.
+            along: Distance covered along the route [m].
+            here: Current position [m].
+            others: Others nearby.
             last: The side that was chosen before [m].
         """
         way = np.arange(0.0, min(AHEAD, route.length - along) + STEP, STEP)
@@ -166,9 +166,9 @@ class Avoidance:
         A gap that is too small already may grow.
 
         Args:
-            points: Of lanes, shape `(k, n, 2)` [m].
-            places: Where others are meanwhile; see `_foreseen`.
-            others: Who they are.
+            points: Points of the lanes, shape `(k, n, 2)` [m].
+            places: Predicted positions of others; see `_foreseen`.
+            others: The others.
 
         Returns:
             The gaps, and of all lanes' points whether they are free, shape `(k, n)`.
@@ -183,9 +183,9 @@ class Avoidance:
         """The nearest place beside the way where one is in nobody's way; None if there is none.
 
         Args:
-            here: Where one is [m].
+            here: Current position [m].
             route: The way to leave free, shape `(n, 2)` [m].
-            others: Who is near.
+            others: Others nearby.
         """
         rings = np.arange(0.4, REFUGE + 0.1, 0.2)
         angles = np.arange(24) * (2.0 * math.pi / 24)

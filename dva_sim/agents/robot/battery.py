@@ -16,10 +16,10 @@ class BatteryProfile(Config):
     """Capacity of a battery and its consumers; the shipped numbers are assumed.
 
     Attributes:
-        idle_w: What computer, sensors and radio draw, driving or not.
+        idle_w: Power of computer, sensors and radio, driving or not.
         rolling_resistance: Force against rolling by weight.
         efficiency: Share of the energy taken that reaches the floor.
-        charging_w: What the base gives, besides what is drawn meanwhile.
+        charging_w: Charging power of the base, besides what is used meanwhile.
 
     References:
         J. Y. Wong: Theory of Ground Vehicles, 4th ed., Wiley 2008, chapter 1: rolling resistance
@@ -37,12 +37,12 @@ class Battery:
     """The charge of one robot, kept by counters that only grow, so it may be asked seldom.
 
     Args:
-        profile: What it holds and what draws on it.
-        mass: Of the robot [kg].
-        share: Of the capacity that it begins with.
+        profile: Capacity and consumers.
+        mass: Mass of the robot [kg].
+        share: Initial share of the capacity.
 
     Attributes:
-        energy: What it holds [J].
+        energy: Stored energy [J].
     """
 
     def __init__(self, profile: BatteryProfile, mass: float, share: float = 1.0) -> None:
@@ -70,7 +70,7 @@ class Battery:
             time: Now [s].
             distance: Driven altogether [m].
             work: Done by the motors altogether, besides rolling [J].
-            at_base: Whether the robot has stood at a base all that time, and was charged.
+            at_base: True if the robot has stood at a base all that time, and was charged.
         """
         spent, rolled, worked = time - self._time, distance - self._distance, work - self._work
         self._time, self._distance, self._work = time, distance, work

@@ -36,11 +36,11 @@ class Nearby(NamedTuple):
     Attributes:
         kind: `robot` or `person`.
         name: Robots know each other by name; of people it only tells one from the other.
-        x: Where [m].
-        y: The same to the north [m].
-        vx: How fast it goes east [m/s].
-        vy: The same to the north [m/s].
-        radius: Of the circle around it [m].
+        x: Position to the east [m].
+        y: Position to the north [m].
+        vx: Velocity to the east [m/s].
+        vy: Velocity to the north [m/s].
+        radius: Radius of the enclosing circle [m].
         keep: Gap between surfaces that a moving robot keeps to it [m].
     """
 
@@ -63,10 +63,9 @@ def who_is_near(
     """Everybody in sight, the nearest first; tracked, so that velocities are known.
 
     Args:
-        world: As of now.
-        body: Whose sensors look.
+        body: Robot whose sensors look.
         within: Their reach [m].
-        sees: Whether nothing stands between two places.
+        sees: Predicate: True if nothing stands between two places.
     """
     here = body.x, body.y
     found = []
@@ -101,8 +100,8 @@ class CollisionGuard:
     """Scales speed by the clearance ahead along the commanded arc.
 
     Attributes:
-        radius: Of the robot [m].
-        deceleration: That its brakes hold [m/s^2].
+        radius: Radius of the robot [m].
+        deceleration: Braking deceleration [m/s^2].
         room_at: Distance to the nearest wall at points `(n, 2)` [m].
     """
 
@@ -123,7 +122,7 @@ class CollisionGuard:
             pose: Position and heading [m, rad].
             speed: Asked for [m/s].
             turn_rate: Asked for; it stays as it is [rad/s].
-            others: Who is near.
+            others: Others nearby.
         """
         for _ in range(ROUNDS):
             if not speed > SLOWEST:
@@ -161,7 +160,7 @@ class CollisionGuard:
             pose: Position and heading [m, rad].
             speed: Above 0 [m/s].
             turn_rate: [rad/s]
-            others: Who is near, where they are now.
+            others: Others nearby, at their current positions.
             reach: Look no farther than that [m].
         """
         way = np.arange(0.0, reach + STEP, STEP)

@@ -55,10 +55,10 @@ class Letter(NamedTuple):
 
     Attributes:
         data: Its bytes.
-        arrived: When [s].
-        request: What it came by; None if nobody waits for an answer.
-        message: What it says, where the queue was told how to read it.
-        moves: Whether it is a command; everything else is control.
+        arrived: Arrival time [s].
+        request: Request that carried it; None if nobody waits for a reply.
+        message: Content, where the queue can decode it.
+        moves: True for a command; everything else is control.
     """
 
     data: bytes
@@ -93,11 +93,11 @@ class FairQueue:
     where there is no room at all, the newest of the longest line makes some, strangers first.
 
     Args:
-        limit: How many messages of the holder may wait; of others no more than `OTHERS`.
-        standing: Of a message, by now: a grant that comes meanwhile counts.
+        limit: Maximum number of queued messages of the holder; of others no more than `OTHERS`.
+        standing: Current standing of a message's sender: a grant that comes meanwhile counts.
 
     Attributes:
-        length: How many wait.
+        length: Number of queued messages.
     """
 
     def __init__(self, limit: int, standing: StandingOf) -> None:
@@ -197,18 +197,19 @@ class CommandQueue:
         handle: Takes each letter when its processing is done.
         latest_wins: Keep only the newest waiting command, as a subscriber that drains its
             socket before it works does.
-        limit: How many messages of the holder may wait, and how many emergencies.
+        limit: Maximum number of queued messages of the holder, and of emergencies.
         read: Reads what arrives, before it waits: what is None was refused, and takes no time.
             Without it all is taken as bytes, and only emergencies are read.
-        standing: Of a message, by now.
-        driven: Whether somebody drives the robot, so that strangers have to leave it time.
+        standing: Current standing of a message's sender.
+        driven: Predicate: True while somebody drives the robot, so that other senders must leave it
+            time.
         refuse: Takes each letter that there is no room for.
 
     Attributes:
-        service: As given; may be replaced at any time.
-        latest_wins: The same.
-        flow: Where published commands come from, if it can be told to wait: then a full inbox
-            takes nothing more until half of it is done. What cannot wait is dropped.
+        service: Service time; may be replaced at any time.
+        latest_wins: True to keep only the newest command; may be changed at any time.
+        flow: Source of published commands, if it can be paused: then a full inbox takes nothing
+            more until half of it is done. Commands of sources that cannot be paused are dropped.
     """
 
     def __init__(
@@ -401,9 +402,9 @@ class ServiceLaw(Config):
 
     Attributes:
         law: `constant`, `exponential`, `lognormal` or `gamma`.
-        mean_s: Of all messages but the first.
+        mean_s: Mean service time of all messages but the first.
         cv: Standard deviation over mean; of a lognormal or gamma law only.
-        first_s: What the first message takes (a cold start); left out: as the others.
+        first_s: Service time of the first message (a cold start); by default as the others.
     """
 
     law: Literal["constant", "exponential", "lognormal", "gamma"]

@@ -53,11 +53,11 @@ class Decision(NamedTuple):
 
     Attributes:
         code: Reply code; anything but OK means that nothing has changed.
-        text: Why, for people.
+        text: Reason in words.
         set_point: The new set point, or None to leave it.
         content: Content of the reply.
-        waits: Whether that is so only as long as the DVA has not said otherwise: it has to be
-            asked, and the message decided on again then.
+        waits: True if it holds only until the DVA has answered: the DVA must be asked, and the
+            message decided on again then.
     """
 
     code: int
@@ -91,16 +91,16 @@ class RobotController:
         id_tag: The robot.
         dva: Id of the DVA: the only one whose grants count.
         limits: Watchdog and age limit.
-        camera_url: Told to whoever asks for the sensors.
+        camera_url: URL given to those who ask for the sensors.
         sensors: The sensors it has.
-        clock_offset: What the robot's own clock shows at the run's start [s]; no other
-            clock agrees with it.
+        clock_offset: Time of the robot's own clock at the run's start [s]; no other clock agrees
+            with it.
         without_tick: Commands without `SeenTick` so far.
         future_ticks: Commands with one that the robot's clock has not reached.
         grant: The permission of its holder, as the DVA has confirmed it.
         observers: Those to read its sensors, by device, likewise.
-        inquiry: What the DVA has to be asked.
-        by_hand: Who drives it by hand, at the robot itself; None: nobody does.
+        inquiry: Open questions to the DVA.
+        by_hand: Person who drives it by hand, at the robot itself; None: nobody does.
     """
 
     id_tag: str
@@ -135,11 +135,11 @@ class RobotController:
         """Decide on a message.
 
         Args:
-            message: What was received and validated.
-            arrived: When it reached the robot [s]; it may have waited since.
+            message: Received and validated message.
+            arrived: Arrival time at the robot [s]; the message may have been queued since.
             now: Time [s].
-            moving: Whether the robot's wheels still turn.
-            waited: Whether it has waited for the DVA: this decision is the last.
+            moving: True while the robot's wheels still turn.
+            waited: True if it has waited for the DVA: this decision is final.
         """
         decision = self._handle(message, arrived, now, moving)
         if decision.waits and not waited:
@@ -212,7 +212,7 @@ class RobotController:
         """Begin again as after a restart of the program: idle, and with no known holder.
 
         Args:
-            clock_offset: What its clock shows at the run's start from now on [s].
+            clock_offset: New time of its clock at the run's start [s].
             now: Time [s].
         """
         self._idle("its computer was restarted")
@@ -232,7 +232,7 @@ class RobotController:
         Args:
             who: Stays on this side of the network.
             now: Time [s].
-            moving: Whether the robot's wheels still turn.
+            moving: True while the robot's wheels still turn.
         """
         if self.by_hand == who:
             return Decision(m.OK, "is in hand already")
@@ -250,7 +250,7 @@ class RobotController:
         """A set point of whom the robot is in the hands of; in force until the watchdog.
 
         Args:
-            who: As it took the robot.
+            who: Person, by the name under which the robot was taken.
             speed: [m/s]; there is no reverse.
             turn_rate: [rad/s]
             now: Time [s].
@@ -278,7 +278,7 @@ class RobotController:
         """The robot says how its mission goes on; True if that is news.
 
         Args:
-            state: As in `MissionStatus`; `done` and `failed` end the mission.
+            state: State as in `MissionStatus`; `done` and `failed` end the mission.
             left: Places still to be visited.
             reason: In words.
         """

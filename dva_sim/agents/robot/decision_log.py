@@ -26,7 +26,7 @@ class DecisionLog:
 
     Args:
         to: The file, whose folder must be there; or what takes each line.
-        controller: Whose decisions these will be.
+        controller: Controller to log.
     """
 
     def __init__(self, to: Path | Callable[[str], object], controller: RobotController) -> None:
@@ -93,7 +93,7 @@ def replay(
 
     Args:
         path: The file.
-        lines: What it holds, if that is known.
+        lines: Lines of the file, if already read.
 
     Yields:
         Each message, what was decided then, and what is decided now (reply contents left out).

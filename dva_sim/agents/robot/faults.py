@@ -20,14 +20,13 @@ class RobotFaults:
     """The faults of one robot.
 
     Args:
-        robot: Which.
-        lost: Told of each reply that is dropped: the robot, and the bytes.
+        lost: Callback for each dropped reply: the robot, and the bytes.
 
     Attributes:
-        processing_s: What each message takes its computer [s]; None: what it usually takes.
-        drops_replies: Whether whatever it answers is lost.
-        frozen: Whether its computer has hung up: it hears and says nothing.
-        camera_lost: Whether it takes no pictures.
+        processing_s: Processing time of each message [s]; None: the usual one.
+        drops_replies: True if all its replies are lost.
+        frozen: True if its computer hangs: it neither hears nor sends.
+        camera_lost: True if it takes no pictures.
         stuck: Sensors that give their last values for ever.
     """
 

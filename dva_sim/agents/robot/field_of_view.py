@@ -20,7 +20,7 @@ class HazardSpot(NamedTuple):
     """A hazard as the camera may see it: kind, place and radius [m].
 
     Attributes:
-        shines: Whether smoke does not hide it.
+        shines: True if it is visible through smoke.
     """
 
     kind: str
@@ -42,10 +42,11 @@ class FieldOfView:
 
     Attributes:
         angle: Whole angle of view [rad].
-        range: How far a hazard can be recognised [m].
-        line_of_sight: Whether no wall stands between two places.
+        range: Distance at which a hazard can be recognised [m].
+        line_of_sight: Predicate: True if no wall stands between two places.
         smoke: Optical depth of the smoke between two places now.
-        hazy: Whether smoke is in anybody's sight now: if not, `smoke` is zero everywhere.
+        hazy: Predicate: True if smoke impairs anybody's sight now; if not, `smoke` is zero
+            everywhere.
     """
 
     angle: float

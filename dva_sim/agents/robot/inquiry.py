@@ -27,7 +27,7 @@ class Inquiry:
 
     Attributes:
         asked: The question under way.
-        asked_at: When it was asked [s].
+        asked_at: Time of the question [s].
     """
 
     asked: m.GetGrant | None = None

@@ -87,10 +87,10 @@ class MissionLoop:
 
     Args:
         around: The robot and who is near.
-        controller: Told how the mission stands.
-        observe: What is in the picture now.
+        controller: Controller that receives the state of the mission.
+        observe: Function that returns the current observation.
         charge: Share of the battery's charge that is left.
-        on_news: Told when the mission stands otherwise than before.
+        on_news: Callback when the state of the mission changes.
     """
 
     def __init__(

@@ -39,9 +39,9 @@ class Sensed(NamedTuple):
 
     Attributes:
         now: [s]
-        view: Where it is, and what is in its picture.
-        nearby: Who is in sight and within reach.
-        jammed: Whether it drives against something and does not move.
+        view: Position, and content of its picture.
+        nearby: Others in sight and within reach.
+        jammed: True if it drives against something and does not move.
         charge: Share of its battery's charge that is left.
     """
 
@@ -67,7 +67,7 @@ class Manoeuvre:
     """Something that ends by itself.
 
     Attributes:
-        state: Of the mission meanwhile.
+        state: State of the mission meanwhile.
         reason: In words.
     """
 
@@ -124,9 +124,9 @@ class Aside(Manoeuvre):
 
     Args:
         seen: The moment it begins.
-        place: Where to wait [m].
-        way: What to leave free, shape `(n, 2)` [m].
-        radius: Of the robot [m].
+        place: Waiting place [m].
+        way: Path to keep free, shape `(n, 2)` [m].
+        radius: Radius of the robot [m].
         most_turn: Highest turn rate [rad/s].
     """
 
@@ -179,8 +179,8 @@ class Inspection:
 
     Args:
         event: Kind of the event.
-        place: Where it is said to be [m].
-        sees: Whether nothing stands between two places.
+        place: Reported position [m].
+        sees: Predicate: True if nothing stands between two places.
         most_turn: Highest turn rate [rad/s].
     """
 

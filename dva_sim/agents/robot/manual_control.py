@@ -10,11 +10,7 @@ from dva_sim.protocol import messages as m
 
 
 class ManualControl:
-    """Lets one hand at a time drive a robot; its controller decides.
-
-    Args:
-        robot: Which.
-    """
+    """Lets one hand at a time drive a robot; its controller decides."""
 
     def __init__(self, robot: RobotAgent) -> None:
         self._robot = robot

@@ -43,9 +43,9 @@ class MissionGoal:
 
     Attributes:
         goals: Places of a lap, in order [m].
-        laps: How many; 0: without end.
+        laps: Number of laps; 0: without end.
         event: Kind of the event to be looked at, if there is one.
-        home: Whether it is the way home.
+        home: True for the drive home.
     """
 
     goals: tuple[Point, ...]
@@ -97,12 +97,12 @@ class Pilot:
     """Drives one mission.
 
     Args:
-        errand: Where to.
+        errand: Mission to drive.
         planner: The robot's map.
         guard: Keeps it from driving into anything; knows its radius.
-        name: Of the robot.
+        name: Name of the robot.
         reach: Its top speed and highest turn rate.
-        turning_radius: Of its sharpest curve [m]; 0: it turns on the spot.
+        turning_radius: Radius of its sharpest curve [m]; 0: it turns on the spot.
     """
 
     def __init__(

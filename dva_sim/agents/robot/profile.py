@@ -28,14 +28,14 @@ class RobotProfile(Config):
     """Body, motors, computer and battery of a kind of robot.
 
     Attributes:
-        radius_m: Of its footprint, or of a circle that holds its corners.
-        corners_m: Of a convex footprint, counter-clockwise, x ahead, y to the left, with the
-            middle at 0, 0; left out: a circle.
+        radius_m: Radius of its footprint, or of a circle that encloses its corners.
+        corners_m: Corners of a convex footprint, counter-clockwise, x ahead, y to the left, with
+            the middle at 0, 0; by default a circle.
         drive: `differential`, `three_way`, or a class of your own as `mine.py:Mine`.
-        options: Of that drive.
-        processing_s: What a message takes its computer, a number or a law; left out: 0.05.
+        options: Options of that drive.
+        processing_s: Processing time of a message, a number or a law; by default 0.05.
         battery: Left out: power never ends.
-        sensors: What it carries; left out: one of each kind.
+        sensors: Sensors on board; by default one of each kind.
     """
 
     description: str = ""

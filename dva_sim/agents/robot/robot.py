@@ -57,18 +57,18 @@ class RobotSetup:
     """Connections of a robot.
 
     Attributes:
-        pattern: How SetTeleOp reaches it.
+        pattern: Messaging pattern of SetTeleOp.
         service: Gives the time that the next message takes its computer [s].
-        frame_rate: Of the camera [1/s].
+        frame_rate: Frame rate of the camera [1/s].
         frame_bytes: Size of a frame [B].
-        view: What the camera sees.
-        hazards: What is there to be seen, at a time [s].
-        sensors: What it measures, by name.
-        guarded: Whether a collision guard slows whoever drives it (coordinated control).
+        view: Field of view of the camera.
+        hazards: Visible hazards at a time [s].
+        sensors: Sensors by name.
+        guarded: True if a collision guard slows its drivers (coordinated control).
         encode: From taking a frame to publishing it [s]; one frame at a time.
         charge: Share of the battery's charge that is left.
-        conflates: Whether its socket keeps only the newest published command.
-        limit: How many messages of a class may wait for its computer.
+        conflates: True if its socket keeps only the newest published command.
+        limit: Maximum number of queued messages of a class.
     """
 
     pattern: Pattern
@@ -90,7 +90,7 @@ class RobotAgent:
 
     Args:
         device: Identity and ways to talk.
-        controller: What decides.
+        controller: Controller that decides.
         world: The physics that it is part of.
         body: Its own body there.
         planner: Its map, for missions.
@@ -100,17 +100,17 @@ class RobotAgent:
     Attributes:
         applied: Commands that took effect.
         refused: Messages that were refused.
-        picture_age: How old the picture behind the last command was when it took effect [s],
-            by the robot's own clock.
-        set_point: What it was told last, and until when.
-        filmed: Told of each frame that it takes, with its id.
-        trace: Told each decision, if there is one.
-        unfit: Why it cannot be driven now; empty: it can.
-        takes_missions: Whether it drives missions by itself.
+        picture_age: Age of the picture behind the last command when it took effect [s], by the
+            robot's own clock.
+        set_point: Latest set point, and its end of validity.
+        filmed: Callback for each frame that it takes, with its id.
+        trace: Trace that receives each decision, if there is one.
+        unfit: Reason why it cannot be driven now; empty: it can.
+        takes_missions: True if it drives missions by itself.
         refuses: Made to refuse every command with this code: a fault that is planted.
-        blind: Whether it takes no pictures: another one.
-        drained: Whether its battery counts as empty, whatever is in it: another one.
-        sensors: What it measures, by name; each may be given another port.
+        blind: Injected fault: the camera takes no pictures.
+        drained: Injected fault: the battery counts as empty, whatever its charge.
+        sensors: Sensors by name; each may be given another port.
     """
 
     def __init__(

@@ -42,10 +42,10 @@ class SensorPort:
     """A sensor.
 
     Attributes:
-        unit: Of its values.
+        unit: Unit of its values.
         read: Its values at a time [s]: 1 to 360, or none if it is lost.
-        fastest: How often it gives values at most [Hz].
-        lags: Whether a value depends on those before: then it samples while anybody listens,
+        fastest: Highest rate of values [Hz].
+        lags: True if a value depends on those before: then it samples while anybody listens,
             however seldom.
     """
 
@@ -74,7 +74,7 @@ class SensorSubscriptions:
 
     Args:
         device: The robot.
-        sensors: What it has, by name.
+        sensors: Sensors by name.
         tick: The robot's own clock [ms], at a time [s].
     """
 
@@ -160,7 +160,7 @@ class SensorKind(NamedTuple):
     """A kind of sensor, as it is unless a scenario says otherwise; the numbers are assumed.
 
     Attributes:
-        unit: Of its values.
+        unit: Unit of its values.
         noise: Standard deviation.
         resolution: Smallest step.
         low: Least value that it shows.
@@ -192,7 +192,7 @@ class FaultConfig(Config):
 
     Attributes:
         kind: `lost`: no values from then on. `stuck`: the last values for ever.
-        at_s: When.
+        at_s: Time of the fault.
         mean_time_s: Mean of the time until then, which is exponential.
     """
 
@@ -217,14 +217,14 @@ class SensorConfig(Config):
     """A sensor that a robot carries; what is left out is as usual for its kind (`KINDS`).
 
     Attributes:
-        name: Of the kind.
-        rate_hz: How often it samples, and so gives values at most.
+        name: Name of the kind.
+        rate_hz: Sampling rate, and so the highest rate of values.
         noise: Standard deviation, in the unit of its values.
         resolution: Smallest step of its values.
         low: Least value that it shows.
         high: Greatest value that it shows.
         lag_s: Time constant.
-        faults: How it fails; the first one that happens stays.
+        faults: Faults; the first one that happens stays.
     """
 
     name: str
@@ -262,8 +262,8 @@ class RobotSensor:
     """One sensor of one robot.
 
     Args:
-        config: What it is like.
-        source: What is there, at a time [s].
+        config: Properties of the sensor.
+        source: True value at a time [s].
         luck: Streams of its own, by what they are for.
     """
 
@@ -369,8 +369,8 @@ def make_ports(
     """The sensors of a robot, ready to be subscribed to.
 
     Args:
-        configs: Which there are.
-        sources: What each measures, by name.
+        configs: Sensors to make.
+        sources: Sources of true values, by name.
         luck: A new stream from its beginning, by name; the same name gives the same stream.
 
     Raises:

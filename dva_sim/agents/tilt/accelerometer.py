@@ -31,14 +31,14 @@ class AccelerometerPart(Config):
     What a data sheet calls typical is taken to be a standard deviation, which is assumed.
 
     Attributes:
-        data_sheet: Where the numbers are from.
+        data_sheet: Source of the numbers.
         assumed: Keys whose numbers are not in it.
         rate_hz: Samples per second.
         noise_density_ug: White noise [micro-g per root hertz]; with `bandwidth_hz`.
-        bandwidth_hz: Of the part's own low-pass filter.
+        bandwidth_hz: Bandwidth of the part's own low-pass filter.
         noise_mg: White noise of a sample, standard deviation; instead of the two before.
         offset_mg: Output at no acceleration, standard deviation over parts.
-        offset_mg_per_k: How that changes with temperature.
+        offset_mg_per_k: Change of the offset with temperature.
         drift_mg_per_sqrt_min: Random walk of the output within a session.
         resolution_mg: Step of the output; 0: none.
         range_g: Largest output, either way.
@@ -97,19 +97,19 @@ class Accelerometer:
     slowly drifting) and by white noise, rounded to the part's step and cut off at its range.
 
     Args:
-        part: Which.
-        rng: Luck of this run: sessions, noise, drift, times.
-        own: Luck that makes this copy differ from others of the part, the same in all runs of
-            its owner; if not given, of this run.
-        rate_hz: How often the app is told, if not as the part measures.
+        rng: Random generator of this run: sessions, noise, drift, times.
+        own: Random generator of the differences between copies of the part, the same in all runs of
+            its owner; by default that of this run.
+        rate_hz: Rate of samples for the app, if other than the part's.
         jitter: Standard deviation of the time of a sample, as a share of the time between two.
         warming: Standard deviation of a session's temperature, against the calibration's [K].
-        block: How many samples of luck are drawn at once; changes no number.
+        block: Number of samples whose random numbers are drawn at once; changes no number.
 
     Attributes:
         period: Mean time between two samples [s].
-        offset: Of this copy, as it was when new [m/s^2].
-        interval: Tells the time from the sample before to the next one [s]; called once for each.
+        offset: Initial offset of this copy [m/s^2].
+        interval: Function that returns the time from one sample to the next [s]; called once for
+            each.
     """
 
     def __init__(

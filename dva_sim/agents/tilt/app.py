@@ -44,7 +44,7 @@ class TiltCommand(NamedTuple):
             from the samples that the filter holds, each with its weight in the value, to now [s].
             All that the phone delays is in it once: waiting for the next sample, the filter, and
             how long its value has stood. The lag of the hand is before it, the mapping after it.
-        captured: When the pictures behind it were captured, on average [s]; for the recorder.
+        captured: Mean capture time of the pictures behind it [s]; for the recorder.
     """
 
     speed: float
@@ -118,19 +118,19 @@ class TiltApp:
     """An app of a phone. What comes of a sample depends on when it was taken, never on who looks.
 
     Args:
-        profile: How it reads, filters, maps and sends.
-        reference: What the part measures in the pose that means nothing: x, y, z [m/s^2].
+        profile: Settings of reading, filter, mapping and sending.
+        reference: Reading of the part in the neutral pose: x, y, z [m/s^2].
         period: Mean time between two samples [s].
         decay: The share of the way to what is asked that the hand still has to go, from one
             sample to the next: 0 if samples are what was asked.
 
     Attributes:
-        keeps_alive: Whether the newest value is sent at every chance, changed or not.
-        waits: Whether it sends from within the call that takes a sample, and so does nothing else
+        keeps_alive: True if the newest value is sent at every chance, changed or not.
+        waits: True if it sends from within the call that takes a sample, and so does nothing else
             until a request is answered; see `hold`.
         shown: The command on the display: level, turn [deg/s].
-        samples: How many were in the batches of this drive.
-        values: How many batches there were.
+        samples: Number of samples in the batches of this drive.
+        values: Number of batches.
 
     Raises:
         ConfigError: the filter or the mapping cannot be had.

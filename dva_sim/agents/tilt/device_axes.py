@@ -35,7 +35,7 @@ def to_tilt_axes(measured: Triple, orientation: int = 0, ios: bool = False) -> T
     Args:
         measured: x, y, z in the axes of the phone [m/s^2].
         orientation: `screen.orientation.angle`, one of `ORIENTATIONS` [deg].
-        ios: Whether the signs are those of iOS.
+        ios: True for the signs of iOS.
     """
     x, y, z = measured
     if ios:

@@ -33,8 +33,8 @@ class Filter(ABC):
         batch: After so many fresh samples, 1 to 1000, or when the app's longest delay has passed,
             the value is taken, and stands until the next time; None: the value is of use at any
             time, and asking for it changes nothing.
-        failures: How often it gave no answer that is one; only filters of users do that.
-        first_failure: What was wrong with it first, in a line.
+        failures: Number of missing or invalid values; only users' filters have any.
+        first_failure: First failure, in one line.
     """
 
     batch: int | None = None
@@ -134,7 +134,7 @@ class MovingMedian(Filter):
 
     Args:
         period: Mean time between two samples [s].
-        window: How many samples it covers.
+        window: Number of samples in the window.
     """
 
     def __init__(self, period: float, window: int = 5) -> None:

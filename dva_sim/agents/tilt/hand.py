@@ -30,13 +30,13 @@ class Hand:
 
     Args:
         lag: Time constant [s]; 0: it is where it aims at once.
-        rng: Its luck.
+        rng: Random generator of the hand.
         motor_noise: Standard deviation of the error of aiming, as a share of the tilt.
         tremor: Apparent tilt, standard deviation of each axis [rad].
         max_tilt: Away from rest, each axis [rad].
-        max_speed: Of tilting, each axis [rad/s].
-        tremor_width: Of the resonance of the tremor, between half-power frequencies [Hz].
-        block: How many steps of luck are drawn at once; changes no number.
+        max_speed: Highest tilting speed, each axis [rad/s].
+        tremor_width: Width of the tremor's resonance, between half-power frequencies [Hz].
+        block: Number of steps whose random numbers are drawn at once; changes no number.
 
     References:
         M. Lakie, C. A. Vernooij, C. J. Osler et al.: Increased gravitational force reveals the

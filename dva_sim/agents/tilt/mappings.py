@@ -23,12 +23,12 @@ class Mapping(ABC):
     """Base of all mappings; derive from this to make another one.
 
     Attributes:
-        integrates: Whether a command depends on those before. If so, every value of the filter
-            is told once, with the time that it stands for, and the person watches the display.
-            It is time that counts then, not steps: a second of a reading that stands, in whole
-            samples or in halves, comes to the same within 2 %.
-        failures: How often it gave no answer that is one; only mappings of users do that.
-        first_failure: What was wrong with it first, in a line.
+        integrates: True if a command depends on those before. If so, it gets every value of the
+            filter once, with the time that it stands for, and the person watches the display. Time
+            counts then, not steps: a second of a constant reading, in whole samples or in halves,
+            gives the same within 2 %.
+        failures: Number of missing or invalid commands; only users' mappings have any.
+        first_failure: First failure, in one line.
     """
 
     integrates: bool = True
@@ -40,8 +40,8 @@ class Mapping(ABC):
         """The command now, which is also what the display shows.
 
         Args:
-            level: Of the reading.
-            turn: Of the reading [deg/s].
+            level: Level of the reading.
+            turn: Turn of the reading [deg/s].
             dt: For how long the reading stands [s].
 
         Returns:
@@ -53,8 +53,8 @@ class Mapping(ABC):
         """The reading that a practised hand tilts to.
 
         Args:
-            wanted: What the command should be; a level below 0 means: surely stand.
-            shown: What the display shows, as the person has perceived it.
+            wanted: Desired command; a level below 0 means: surely stand.
+            shown: Displayed command, as the person has perceived it.
             within: In what time to get there [s].
         """
 
@@ -66,8 +66,8 @@ class AbsoluteMapping(Mapping):
     """The tilt is the command.
 
     Args:
-        gain: Of the turn rate.
-        speed_gain: Of the speed.
+        gain: Gain of the turn rate.
+        speed_gain: Gain of the speed.
         dead_zone: Share of the full reading around the reference that means nothing.
     """
 
@@ -99,7 +99,7 @@ class DifferentialMapping(AbsoluteMapping):
 
     Args:
         gain: Growth of the turn rate for each degree per second of the reading [1/s].
-        speed_gain: Of the speed.
+        speed_gain: Gain of the speed.
         dead_zone: Share of the full reading around the reference that means nothing.
     """
 
@@ -129,7 +129,7 @@ class LeakyMapping(DifferentialMapping):
 
     Args:
         gain: Growth of the turn rate for each degree per second of the reading [1/s].
-        speed_gain: Of the speed.
+        speed_gain: Gain of the speed.
         dead_zone: Share of the full reading around the reference that means nothing.
         leak_s: Time constant in which it goes back [s].
     """
@@ -164,8 +164,8 @@ class SlewMapping(AbsoluteMapping):
     A phone held level lets it go back to zero as fast. The speed is absolute.
 
     Args:
-        gain: Of the turn rate that a tilt means.
-        speed_gain: Of the speed.
+        gain: Gain of the turn rate that a tilt means.
+        speed_gain: Gain of the speed.
         dead_zone: Share of the full reading around the reference that means nothing.
         slew_deg_s2: Fastest growth of the turn rate [deg/s^2].
     """

@@ -41,17 +41,17 @@ class Phone(TiltApp):
 
     Args:
         profile: Phone and app.
-        holder: Who holds it.
-        rng: Luck of this run.
-        own: Luck of this person's copy of the phone and its calibration, the same in all runs;
-            if not given, of this run.
+        holder: Person who holds it.
+        rng: Random generator of this run.
+        own: Random generator of this person's copy of the phone and its calibration, the same in
+            all runs; by default that of this run.
 
     Attributes:
         hand_lag: By how much the hand makes a command follow later what is asked, on average [s].
             The hand is moved from sample to sample, so that it is less than the time constant.
         shown: The command on the display: level, turn [deg/s].
-        samples: How many were in the batches of this drive.
-        values: How many batches there were.
+        samples: Number of samples in the batches of this drive.
+        values: Number of batches.
 
     Raises:
         ConfigError: the part, the filter or the mapping cannot be had.

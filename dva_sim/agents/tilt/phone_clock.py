@@ -20,7 +20,7 @@ class PhoneClock:
     """Sets the times of one phone.
 
     Attributes:
-        offset: Of our time against the phone's [s]; infinite before the first sample.
+        offset: Offset of our time against the phone's [s]; infinite before the first sample.
     """
 
     def __init__(self) -> None:
@@ -35,8 +35,8 @@ class PhoneClock:
         """Return when samples were taken by our clock [s]: not in the future, and in order.
 
         Args:
-            told: When, by the phone, rising [s]; at least one.
-            came: When they came, together, by our clock [s]; not before earlier ones.
+            told: Times by the phone, rising [s]; at least one.
+            came: Common arrival time by our clock [s]; not before earlier ones.
         """
         if told[-1] <= self._told - ANEW:
             self.offset = math.inf

@@ -21,21 +21,22 @@ class PhoneProfile(PhoneHabits):
         sample_rate_hz: Samples per second that the app gets.
         reference_mps2: x, y, z of the pose that means nothing: speed zero, straight on.
         filter: By name, or a class in a file, `mine.py:Mine`.
-        filter_options: Of the filter, such as `{window: 9}` of the median.
+        filter_options: Options of the filter, such as `{window: 9}` of the median.
         mapping: By name, or a class in a file.
-        mapping_options: Of the mapping, such as `{gain: 2}`.
+        mapping_options: Options of the mapping, such as `{gain: 2}`.
         send: `on_change` sends what differs from the last one sent when 20 samples have come or
             `max_delay_s` has passed; `keep_alive` sends at the wanted rate always.
         max_delay_s: Longest time between two looks at the filter (`on_change`), and between two
             values of a filter that works in batches.
-        limits: Where level and turn are limited: in the reading of each sample (`before_filter`,
-            as figure 5.7 of the document has it), or in the command alone (`after_mapping`).
-        values_at: When a value is taken whose batch is not complete: at the first `sample` after
-            `max_delay_s` (as figure 5.8 has it), or at the `delay` itself.
-        while_open: What becomes of samples while a request is open: the app goes on to `take`
-            them; or it sends from within the call that takes a sample (figure 5.8), so that the
-            system has to `drop` or to `queue` them until the reply has come.
-        ideal: What the person wants becomes the command at once: a reference, not a phone.
+        limits: Stage at which level and turn are limited: in the reading of each sample
+            (`before_filter`, as figure 5.7 of the document has it), or in the command alone
+            (`after_mapping`).
+        values_at: Time at which a value of an incomplete batch is taken: at the first `sample`
+            after `max_delay_s` (as figure 5.8 has it), or at the `delay` itself.
+        while_open: Fate of samples while a request is open: the app continues to `take` them; or it
+            sends from within the call that takes a sample (figure 5.8), so that the system has to
+            `drop` or to `queue` them until the reply has come.
+        ideal: True if the desired command takes effect at once: a reference, not a phone.
     """
 
     description: str = ""

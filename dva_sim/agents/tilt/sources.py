@@ -23,10 +23,10 @@ class TiltSources:
     """Sources of commands from whatever a person steers with.
 
     Args:
-        profile: How it reads, filters, maps and sends.
-        reference: What the phone's part measures in the pose that means nothing [m/s^2].
+        profile: Settings of reading, filter, mapping and sending.
+        reference: Reading of the phone's part in the neutral pose [m/s^2].
         period: Mean time between two samples of that part [s].
-        given_hz: How often what is steered by stick is sampled [Hz].
+        given_hz: Sampling rate of a stick [Hz].
 
     Raises:
         ConfigError: the filter or the mapping cannot be had.

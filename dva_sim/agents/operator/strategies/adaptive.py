@@ -86,14 +86,14 @@ class Adaptive(Strategy):
     """Acts in samples under short delays, and moves and waits under long ones.
 
     Args:
-        person: Who steers.
+        person: Person who steers.
         reach: Limits of what is steered.
         closed: Strategy that takes the place of its own under short delays.
 
     Attributes:
-        using: What is used now: `closed` or `move_and_wait`.
-        switches: How often that has changed.
-        period: What it has seen of how often commands get through.
+        using: Current strategy: `closed` or `move_and_wait`.
+        switches: Number of changes of strategy.
+        period: Estimate of how often commands get through.
     """
 
     uses = "closed"

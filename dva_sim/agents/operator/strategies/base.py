@@ -52,13 +52,13 @@ class Strategy:
     It has no noise: errors and noise are the person's, outside.
 
     Args:
-        person: Whose gains, caution and pace it steers with.
+        person: Person with gains, caution and pace.
         reach: Limits of what is steered.
 
     Attributes:
         uses: Its argument that is another strategy, if it has one: a configuration names it there.
-        failures: How often it gave no answer that is one; only strategies of users do that.
-        first_failure: What was wrong with it first, in a line.
+        failures: Number of missing or invalid answers; only users' strategies have any.
+        first_failure: First failure, in one line.
     """
 
     uses: ClassVar[str] = ""
@@ -73,8 +73,8 @@ class Strategy:
 
         Args:
             route: The way to go.
-            view: What is seen, and when.
-            stop_before: Where to stop: so far before the end of the route [m].
+            view: Current observation and its time.
+            stop_before: Distance from the end of the route at which to stop [m].
         """
         raise NotImplementedError
 
@@ -96,7 +96,7 @@ class Strategy:
         """Press the button: the cursor is seen on its target, and will stay there.
 
         Args:
-            view: What is known.
+            view: View of cursor and target.
             hurried: A press beside the target costs nothing.
         """
         seen = view.seen

@@ -25,11 +25,11 @@ class Sighting(NamedTuple):
     """A frame of a cursor and of its target, as the person judges it.
 
     Attributes:
-        tick: When it was taken, by the display's clock [ms].
-        x: Of the cursor [m].
-        y: Of the cursor [m].
-        vx: Of the cursor [m/s].
-        vy: Of the cursor [m/s].
+        tick: Capture time by the display's clock [ms].
+        x: Position of the cursor [m].
+        y: Position of the cursor [m].
+        vx: Velocity of the cursor [m/s].
+        vy: Velocity of the cursor [m/s].
         target_x: [m]
         target_y: [m]
         target_vx: [m/s]
@@ -58,9 +58,9 @@ def towards(
 
     Args:
         seen: The newest frame.
-        delay: What the person takes the whole delay to be [s].
+        delay: Whole delay as the person perceives it [s].
         person: Knows its gain and margin.
-        most: As fast as the person cares to go [m/s].
+        most: Highest speed that the person chooses [m/s].
         margin: Gain x delay; left out: the person's usual one.
     """
     gain = gain_at(person.pointing, margin or person.margin, delay)
@@ -79,9 +79,9 @@ def through(path: Route, seen: Sighting, delay: float, person: Person, most: flo
     Args:
         path: The middle line [m].
         seen: The newest frame; its tolerance is half the width.
-        delay: What the person takes the whole delay to be [s].
+        delay: Whole delay as the person perceives it [s].
         person: Caution, gain and noise.
-        most: As fast as the person cares to go [m/s].
+        most: Highest speed that the person chooses [m/s].
     """
     delay, gain = max(delay, SHORTEST), gain_at(person.pointing, person.margin, delay)
     speed = fastest(seen.tolerance, delay, person, most)
@@ -109,10 +109,10 @@ def fastest(half_width: float, delay: float, person: Person, most: float) -> flo
     """The speed at which the noise of the hand, during the delay, takes up the person's caution.
 
     Args:
-        half_width: Of the tunnel [m].
-        delay: What the person takes the whole delay to be [s].
+        half_width: Half-width of the tunnel [m].
+        delay: Whole delay as the person perceives it [s].
         person: Caution and noise.
-        most: As fast as the person cares to go [m/s].
+        most: Highest speed that the person chooses [m/s].
     """
     noise = max(delay, SHORTEST) * max(person.motor_noise, SHORTEST)
     return min(most, person.caution * half_width / noise)

@@ -28,11 +28,11 @@ class Moves:
     """Moves of a person who moves and waits.
 
     Args:
-        reaction: Of the person [s].
-        habits: Of the person.
+        reaction: Reaction time of the person [s].
+        habits: Habits of the person.
 
     Attributes:
-        waits: How often it has waited.
+        waits: Number of waits.
     """
 
     def __init__(self, reaction: float, habits: WaitingHabits) -> None:
@@ -64,8 +64,8 @@ class Moves:
 
         Args:
             now: [s]
-            parts: How long [s], and what is wanted meanwhile; at least one.
-            peak: How fast it is at its fastest, in the measure that `next` is told.
+            parts: Duration [s] and command of each part; at least one.
+            peak: Top speed of the move, in the unit of `pace` in `next`.
         """
         ends, at = [], now
         for lasts, one, other in parts:
@@ -79,8 +79,8 @@ class Moves:
 
         Args:
             now: [s]
-            delay: What the person takes the whole delay to be [s].
-            pace: How fast the picture moves, in any one measure.
+            delay: Whole delay as the person perceives it [s].
+            pace: Speed of the picture, in any one unit.
         """
         still = pace <= self._habits.still_share * self._peak
         self._was_seen = self._was_seen or not still
@@ -113,10 +113,10 @@ def straight_way(route: Route, here: Pair, along: float, most: float, slack: flo
 
     Args:
         route: [m]
-        here: Where one is [m].
-        along: How far along the route that is [m].
+        here: Current position [m].
+        along: Current distance along the route [m].
         most: [m]
-        slack: How far the route may lie from the straight line [m].
+        slack: Largest distance of the route from the straight line [m].
     """
     way = most
     while way > 2.0 * slack and _apart(route, here, along, way) > slack:
@@ -142,7 +142,7 @@ class MoveAndWait(Strategy):
     target; through a tunnel as far as the hand's noise leaves it inside.
 
     Attributes:
-        trusted: How far a robot is driven in one move [m].
+        trusted: Distance that a robot is driven in one move [m].
         period: Between two commands that get through, as far as it is known [s].
     """
 

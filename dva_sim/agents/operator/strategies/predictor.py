@@ -33,7 +33,7 @@ class Predictor(Strategy):
     the delay is what the inner strategy has still to be careful about.
 
     Args:
-        person: Who steers.
+        person: Person who steers.
         reach: Limits of what is steered.
         inner: Strategy that steers by the predicted picture; left out: `Pursuit`.
         quality: From 0, no prediction, to 1, a perfect model of one's own commands.
@@ -135,7 +135,7 @@ class Truth(Generic[S]):
     """The true state now, told without delay or error: for the oracle alone.
 
     Attributes:
-        state: As a frame would show it.
+        state: State as a frame would show it.
         delay: Until what is asked for now takes effect [s].
     """
 

@@ -102,7 +102,7 @@ class Submovements:
         Args:
             now: [s]
             seen: The newest frame.
-            delay: What the whole delay is taken to be [s].
+            delay: Perceived whole delay [s].
             noise: Standard normal numbers, three for each movement.
         """
         if self._last is not None:
