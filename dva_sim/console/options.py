@@ -29,17 +29,17 @@ class ConsoleOptions(PageOptions):
 
     Attributes:
         scenario: By name or path.
-        seed: Decides all luck.
-        changes: Of the scenario, `KEY=VALUE`.
+        seed: Random seed.
+        changes: Changes of the scenario, `KEY=VALUE`.
         links: `modelled` as in a study, or `real`: sockets, which others may join.
         dva_port: Port of the DVA on real links; 0: any that is free.
-        transport: What carries messages on real links, as on the command line.
+        transport: Transport of the messages on real links, as on the command line.
         emulated: The scenario's link is emulated between the robots and everybody else.
         record: Recording to be made, if any.
         audit: File of the audit log; None: one that is gone with the console.
         results: Folder for the tables of what people did, if any.
         keep_motion: Folder for the samples of phones whose person agrees, if any.
-        overwrite: What is there may be replaced.
+        overwrite: True to replace existing files.
         rosbridge: Port for clients of ROS; None: there is none.
         foxglove: Port for Foxglove; None: there is none.
     """

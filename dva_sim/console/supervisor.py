@@ -39,11 +39,11 @@ class ConsoleSupervisor:
     """One console.
 
     Args:
-        options: What to run, and where it is to be seen.
+        options: Scenario and addresses.
         say: Prints a line.
 
     Attributes:
-        packets: What became of the packets of the emulated link, once it has ended.
+        packets: Report on the packets of the emulated link, once it has ended.
     """
 
     def __init__(self, options: ConsoleOptions, say: Say) -> None:

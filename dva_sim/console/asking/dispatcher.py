@@ -57,7 +57,7 @@ class ActionDispatcher:
     """Does what lines of the web process ask for.
 
     Args:
-        place: Of the actions that are done here.
+        place: Place whose actions are carried out here.
         holders: Objects with marked methods, for all that is declared for this place.
         tell: Takes the answers.
         elsewhere: The refusal of actions that are declared for other places only.

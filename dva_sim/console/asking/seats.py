@@ -18,9 +18,9 @@ class TakenSeat:
     """A seat in which somebody sits.
 
     Attributes:
-        number: Of the seat, from 0.
-        heard: When its newest input came, real time [s].
-        holds: Whether that asked for motion, or for standing with a hand on it.
+        number: Number of the seat, from 0.
+        heard: Time of its newest input, real time [s].
+        holds: True if that input asked for motion, or for standing while held.
     """
 
     number: int

@@ -29,7 +29,7 @@ class AttachedActions:
     """Does what lines of the web process ask for.
 
     Args:
-        pages: Of the system to which the console is attached.
+        pages: Pages of the system to which the console is attached.
 
     Attributes:
         take: Does what a line asks for.

@@ -29,10 +29,10 @@ class AskedDecision:
     """A decision of which the DVA's answer or its record is still to come.
 
     Attributes:
-        action: As the DVA calls it.
+        action: Name that the DVA uses for it.
         event: About which event; None: none, or one that has no number yet.
-        record: What the DVA has published of it.
-        finish: Tells how it ended; None: not answered yet.
+        record: Record published by the DVA.
+        finish: Callback that reports the result; None: no reply yet.
     """
 
     action: str
@@ -50,9 +50,9 @@ class AttachedAudit(Audited):
     """Keeps the audit log of an attached console.
 
     Args:
-        keeper: Of the file.
+        keeper: Keeper of the file.
         system: To which the console is attached.
-        author: What the person of a page is called.
+        author: Name of the person at a page.
     """
 
     def __init__(

@@ -25,7 +25,7 @@ class AttachedDecisions:
 
     Args:
         system: To which the console is attached.
-        people: Who is at the pages.
+        people: People at the pages.
     """
 
     def __init__(self, system: AttachedSystem, people: AttachedPeople) -> None:

@@ -31,10 +31,10 @@ class AttachOptions(PageOptions):
     Attributes:
         dva: Address of the DVA, `HOST:PORT`.
         keys: Folder with the keys of the devices; None: without.
-        scenario: Whose site is drawn; None: no plan is known.
-        changes: Of the scenario, `KEY=VALUE`.
+        scenario: Scenario whose site is drawn; None: no plan is known.
+        changes: Changes of the scenario, `KEY=VALUE`.
         audit: File of the audit log; None: one that is gone with the console.
-        transport: What carries the DVA's messages, as on the command line.
+        transport: Transport of the DVA's messages, as on the command line.
     """
 
     dva: str

@@ -40,9 +40,9 @@ class AttachedPages:
         audit: Keeps the audit log.
 
     Attributes:
-        looked: Whether somebody looks at the table of devices.
-        people: Who is at the pages.
-        alarms: What wants somebody to act.
+        looked: True while somebody looks at the table of devices.
+        people: People at the pages.
+        alarms: Alarms that need action.
         sensors: Those that somebody looks at.
         audited: Keeps who did what.
     """

@@ -23,8 +23,8 @@ class SensorWatch:
     """One robot whose sensors are listened to, until nobody looks at it any more.
 
     Args:
-        device: Who listens.
-        told: What is known of the robot; takes the values.
+        device: Device that subscribes.
+        told: State of the robot, which takes the values.
     """
 
     def __init__(self, device: AgentDevice, told: ToldDevice) -> None:
@@ -99,8 +99,8 @@ class ToldSensors:
     """All robots whose sensors are listened to.
 
     Args:
-        device: Who listens.
-        told: What is known of the robots.
+        device: Device that subscribes.
+        told: State of the robots.
         id_of: The id of a device that pages know by a number; None: there is none.
     """
 

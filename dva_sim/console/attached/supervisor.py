@@ -20,7 +20,7 @@ def attach(options: AttachOptions, say: Say) -> None:
     """Show what runs at a DVA until Ctrl-C, SIGTERM, or the end of the web process.
 
     Args:
-        options: Where the DVA is, and where the page is to be seen.
+        options: Addresses of the DVA and of the page.
         say: Prints a line.
 
     Raises:

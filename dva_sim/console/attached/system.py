@@ -31,21 +31,21 @@ class AttachedSystem:
     """System at another DVA.
 
     Args:
-        options: Where the DVA is.
+        options: Address of the DVA, and other options.
         links: To it.
 
     Attributes:
         clock: Real time.
         recorder: Keeps the story.
-        note: Tells people that something has gone wrong.
+        note: Function that notifies people of a failure.
         agent: The console's own control room.
-        told: What the devices tell.
+        told: State reported by the devices.
         fakes: Devices that were added by hand.
         numbers: By which pages know devices; each stays as it is.
-        site: Of the scenario, if one is named.
-        is_told: Whether the DVA has told all events of its present life.
+        site: Site of the scenario, if one is named.
+        is_told: True once the DVA has sent all its events since its last restart.
         on_devices: Called when there is a device more, or one less.
-        on_record: Told of each decision that the DVA tells of.
+        on_record: Callback for each decision that the DVA publishes.
 
     Raises:
         ConfigError: the site cannot be read.

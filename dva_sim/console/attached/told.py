@@ -22,15 +22,15 @@ class ToldDevice:
     """A device, as far as messages tell.
 
     Attributes:
-        device: As it stands on the list.
-        listed: When it last stood there [s].
-        heard: When it last published something; None: never [s].
-        status: What it published last about itself.
-        holder: Who holds it, by its own word, and when that came [s].
+        device: Device as in the list.
+        listed: Time of the latest list that contains it [s].
+        heard: Time of its latest publication; None: never [s].
+        status: Latest status that it published.
+        holder: Holder that it reported, and time of the report [s].
         beats: Heartbeats heard.
-        camera: Where its pictures are.
-        sensors: What it can measure.
-        values: What its sensors have shown last, and when that came [s]; by their names.
+        camera: URL of its pictures.
+        sensors: Sensors that it offers.
+        values: Latest value of each sensor, and its arrival time [s]; by name.
     """
 
     device: m.Device
@@ -50,7 +50,7 @@ class ToldSystem:
     """All devices that the DVA lists, and what they publish.
 
     Args:
-        device: Who listens.
+        device: Device that subscribes.
         on_news: Called when there is a device more, or one less.
 
     Attributes:

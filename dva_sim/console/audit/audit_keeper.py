@@ -62,17 +62,18 @@ class AuditKeeper:
     """The audit log of one console.
 
     Args:
-        path: A log that is there is gone on with; None: a file that is gone with the console.
+        path: File; an existing log is appended to. None: a temporary file, removed with the
+            console.
         now: Time of the run [s].
-        about: What is told of the run in its first row.
+        about: Facts about the run for the first row.
 
     Attributes:
-        path: Of the file.
-        is_lasting: Whether it stays when the console has ended.
-        problem: Why nothing can be written now; empty if all is well.
+        path: File of the log.
+        is_lasting: True if it stays when the console has ended.
+        problem: Reason why nothing can be written now; empty if it can.
         head: The hash of the last row that is on the disk.
         number: And its number.
-        on_rows: Told of each row that is.
+        on_rows: Callback for each row that is on disk.
 
     Raises:
         ConfigError: the file cannot be used, or its chain is broken.
@@ -204,8 +205,8 @@ def auditing(
 
     Args:
         path: See `AuditKeeper`.
-        clock: Of what is shown.
-        about: What is told of it in the first row.
+        clock: Clock of the displayed run.
+        about: Facts for the first row.
         say: Prints a line.
 
     Raises:

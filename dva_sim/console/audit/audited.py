@@ -25,8 +25,8 @@ class Audited:
     """Keeps the audit log of a console.
 
     Args:
-        keeper: Of the file.
-        author: What the person of a page is called.
+        keeper: Keeper of the file.
+        author: Name of the person at a page.
         label: The name of a device, by its id.
     """
 

@@ -30,11 +30,7 @@ def link_of(heard_s: float, silent: bool) -> str:
 
 
 class DeviceRows:
-    """Rows about all devices of a run.
-
-    Args:
-        run: Which.
-    """
+    """Rows about all devices of a run."""
 
     def __init__(self, run: Run) -> None:
         self._run = run

@@ -22,14 +22,13 @@ class DvaPages:
     """The DVA of a run as people see and serve it.
 
     Args:
-        run: Whose.
-        address: Where the DVA listens, or is said to.
-        sockets: What carries messages, if the links are real.
+        address: Address of the DVA, real or displayed.
+        sockets: Sockets of the messages, if the links are real.
         moved: Called when the DVA listens elsewhere.
 
     Attributes:
-        port: Where it listens.
-        looked: Whether somebody looks at the table of devices.
+        port: Port of the DVA.
+        looked: True while somebody looks at the table of devices.
     """
 
     def __init__(

@@ -22,14 +22,13 @@ class DvaPort:
     part in the modelled network, or does not.
 
     Args:
-        run: Whose DVA.
-        recorder: Told when it begins and ends to listen.
-        address: Where it listens, or is said to.
-        sockets: What carries messages, if the links are real.
+        recorder: Recorder of the run, which notes opening and closing.
+        address: Address of the DVA, real or displayed.
+        sockets: Sockets of the messages, if the links are real.
 
     Attributes:
-        address: Where it listens, or would.
-        listens: Whether it does.
+        address: Current or future address.
+        listens: True while it listens.
     """
 
     def __init__(

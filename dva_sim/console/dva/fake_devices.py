@@ -30,7 +30,7 @@ class FakeDevices:
 
     Args:
         make: Makes a device of an id, a label, a type and an address.
-        is_known: Whether there is a device of an id already.
+        is_known: Predicate: True if a device with this id exists.
         id_of: Gives the id of the n-th fake device, and an address at which nobody is, from 1.
         dismiss: Forgets a device, and makes the DVA forget it where it can be made to.
 

@@ -17,8 +17,8 @@ class AlarmActions:
 
     Args:
         desk: With the alarms.
-        author: What the person of a page is called.
-        acknowledge: Tells the DVA that somebody has seen an event.
+        author: Name of the person at a page.
+        acknowledge: Action that notifies the DVA of an acknowledgement.
     """
 
     def __init__(self, desk: AlarmDesk, author: Callable[[str], str], acknowledge: Doer) -> None:

@@ -36,11 +36,7 @@ class AlarmFacts(Protocol):
 
 
 class RunFacts:
-    """Those of a run.
-
-    Args:
-        run: Which.
-    """
+    """Those of a run."""
 
     def __init__(self, run: Run) -> None:
         self._run = run
@@ -73,11 +69,11 @@ class AlarmDesk:
     """The alarms of a console.
 
     Args:
-        facts: Of what is shown.
+        facts: Facts about the displayed system.
         clock: Real time [s]: what people can bear does not hang on the pace of a run.
 
     Attributes:
-        alarms: What decides.
+        alarms: Rules that raise and fold alarms.
     """
 
     def __init__(self, facts: AlarmFacts, clock: Callable[[], float] | None = None) -> None:

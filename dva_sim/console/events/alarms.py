@@ -45,13 +45,13 @@ class AlarmCondition(NamedTuple):
 
     Attributes:
         key: By which it is known as long as it lasts.
-        kind: What kind of thing is wrong: alike ones fold in a flood.
+        kind: Kind of problem: equal ones fold in a flood.
         priority: One of `PRIORITIES`.
-        place: Where; nothing if that does not matter.
-        text: What is wrong, for people.
-        since_ms: Of the run [ms].
+        place: Place; empty if it does not matter.
+        text: Description for people.
+        since_ms: Start by the run's clock [ms].
         event: The event it is about, if any.
-        seen_by: Who has said elsewhere to have seen it, as by a message to the DVA.
+        seen_by: Person who acknowledged it elsewhere, as by a message to the DVA.
     """
 
     key: str
@@ -69,13 +69,13 @@ class RaisedAlarm:
     """A condition, and who has seen it.
 
     Attributes:
-        condition: As it was last.
+        condition: Latest condition.
         state: See `AlarmState`.
         raised: Since when it is what it is now, real time [s].
-        is_on: Whether the condition lasts.
-        seen_by: Who has acknowledged it.
+        is_on: True while the condition lasts.
+        seen_by: Person who acknowledged it.
         shelved_until: Real time [s]; None if it is not shelved.
-        shelved_by: Who has.
+        shelved_by: Person who shelved it.
     """
 
     condition: AlarmCondition
@@ -92,7 +92,7 @@ class Alarms:
 
     Attributes:
         known: By key.
-        is_flood: Whether so many come that they fold.
+        is_flood: True while so many come that they fold.
         left_out: Conditions that found no place.
     """
 

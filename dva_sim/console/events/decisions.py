@@ -29,9 +29,9 @@ def decision_of(
     """Return the message that a page's line requests, and the text shown on success.
 
     Args:
-        line: As the web process has checked it.
+        line: Line as checked by the web process.
         device: Gives the id of a label.
-        seen: How many decisions on an event are known, where the page does not say so.
+        seen: Number of known decisions on an event, for pages that do not send it.
     """
     number, reason = line.get("event", 0), line.get("reason") or None
     label = str(line.get("device", ""))
@@ -120,9 +120,9 @@ def about_event(
     """Return what a page gets of an event besides what everybody sees.
 
     Args:
-        events: As the DVA has told of them.
-        at: When that was [s].
-        number: Of the event.
+        events: Events as published by the DVA.
+        at: Time of each publication [s].
+        number: Number of the event.
     """
     status = events.get(number)
     if status is None:

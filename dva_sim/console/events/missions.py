@@ -27,11 +27,11 @@ def send_on_mission(
     """Get the permission for a robot, and have it begin.
 
     Args:
-        device: Of the control room that sends it.
+        device: Device of the control room that sends it.
         robot: By its id.
-        label: What it is called.
-        body: Where to.
-        said: Told how that went.
+        label: Label of the robot.
+        body: Mission with its destination.
+        said: Callback for the result.
     """
 
     def granted(reply: m.Reply) -> None:

@@ -38,9 +38,9 @@ class ConsoleRoom:
     Attributes:
         number: By which its id is made.
         agent: At the DVA.
-        role: What the person's address allows.
-        registered: Whether the DVA knows it.
-        unanswered: What its person asked for, and was not answered yet.
+        role: Role that the person's address allows.
+        registered: True once the DVA has registered it.
+        unanswered: Requests of its person without a reply.
     """
 
     number: int
@@ -74,8 +74,8 @@ class ConsoleRoom:
         """Ask the DVA, and tell how that went.
 
         Args:
-            body: What is asked.
-            said: Told what became of it.
+            body: Content of the request.
+            said: Callback for the result.
             done: In words, if it is done.
             then: Makes more of a reply that says so.
         """
@@ -98,7 +98,7 @@ class ConsoleRooms:
 
     Args:
         run: In which.
-        roles: What the DVA knows of who may do what: no device states its own.
+        roles: Roles as the DVA knows them: no device states its own.
 
     Attributes:
         listener: Hears for the pages what the DVA says of events.

@@ -25,13 +25,13 @@ class Takeover:
     """One robot on its way into a person's hands.
 
     Args:
-        agent: Of the control room whose decision it is.
+        agent: Control room that decides.
         robot: By its id.
         reason: In words.
-        event: How that stands which the robot was sent to; None: it was sent nowhere.
-        seat: Id of the device that shall drive it; None: it is sent nowhere by the DVA.
+        event: Event that the robot was sent to; None: it was sent nowhere.
+        seat: Id of the device that is to drive it; None: the DVA sends it nowhere.
         take: Asks for the robot, for the seat or otherwise.
-        said: Told how it ended.
+        said: Callback for the result.
     """
 
     def __init__(

@@ -22,8 +22,8 @@ class GuardActions:
     """Does what guards' pages ask for.
 
     Args:
-        guards: Who plays whom.
-        site: Where they are.
+        guards: Guards and their players.
+        site: Site of the guards.
     """
 
     def __init__(self, guards: PlayedGuards, site: Site) -> None:

@@ -14,11 +14,11 @@ class PageOptions:
     Attributes:
         host: Address to listen on.
         port: 0: any that is free.
-        token: Whether the address has to hold a secret.
-        phones: Whether phones have an address of their own, by https.
+        token: True if the address must contain a secret.
+        phones: True if phones have an address of their own, by https.
         phones_host: Address to listen on for them.
         phones_port: 0: any that is free.
-        open: Whether a browser is opened, where there is one.
+        open: True to open a browser, where there is one.
     """
 
     host: str = "127.0.0.1"

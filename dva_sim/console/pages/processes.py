@@ -43,7 +43,7 @@ class ConsoleSubject(Protocol):
         clock: Its time, at its pace.
         tell: Takes lines for pages, and a key for those of which the newest counts.
         show: Takes lines for the process that draws pictures, likewise.
-        dropped: How many lines for pages were dropped so far.
+        dropped: Number of lines for pages dropped so far.
     """
 
     clock: PacedClock
@@ -68,12 +68,12 @@ class ConsoleProcesses:
     """The web process and the one that draws, and the lines to and from them.
 
     Args:
-        options: Where pages are to be seen, and by whom.
+        options: Addresses and access rules of the pages.
         say: Prints a line.
 
     Attributes:
-        serving: What the web process said of itself first: its addresses.
-        failed: Why the web process has ended by itself; empty if it has not.
+        serving: First message of the web process: its addresses.
+        failed: Reason why the web process has ended by itself; empty if it has not.
     """
 
     def __init__(self, options: PageOptions, say: Say) -> None:
@@ -93,7 +93,7 @@ class ConsoleProcesses:
         """Start both, connect them with what is shown, say where it is, and begin.
 
         Args:
-            subject: What is shown.
+            subject: Subject to show.
             take: Does what a line of a page asks for.
             audit: File of the audit log that pages show, if there is one.
             report: A study's report that pages may show.

@@ -24,9 +24,9 @@ def half_blocks(address: str, colours: bool) -> str:
     """For a terminal: two modules in each character.
 
     Args:
-        address: What is read.
-        colours: Whether the terminal obeys them. Else what is light is drawn, for most terminals
-            are dark.
+        address: Address to encode.
+        colours: True if the terminal supports colours. Otherwise light modules are drawn, as most
+            terminals are dark.
     """
     rows = [list(row) for row in segno.make_qr(address, error="l").matrix_iter(border=TERMINAL_RIM)]
     if len(rows) % 2:

@@ -32,7 +32,7 @@ class PhoneActions:
 
     Args:
         world: In which.
-        seats: Who sits where.
+        seats: Seats and their clients.
         robot: Gives the id of a robot by what a line calls it.
         stop: Ends the drive of a client, and says why.
     """

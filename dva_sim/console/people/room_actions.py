@@ -31,7 +31,7 @@ class RoomActions:
 
     Args:
         world: In which.
-        seats: Who sits where.
+        seats: Seats and their clients.
         robot: Finds the id of a robot that a line names.
         take: Takes a robot for a page's seat.
     """

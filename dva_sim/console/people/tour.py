@@ -42,7 +42,7 @@ def tour_of(run: Run, numbers: Mapping[str, int]) -> TourPlan | None:
 
     Args:
         run: In which.
-        numbers: Of the robots, by id.
+        numbers: Numbers of the robots, by id.
     """
     site = run.stage.site
     for pair in pairwise(run.field.robots.values()):

@@ -19,11 +19,11 @@ class Samples(NamedTuple):
     """Samples of one message.
 
     Attributes:
-        first: Which one the first is, of all that the page has taken.
-        at: When each was taken, by the phone, rising [s].
-        xyz: What each measured, in the phone's axes [m/s^2].
-        hand: Whether the person holds on.
-        orientation: Of the screen [deg].
+        first: Index of the first sample, of all that the page has taken.
+        at: Times of the samples, by the phone, rising [s].
+        xyz: Measured values in the phone's axes [m/s^2].
+        hand: True if the person holds on.
+        orientation: Orientation of the screen [deg].
     """
 
     first: int
@@ -38,13 +38,13 @@ class PhoneSettings:
     """The calibration of a phone.
 
     Attributes:
-        reference: What it measures in the pose that means nothing, in its own axes [m/s^2].
-        changes: Of the pipeline's profile.
+        reference: Reading in the neutral pose, in the phone's own axes [m/s^2].
+        changes: Changes of the pipeline's profile.
         pipeline: Name of that profile.
-        filter: As asked for; None: the pipeline's own.
-        calibrated: Whether somebody has.
-        ios: Whether the signs are those of iOS.
-        keep: Whether the person agrees that the motion is written down.
+        filter: Requested filter; None: the pipeline's own.
+        calibrated: True once somebody has calibrated it.
+        ios: True if the signs are those of iOS.
+        keep: True if the person agrees that the motion is recorded.
     """
 
     reference: Triple = FLAT

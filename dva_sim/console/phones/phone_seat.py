@@ -34,19 +34,19 @@ class PhoneSeat:
     Args:
         clock: The run's.
         profile: The profile that settings lead to.
-        given_hz: How often what is steered by stick is sampled [Hz].
-        attempts: How often a command is sent before the link counts as lost.
+        given_hz: Sampling rate of a stick [Hz].
+        attempts: Number of attempts per command before the link counts as lost.
 
     Attributes:
-        person: Who it is on the wire; None before it registers.
+        person: Device on the network; None before it registers.
         operator: The console's own operator who tilts it, and needs no registration.
-        registered: Whether the DVA has agreed.
-        settings: How it is calibrated.
-        orientation: Of its screen [deg].
+        registered: True once the DVA has registered it.
+        settings: Calibration.
+        orientation: Orientation of its screen [deg].
         tilt: Makes commands: those of the drive that goes on, or else what its screen shows.
-        samples: How many have come.
-        lost: How many have not, by their numbers.
-        motion: Where its motion is written down, if its person agrees.
+        samples: Number of samples received.
+        lost: Number of samples missing, by their numbers.
+        motion: File of its motion, if its person agrees.
     """
 
     def __init__(
@@ -144,8 +144,8 @@ class PhoneSeat:
         """Samples have come; whether one of them is new.
 
         Args:
-            said: Which.
-            came: When, real time [s].
+            said: New samples.
+            came: Arrival time, real time [s].
         """
         fresh = [pair for pair in zip(said.at, said.xyz, strict=True) if not self._is_old(pair[0])]
         self._count(said, len(fresh))

@@ -43,13 +43,13 @@ class Phones:
     Args:
         run: In which.
         clock: Its own.
-        console: What persons work with by now.
-        address: Where the DVA listens, if the links are real; a modelled one has no real address.
+        console: Current equipment of persons.
+        address: Address of the DVA, if the links are real; a modelled one has no real address.
 
     Attributes:
-        address: Where the DVA listens.
+        address: Address of the DVA.
         by_client: The phones by their pages.
-        motion_folder: Where the motion of those is kept whose person agrees; None: nowhere.
+        motion_folder: Folder for the motion of persons who agree; None: not kept.
     """
 
     def __init__(

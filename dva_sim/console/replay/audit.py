@@ -16,7 +16,7 @@ class RecordedAudit:
     """The rows of whichever recording is played; a file that is gone with the player.
 
     Attributes:
-        path: Of the file.
+        path: File of the rows.
     """
 
     def __init__(self) -> None:

@@ -48,7 +48,7 @@ def show_replay(options: ReplayOptions, say: Say) -> None:
     """Show it until Ctrl-C, SIGTERM, or the end of the web process.
 
     Args:
-        options: What, and where.
+        options: Recording and addresses.
         say: Prints a line.
 
     Raises:

@@ -50,8 +50,8 @@ class RecordedDevices:
 
         Args:
             now: The moment [s].
-            robots: What is known of robots, by their ids.
-            doing: What those on the site are doing, by label.
+            robots: State of robots, by id.
+            doing: Activities of the people and robots on site, by label.
         """
         return [
             self._row(who, about, now, robots.get(who), doing)

@@ -28,7 +28,7 @@ class RecordedTracks:
 
     Args:
         tracks: By label, in order of time.
-        duration: Of the recording [s].
+        duration: Length of the recording [s].
     """
 
     def __init__(self, tracks: Mapping[str, Sequence[TrackPoint]], duration: float) -> None:

@@ -41,9 +41,9 @@ class Player:
     """A recording that is being played.
 
     Args:
-        run: What is played; None until one is taken from the shelf.
+        run: Recording being played; None until one is taken from the shelf.
         shelf: Others that can be played instead.
-        clock: Of whoever looks; the recording's own time follows it.
+        clock: Clock of the viewer; the recording's own time follows it.
 
     Attributes:
         tell: Takes lines for pages, and a key for those of which the newest counts.

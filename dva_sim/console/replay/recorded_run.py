@@ -46,15 +46,15 @@ class RecordedRun:
 
     Args:
         opened: The recording.
-        name: What it is called on the page.
+        name: Name on the page.
 
     Attributes:
-        playback: What can be told and shown of the run.
+        playback: Content of the recording.
         things: Everybody.
         numbers: By which lines call them, by id and by label.
-        duration: How long it lasts [s].
+        duration: Length [s].
         audit: The rows of the console's audit log, if it had one.
-        tracks: Where everybody was.
+        tracks: Tracks of everybody.
     """
 
     def __init__(self, opened: Opened, name: str) -> None:

@@ -41,10 +41,10 @@ class RobotLines:
     """The windows of one robot.
 
     Args:
-        drives: Of this robot.
+        drives: Drives of this robot.
         traffic: All messages of the run, by time.
         robot: Its id.
-        labels: Of all devices, by id.
+        labels: Labels of all devices, by id.
     """
 
     def __init__(
@@ -68,9 +68,9 @@ class RobotLines:
         """The windows at a moment.
 
         Args:
-            row: What everybody knows of the robot then.
-            speed: As it moved [m/s].
-            turn_rate: As it turned [rad/s].
+            row: Public state of the robot at that moment.
+            speed: Recorded speed [m/s].
+            turn_rate: Recorded turn rate [rad/s].
             now: The moment [s].
         """
         return {

@@ -34,7 +34,7 @@ class Shelf:
     """The recordings below a folder.
 
     Args:
-        folder: Of a study's results, or one in which recordings lie.
+        folder: Results folder of a study, or any folder with recordings.
 
     Attributes:
         report: The study's report; None without one.

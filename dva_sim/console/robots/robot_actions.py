@@ -27,8 +27,8 @@ class PageHand:
 
     Attributes:
         robot: Its id.
-        heard: When its newest input came, real time [s].
-        holds: Whether that was held.
+        heard: Time of its newest input, real time [s].
+        holds: True if that input was held.
     """
 
     robot: str
@@ -40,12 +40,12 @@ class RobotActions:
     """Does what the windows of robots ask for.
 
     Args:
-        windows: Of all robots.
+        windows: Windows of all robots.
         robot: Gives the id of a robot by what a line calls it.
-        why_not: Why nobody may drive now; empty: one may.
-        labels: Of all devices, by id.
-        deaf: Told which robot's computer is made to hang, and that it is again as it should be.
-        slow: Told how long a message is made to take a robot's computer [s].
+        why_not: Reason why nobody may drive now; empty if driving is allowed.
+        labels: Labels of all devices, by id.
+        deaf: Callback when a robot's computer is made to hang, or to work again.
+        slow: Callback with the processing time set for a robot's computer [s].
     """
 
     def __init__(

@@ -24,15 +24,14 @@ class OwnStation:
     then nobody reaches it.
 
     Args:
-        robot: Which.
         network: Its sockets.
         host: Address to listen on.
-        port: Of requests; publications have the next one. 0: any two that are free.
+        port: Port for requests; publications have the next one. 0: any two free ones.
 
     Attributes:
         state: `off`, `registered` or `listening`.
-        dva: Where it was registered last, or is to be.
-        deaf: Told whether it hears anything.
+        dva: Address of its latest or next registration.
+        deaf: Callback when it stops or starts hearing.
     """
 
     def __init__(self, robot: RobotAgent, network: RealNetwork, host: str, port: int) -> None:

@@ -38,11 +38,7 @@ class RobotStation(Protocol):
 
 
 class AlwaysListening:
-    """The station of a robot that registers by itself, and listens from the beginning.
-
-    Args:
-        robot: Which.
-    """
+    """The station of a robot that registers by itself, and listens from the beginning."""
 
     def __init__(self, robot: RobotAgent) -> None:
         self._robot = robot
@@ -60,12 +56,12 @@ class RobotWindow:
 
     Attributes:
         robot: The robot.
-        station: How far it has come.
-        faults: What is wrong with it.
-        hand: For whoever drives it by hand.
-        number: Of the hand that has it, as pages know it; None: nobody's.
+        station: Progress of the robot from off to listening.
+        faults: Injected faults.
+        hand: Manual control at the robot.
+        number: Number of the page in manual control; None: nobody.
         emergency: The newest emergency that it has heard: when [ms] and of whom.
-        notice: Why manual control has ended last.
+        notice: Reason why manual control last ended.
         one_way: From its driver to it.
         loop: From it to its driver and back, by pictures and the commands behind them.
         replies: From a request to the reply.
@@ -106,12 +102,12 @@ class RobotWindows:
     """The windows of all robots of a run.
 
     Args:
-        recorder: Of the run.
+        recorder: Recorder of the run.
         robots: By id.
-        numbers: Of everybody, by id.
-        labels: Of all devices, by id.
-        sent_at: When a message was sent, by its bytes [s]; None: by nobody here.
-        lost: Told of each reply that is dropped.
+        numbers: Numbers of all agents, by id.
+        labels: Labels of all devices, by id.
+        sent_at: Send time of a message, by its bytes [s]; None: not sent by this process.
+        lost: Callback for each dropped reply.
     """
 
     def __init__(
@@ -193,7 +189,7 @@ class RobotWindows:
 
         Args:
             watched: Those, by id.
-            stands: Why a robot stands, in words.
+            stands: Reason why a robot stands, in words.
         """
         for id_tag in watched:
             yield self._line(id_tag, self.by_id[id_tag], stands)

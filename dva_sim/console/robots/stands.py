@@ -14,9 +14,8 @@ def why_stands(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
     """Return why a robot stands; empty if it moves.
 
     Args:
-        robot: Which.
         now: [s]
-        held_by_lag: Whether nobody may drive now.
+        held_by_lag: True if nobody may drive now because the run lags.
     """
     body, controller, point = robot.body, robot.controller, robot.set_point
     if body.jammed:

@@ -10,7 +10,7 @@ class LagRule:
     """Decide whether a world is too far behind for anybody to drive in it.
 
     Attributes:
-        held: Whether it is now.
+        held: True while driving is suspended.
         newest: The lag that was measured last [s].
     """
 

@@ -85,18 +85,18 @@ class ConsoleSockets:
     Args:
         scenario: Says what is set on the sockets.
         clock: Waits for them.
-        recorder: Told what goes wrong, and of each message.
+        recorder: Recorder of messages and failures.
         host: Address to listen on.
-        port: Of the DVA's requests; its publications have the next one. 0: any two that are free.
+        port: Port for the DVA's requests; its publications have the next one. 0: any two free ones.
         ring: Keys of the devices; None to run without.
-        carrier: What carries the messages; None: ZeroMQ.
+        carrier: Transport of the messages; None: ZeroMQ.
         emulated: Random seed of the scenario's link, which is emulated between robots, guards and
             detectors and everybody else; None: it is not.
 
     Attributes:
-        dva: Where the DVA listens, once it does.
+        dva: Address of the DVA, once it listens.
         crossing: The emulated link, if there is one.
-        packets: What became of its packets, at the end.
+        packets: Report on the packets, at the end.
     """
 
     packets: LinkReport | None

@@ -25,8 +25,8 @@ class ConsoleRecorder(Recorder):
     """A recorder of a run that may last for ever.
 
     Attributes:
-        on_applied: Told of each drive that has had a command take effect.
-        on_ordered: Told of each drive as it is ordered.
+        on_applied: Callback for each drive in which a command took effect.
+        on_ordered: Callback for each drive as it is ordered.
         on_tidy: Called before what is old is forgotten.
         on_tidied: Called afterwards.
         kept: Takes lines for a recording, if there is to be one.

@@ -20,12 +20,11 @@ class LinkSliders:
     """Link of all robots, which can be changed while it carries messages.
 
     Args:
-        run: Whose.
-        set_usual: Told how long a message usually takes the computer of a robot, by its id [s].
-        emulated: Whether the scenario's link is emulated below real sockets.
+        set_usual: Callback with the usual processing time of a robot's computer, by its id [s].
+        emulated: True if the scenario's link is emulated below real sockets.
 
     Attributes:
-        link: As it is now.
+        link: Current settings of the link.
     """
 
     def __init__(

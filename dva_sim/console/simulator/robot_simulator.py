@@ -38,12 +38,12 @@ class RobotOptions(PageOptions):
 
     Attributes:
         profile: By name or path.
-        number: Which robot it is, from 1: its id and its label follow from that.
-        dva: Where it is registered at once, `HOST:PORT`; None: from its page.
+        number: Number of the robot, from 1: its id and its label follow from that.
+        dva: Address for registering at once, `HOST:PORT`; None: from its page.
         listen: Port of its requests; its publications have the next one. 0: any two that are free.
         keys: Folder with the keys of the devices; None to run without.
-        seed: Decides all luck.
-        changes: Of the scenario that it stands in, `KEY=VALUE`.
+        seed: Random seed.
+        changes: Changes of the scenario that it stands in, `KEY=VALUE`.
     """
 
     profile: str = "servrobot"
@@ -69,7 +69,7 @@ class RobotSimulator:
     """One robot with its windows.
 
     Args:
-        options: Which, and where it is to be seen.
+        options: Robot and addresses.
         say: Prints a line.
     """
 

@@ -54,17 +54,17 @@ class RobotWorld:
 
     Args:
         scenario: Says which robot, and where it stands.
-        number: Which of its robots it is, from 1.
-        seed: Decides all luck.
+        number: Number of the robot in the scenario, from 1.
+        seed: Random seed.
         clock: Its time; real time.
         ring: Keys of the devices; None to run without.
         host: Address to listen on.
-        port: Of requests; 0: any two that are free.
+        port: Port for requests; 0: any two free ones.
 
     Attributes:
         clock: Real time.
         robot: The robot.
-        station: How far it has come.
+        station: Progress of the robot from off to listening.
         audited: Keeps who did what, once that is wanted.
         windows: Its windows.
         tell: Takes lines for pages, and a key for those of which the newest counts.

@@ -29,7 +29,6 @@ class Feed:
     """Lines about a run.
 
     Args:
-        run: Which.
         book: Events of its DVA, if there is one here.
 
     Attributes:

@@ -24,10 +24,9 @@ class HazardFeed:
     """Positions and extents of hazards.
 
     Args:
-        site: Where.
         incidents: The hazards of a run.
-        surroundings: What they make of the air and the floor.
-        contained: When incidents are dealt with [s], by their place in `incidents`.
+        surroundings: Effect of the hazards on air and floor.
+        contained: Time at which incidents are contained [s], by their index in `incidents`.
     """
 
     def __init__(

@@ -35,12 +35,12 @@ class MessageLog:
     Args:
         name: Label of the device.
         node: Its id.
-        transport: Where its messages come in.
+        transport: Transport that carries its messages.
 
     Attributes:
-        kept: Whether it is written though nobody looks.
-        wants_all: Whether it is written with publications, whoever looks.
-        listeners: Who else takes each exchange.
+        kept: True if it is written even when nobody looks.
+        wants_all: True if it always includes publications.
+        listeners: Further receivers of each exchange.
     """
 
     def __init__(self, name: str, node: str, transport: Transport) -> None:
@@ -101,7 +101,7 @@ class Logs:
     """All logs of a run.
 
     Args:
-        transport: Where messages come in.
+        transport: Transport that carries the messages.
         node_of: Gives the id of a device by its label; None: there is none of that label.
     """
 

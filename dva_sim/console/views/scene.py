@@ -51,13 +51,11 @@ def scene_of(
     """The first line that a page gets.
 
     Args:
-        scenario: What is run.
-        site: Where.
         incidents: Its hazards.
         things: Everybody, with their numbers.
-        link: How messages travel.
-        name: Of the scenario.
-        seed: Of the run.
+        link: Link and transport of the messages.
+        name: Name of the scenario.
+        seed: Random seed of the run.
     """
     return {
         "k": "scene",

@@ -44,7 +44,6 @@ class Strangers:
     """Those of a run.
 
     Args:
-        run: Which.
         feed: Gives numbers.
     """
 

@@ -79,8 +79,8 @@ class Asked:
         site: The `Sec-Fetch-Site` header: how the asking page and this console are related.
         mode: The `Sec-Fetch-Mode` header; `navigate` where a person opens a page.
         scheme: `http` or `https`.
-        changes: Whether it is more than reading: a POST or a WebSocket.
-        is_page: Whether the page itself is asked for.
+        changes: True if it is more than reading: a POST or a WebSocket.
+        is_page: True if it asks for the page itself.
     """
 
     host: str
@@ -97,12 +97,12 @@ class Entrance:
     """The rules of one console.
 
     Attributes:
-        tokens: Of its roles.
+        tokens: Tokens of its roles.
         cookie: Name of the cookie; browsers do not tell ports apart, so the port is in it.
         names: Under which it is served, in lower case.
-        any_address: Whether it is served on all addresses of the machine: then each IP address
-            may be asked for. An address cannot be made to lead elsewhere, as a name can.
-        secure: Whether it is served over https: then its cookie goes nowhere else.
+        any_address: True if it is served on all addresses of the machine: then each IP address may
+            be asked for. An address cannot be made to lead elsewhere, as a name can.
+        secure: True if it is served over https: then its cookie goes nowhere else.
     """
 
     tokens: Tokens
@@ -168,11 +168,10 @@ def rules(
     """The rules of a console that listens on an address.
 
     Args:
-        host: As asked for, such as `127.0.0.1`, `0.0.0.0` or a name of this machine.
-        port: Where.
+        host: Host as asked for, such as `127.0.0.1`, `0.0.0.0` or a name of this machine.
         names: More names under which it is asked for.
         tokens: New ones are drawn if there are none.
-        secure: Whether it listens by https.
+        secure: True if it listens by https.
     """
     known = {name.lower().strip("[]") for name in (*names, host)}
     everywhere = is_address(host) and ipaddress.ip_address(host.strip("[]")).is_unspecified

@@ -62,10 +62,10 @@ def asked_of(name: Any, given: Any, labels: Labels, silent: bool = False) -> dic
     """Return the validated request for the simulation.
 
     Args:
-        name: Of the action.
+        name: Name of the action.
         given: Its arguments.
-        labels: Of the robots, with their indices.
-        silent: Whether those without an answer may be asked for, too.
+        labels: Labels of the robots, with their indices.
+        silent: True to allow actions without an answer.
 
     Raises:
         BadMessage: no such action, or an argument that makes no sense.

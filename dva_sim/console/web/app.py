@@ -66,7 +66,7 @@ class Doorkeeper:
     """Stands before the application: refuses, finds the role, and sets headers on each answer.
 
     Args:
-        app: What is guarded.
+        app: Application to guard.
         access: The rules.
     """
 
@@ -151,7 +151,7 @@ class Pages:
         access: Knows the cookie.
         hub: Knows the simulation.
         cameras: Pictures.
-        files: Of the page.
+        files: Files of the page.
     """
 
     def __init__(
@@ -260,11 +260,11 @@ def make_app(
 
     Args:
         access: Its rules.
-        hub: Of all pages, whatever they were opened by.
+        hub: Hub of all pages, regardless of the listener that opened them.
         cameras: Pictures.
-        files: Of the pages.
-        door: Where phones come in, if they do.
-        audit: Who did what, if that is kept.
+        files: Files of the pages.
+        door: Entrance for phones, if there is one.
+        audit: Audit log, if it is kept.
         report: A study's report that is shown as it is.
     """
     told = StudyReport(report)

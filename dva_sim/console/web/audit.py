@@ -39,7 +39,7 @@ class AuditPages:
     """Requests about the audit log.
 
     Args:
-        path: Of its file; None: there is none.
+        path: File of the log; None: there is none.
     """
 
     def __init__(self, path: Path | None) -> None:

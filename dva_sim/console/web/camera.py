@@ -17,8 +17,8 @@ class ConsoleCameras(CameraStreams):
     """The newest picture of each robot that is looked at.
 
     Args:
-        simulation: The simulation, which is told who is watched.
-        said: Who is watched by pages that say so.
+        simulation: Simulation, which gets the list of watched robots.
+        said: Robots watched by pages that say so.
     """
 
     def __init__(self, simulation: Simulation, said: Callable[[], Iterable[int]]) -> None:

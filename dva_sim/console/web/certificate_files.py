@@ -27,9 +27,9 @@ class KeptCertificates(NamedTuple):
     """Certificates in use.
 
     Attributes:
-        authority: What a phone is asked to trust.
+        authority: Authority that a phone is asked to trust.
         leaf: File with key and certificate of this machine.
-        told: What was made or renewed, and why, a line each.
+        told: Certificates made or renewed, and the reasons, a line each.
     """
 
     authority: Signed
@@ -53,7 +53,7 @@ def certificates(folder: Path, hosts: Hosts, now: datetime | None = None) -> Kep
     """Authority and certificate for these hosts: those that are kept, or new ones.
 
     Args:
-        folder: Where they are kept.
+        folder: Folder of the certificates.
         hosts: Under what this machine is reached.
         now: Else the time of the clock.
 

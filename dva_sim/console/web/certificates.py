@@ -40,7 +40,7 @@ class Hosts:
 
     Attributes:
         names: Such as `lab-pc`, in lower case.
-        addresses: Of its networks.
+        addresses: IP addresses of the machine.
     """
 
     names: frozenset[str]

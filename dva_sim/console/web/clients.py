@@ -31,7 +31,7 @@ class Driver:
 
     Attributes:
         wake: Set when there is something to say.
-        replaced: Whether a newer socket of the same page took over.
+        replaced: True once a newer socket of the same page took over.
     """
 
     def __init__(self) -> None:
@@ -66,15 +66,15 @@ class Client:
     Attributes:
         name: By which the simulation knows it, and everybody who may look.
         key: Opens its seat; never shown to others.
-        role: What it may do.
-        feed: What it gets.
+        role: Role of the page.
+        feed: Lines for the page.
         wake: Set when there may be something for it.
         watches: Robots whose pictures it says it looks at.
         driver: Its driving socket, if it has one.
-        is_here: Whether its state socket is open.
+        is_here: True while its state socket is open.
         page: Name that the page gives itself until it is loaded again; empty: none.
         ws: Its state socket, while that is open.
-        asked: When a program made its newest request [s].
+        asked: Time of a program's newest request [s].
     """
 
     def __init__(self, name: str, role: Role, state: RunState, page: str = "") -> None:
@@ -93,7 +93,7 @@ class Clients:
     """All pages that are here, or were a moment ago.
 
     Args:
-        state: Of the run.
+        state: State of the run.
     """
 
     def __init__(self, state: RunState) -> None:

@@ -23,12 +23,12 @@ class PageFeed:
     """State of a page, and so what it lacks.
 
     Args:
-        state: Of the run.
-        seat: Of this page; its lines come in full.
-        acts: Whether the page may drive.
+        state: State of the run.
+        seat: Seat of this page; its lines come in full.
+        acts: True if the page may drive.
 
     Attributes:
-        looks: Which logs and tables it looks at.
+        looks: Logs and tables that it views.
         watches: Robots at which it looks.
     """
 

@@ -28,17 +28,17 @@ class Entry:
 
     Attributes:
         number: In its log, from 1.
-        time: Of arrival, by the run's clock [ms].
+        time: Arrival time by the run's clock [ms].
         data: The request, or the publication; the first bytes of one that is too long.
         reply: The answer, if there is one.
-        service_us: How long the answer took.
-        published: Whether it is a publication.
-        kind: Of message, as its element is called; `?` if that cannot be seen.
-        payload: What it says, in a few characters.
-        header: What its header holds, as far as that can be read.
-        label: What a device calls itself that registers.
-        code: Of the reply; None without one.
-        text: What the reply says in words.
+        service_us: Time that the answer took.
+        published: True for a publication.
+        kind: Kind of message, by the name of its element; `?` if unreadable.
+        payload: Content in a few characters.
+        header: Fields of its header, as far as readable.
+        label: Label of a device that registers.
+        code: Code of the reply; None without one.
+        text: Text of the reply.
     """
 
     number: int

@@ -34,7 +34,7 @@ class LogRequests:
     """Requests about logs.
 
     Args:
-        hub: Of the pages; knows the simulation.
+        hub: Hub of the pages; knows the simulation.
     """
 
     def __init__(self, hub: Hub) -> None:

@@ -43,10 +43,10 @@ class LogFilter:
 
     Attributes:
         device: Part of the id or the label of who asks or is asked.
-        kind: Of message.
-        code: Of the reply, `none` for those without, or `refused` for all but OK.
-        text: What occurs in a message or its reply.
-        publications: Whether publications are wanted.
+        kind: Kind of message.
+        code: Code of the reply, `none` for those without, or `refused` for all but OK.
+        text: Text that occurs in a message or its reply.
+        publications: True to include publications.
         since: Only entries of a higher number: what came before was cleared.
     """
 
@@ -109,11 +109,11 @@ class KeptLog:
 
     Attributes:
         entries: By number, the oldest first.
-        changed: How many changes there were: a new entry, or one that got its reply.
-        lost: How many exchanges the simulation left out.
-        bytes: What messages take.
+        changed: Number of changes: a new entry, or one that got its reply.
+        lost: Number of exchanges left out by the simulation.
+        bytes: Size of the messages.
         newest: Number of the newest entry.
-        begun: How often it has begun anew, as when a recording is wound back.
+        begun: Number of restarts, as when a recording is wound back.
     """
 
     def __init__(self, name: str) -> None:
@@ -207,7 +207,7 @@ class Looks:
 
     Args:
         logs: All there are.
-        acts: Whether the page may drive: who may not does not learn of sessions, by which one does.
+        acts: True if the page may drive; others do not see sessions, which allow driving.
 
     Attributes:
         wanted: The logs it looks at.

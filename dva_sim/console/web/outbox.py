@@ -17,7 +17,7 @@ class OutgoingLines:
     their numbers tell.
 
     Attributes:
-        refused: How many actions found no room.
+        refused: Number of actions rejected for lack of room.
     """
 
     def __init__(self) -> None:

@@ -19,11 +19,11 @@ class PhoneListener(NamedTuple):
     """All that phones are served with.
 
     Attributes:
-        sock: Where it listens.
+        sock: Listening socket.
         access: Its rules.
         certificate: File with key and certificate.
-        door: What the console says of it.
-        told: What was renewed, for people, a line each.
+        door: Address and certificate, for display.
+        told: Renewals, for people, a line each.
     """
 
     sock: socket.socket
@@ -42,8 +42,8 @@ def listen_for_phones(
         host: Address of this machine, or one that means all.
         port: 0 for any that is free.
         names: More names of this machine.
-        tokens: Of all roles.
-        folder: Where certificates are kept; else in the user's data folder.
+        tokens: Tokens of all roles.
+        folder: Folder of the certificates; by default in the user's data folder.
 
     Raises:
         ConfigError: the address is not of this machine, or taken.

@@ -50,8 +50,8 @@ class PhonePages:
     """Pages about phones.
 
     Args:
-        door: Where they come in; None where there is no such way.
-        files: Of the pages.
+        door: Entrance for phones; None if there is none.
+        files: Files of the pages.
     """
 
     def __init__(self, door: PhoneDoor | None, files: StaticFiles) -> None:

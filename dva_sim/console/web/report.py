@@ -15,7 +15,7 @@ class StudyReport:
     """A study's report: one file with styles and pictures of its own, and no scripts.
 
     Args:
-        path: Of the file; None without one.
+        path: File of the report; None without one.
     """
 
     POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"

@@ -85,7 +85,7 @@ class Rest:
     """The requests of programs.
 
     Args:
-        hub: Of the pages; knows the simulation.
+        hub: Hub of the pages; knows the simulation.
     """
 
     def __init__(self, hub: Hub) -> None:

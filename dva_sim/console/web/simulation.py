@@ -35,8 +35,8 @@ class Simulation:
     Attributes:
         state: The newest of everything.
         ended: Set when the simulation has ended.
-        why: Why it did.
-        labels: Of the robots, with their indices in the scene.
+        why: Reason why it ended.
+        labels: Labels of the robots, with their indices in the scene.
         kinds: Called with each line's kind when the state has changed.
     """
 

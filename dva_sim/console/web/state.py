@@ -50,15 +50,15 @@ class RunState:
 
     Attributes:
         version: Counts changes.
-        time: Of the newest line [ms].
-        scene: What does not change; None until it is told.
+        time: Time of the newest line [ms].
+        scene: Static content; None until it arrives.
         latest: The newest line by its kind.
-        places: Where everybody is, by index: a row of `pos`.
-        seats: What each seat's holder knows, and what others may.
-        guards: What each page of a guard knows.
-        windows: What the windows of a robot show, by its index.
+        places: Positions by index: a row of `pos` each.
+        seats: State of each seat: the part for its holder, and the public part.
+        guards: State for each page of a guard.
+        windows: Content of a robot's windows, by its index.
         tables: The newest line of each kind that only some pages look at.
-        logs: What devices were asked, and answered.
+        logs: Requests to devices, and their replies.
     """
 
     def __init__(self) -> None:

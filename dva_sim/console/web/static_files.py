@@ -37,9 +37,6 @@ class StaticFiles:
 
     A name that is not in the list is looked for once more, as files come and go while somebody
     works on them.
-
-    Args:
-        folder: Where.
     """
 
     def __init__(self, folder: Path = FOLDER) -> None:

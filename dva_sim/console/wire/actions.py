@@ -90,7 +90,7 @@ class Queueing(Enum):
     Attributes:
         IN_TURN: Behind those before it.
         FIRST: Before all others, and never refused for want of room.
-        NEWEST: Of one client only the newest.
+        NEWEST: Only the newest of each client waits.
         BATCH: A few of each client, in their order; of too many the oldest are lost.
     """
 
@@ -128,11 +128,11 @@ class Action:
         at: Places in which it acts.
         role: The least that may ask for it.
         audit: The row of the audit log that records it, or the reason why none does.
-        stops: Whether it only stops or releases something: then it never waits for a disk.
-        over_link: Whether the answer comes from a robot or the DVA, over links that may be slow.
+        stops: True if it only stops or releases something: then it never waits for a disk.
+        over_link: True if the answer comes from a robot or the DVA, over links that may be slow.
         waits: Its order among other requests.
-        seats: Whether a program needs a seat, or another thing of its own, from then on.
-        has_answer: Whether it is answered.
+        seats: True if a program needs a seat, or another thing of its own, from then on.
+        has_answer: True if it is answered.
         check: Raises `BadMessage` if the arguments contradict each other.
     """
 

@@ -33,8 +33,8 @@ class Kind:
     """Limits of a value.
 
     Args:
-        words: What the value should be.
-        limits: As pydantic's core names them, such as `ge` and `max_length`.
+        words: Description of valid values.
+        limits: Limits by the names of pydantic's core, such as `ge` and `max_length`.
     """
 
     def __init__(self, words: str, **limits: Any) -> None:
@@ -163,7 +163,7 @@ def read_arguments(arguments: type, given: Any, labels: Labels | None = None) ->
     Args:
         arguments: A `TypedDict` whose annotations are of this module.
         given: From a client.
-        labels: Of the robots, with their indices; None: robots may be called anything.
+        labels: Labels of the robots, with their indices; None accepts any label.
 
     Raises:
         BadMessage: one is missing, unknown, or not of its kind.

@@ -36,13 +36,13 @@ class KeptResults:
     Args:
         out: The folder.
         scenario: By name or path.
-        changes: Of the scenario, `KEY=VALUE`.
-        seed: Of the study.
-        overwrite: What is there may be replaced.
+        changes: Changes of the scenario, `KEY=VALUE`.
+        seed: Random seed of the study.
+        overwrite: True to replace existing files.
 
     Attributes:
-        scenario: As it is to be run.
-        seed: Of the run.
+        scenario: Scenario to be run.
+        seed: Random seed of the run.
 
     Raises:
         ConfigError: no such scenario, or the folder holds something already.

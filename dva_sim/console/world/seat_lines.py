@@ -38,7 +38,7 @@ class SeatLines:
         run: In which.
         feed: About it.
         persons: By the numbers of their seats.
-        client_of: Who sits there, by the same numbers.
+        client_of: Client in each seat, by number.
         phones: By their clients.
     """
 

@@ -51,18 +51,17 @@ class ConsoleWorld(ToldWorld):
     """Running world with its published state.
 
     Args:
-        scenario: What the run consists of.
-        name: Of the scenario.
-        seed: Decides all luck.
+        name: Name of the scenario.
+        seed: Random seed.
         clock: Its time; default: real time.
         sockets: Makes what carries the messages; default: the link that the scenario models.
-        measured: Whether all that happens is kept, to be measured in the end.
+        measured: True to keep everything for measuring in the end.
 
     Attributes:
         clock: Virtual time, at its pace.
-        sockets: What carries the messages, if the links are real.
+        sockets: Sockets of the messages, if the links are real.
         run: The run.
-        logs: What devices are asked, and answer.
+        logs: Requests to devices, and their replies.
         windows: Those of the robots.
         dva: The DVA as people see and serve it.
         tell: Takes lines for pages, and a key for those of which the newest counts.
