@@ -41,10 +41,10 @@ def job_of(
 
     Args:
         name: With its seed it is no other's.
-        seed: Of its luck.
-        scenario: What is played; what needs none finds all that it is in `asked`.
-        person: Whose it is.
-        asked: What else its program has to know.
+        seed: Random seed.
+        scenario: Scenario to run; a job without one has everything in `asked`.
+        person: Person of the job.
+        asked: Further input of its program.
     """
     cell = tuple(asked.items())
     return StudyJob(
@@ -70,11 +70,10 @@ def play_jobs(
     """The rows of each job by its key.
 
     Args:
-        jobs: What to play.
         program: Plays one; all its rows are in a table `rows`.
         workers: Processes.
-        failed: What is said of one that failed, with a place for its name.
-        progress: Told how much is finished.
+        failed: Message about a failed job, with a place for its name.
+        progress: Callback with the progress.
         count: For how much the rows of a job count there.
 
     Raises:
@@ -97,12 +96,12 @@ class ResultSheet:
 
     Attributes:
         title: Above it; empty for none.
-        heads: Of the columns.
-        rows: As words. On a page a row of two stands across all columns: a title and its source.
+        heads: Column headings.
+        rows: Cells as text. On a page a row of two spans all columns: a title and its source.
         words: Columns that are read as words, not as numbers: these stand left.
-        text: What has to be known to read it.
-        wraps: Whether long cells may take several lines.
-        merged: Whether the first cell is told once for all rows that share it.
+        text: Introduction.
+        wraps: True if long cells may take several lines.
+        merged: True if rows with equal first cells share one.
         widths: In a terminal [characters]; None shares what is left. Empty: as needed.
     """
 
@@ -127,12 +126,12 @@ class ValidationResult:
 
     Attributes:
         name: `dispatch`, `operators` or `network`: of its table, and of its page's method.
-        headline: What it comes to.
-        passes: Whether all that is asked for holds.
-        notes: What belongs to the headline, each in a sentence.
-        conditions: How it was found, by name.
-        sheets: What the page shows, in order.
-        told: What a terminal shows, in order.
+        headline: Result in words.
+        passes: True if all criteria hold.
+        notes: Notes on the headline, one sentence each.
+        conditions: Conditions of the validation, by name.
+        sheets: Content of the page, in order.
+        told: Content on a terminal, in order.
         draw: Draws the figures, which takes a while.
         tables: Rows by name, each with the same keys.
         rule: Numbers that the page's method names.
@@ -196,9 +195,9 @@ def captioned(figure: Figure, name: str, **numbers: object) -> Drawn:
     """A figure with its title and caption, which are in `templates/captions.yaml`.
 
     Args:
-        figure: What is drawn.
-        name: Of the figure.
-        numbers: That its caption has places for.
+        figure: Figure to caption.
+        name: Name of the figure.
+        numbers: Numbers for the places in its caption.
     """
     words = load_yaml(Path(__file__).parent / "templates/captions.yaml").data[name]
     return finish(figure, name, words["title"], words["text"].format(**numbers))

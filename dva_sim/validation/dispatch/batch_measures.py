@@ -42,26 +42,26 @@ class Sample:
         units: Names of the responders.
         groups: Name of each responder's group.
         kinds: `guard` or `robot`, of each responder.
-        operators: How many there are.
-        sources: How many sources there are, if they are finite.
-        begins: When measuring begins.
-        ends: When it ends: no event after this.
+        operators: Number of operators.
+        sources: Number of sources, if finite.
+        begins: Start of the measurement.
+        ends: End of the measurement: no event after this.
         stream: Class of each event, a place in `streams` `(n,)`.
-        unit: Who served it, a place in `units`; `NOBODY` if nobody did `(n,)`.
+        unit: Unit that served it, an index into `units`; `NOBODY` if none `(n,)`.
         outcome: `confirmed`, `contained`, `refuted`, `escalated`, `expired` or `open` `(n,)`.
         detected: `(n,)`
         assigned: `(n,)`
         arrived: `(n,)`
-        confirmed: When who was sent was sure, one way or the other `(n,)`.
-        act_assigned: When somebody was sent to contain it `(n,)`.
+        confirmed: Time at which the responder was sure, one way or the other `(n,)`.
+        act_assigned: Time at which somebody was sent to contain it `(n,)`.
         act_arrived: `(n,)`
         closed: `(n,)`
-        busy_unit: Who was busy, a place in `units` `(m,)`.
+        busy_unit: Busy unit, an index into `units` `(m,)`.
         busy_from: `(m,)`
         busy_until: `(m,)`
         waiting_area: Integral over the measured time of how many events wait, as the world
             itself has summed it up [s].
-        served_area: The same of those that somebody is at.
+        served_area: Integral of the number of events with a responder on site [s].
         worked: Busy time of each unit in the measured time, as the unit itself has summed it
             up [s] `(k,)`.
         broken: Rules of the core that were broken, policies that failed or were overruled.
@@ -103,9 +103,9 @@ def occupied(starts: Floats, ends: Floats, edges: Floats) -> Floats:
     """Total length of the intervals within each window [s].
 
     Args:
-        starts: Of the intervals `(n,)`.
+        starts: Starts of the intervals `(n,)`.
         ends: nan for those that have not ended `(n,)`.
-        edges: Of the windows, ascending `(b + 1,)`.
+        edges: Edges of the windows, ascending `(b + 1,)`.
 
     Returns:
         `(b,)`
@@ -182,9 +182,9 @@ def many_servers(times: Floats, services: Floats, servers: int) -> Floats:
     """Waits at several servers, first come first served.
 
     Args:
-        times: Of arrival, ascending `(n,)`.
+        times: Arrival times, ascending `(n,)`.
         services: `(n,)`
-        servers: How many.
+        servers: Number of servers.
 
     References:
         J. Kiefer & J. Wolfowitz, Trans. Am. Math. Soc. 78 (1955) 1-18.
@@ -202,7 +202,7 @@ def one_server(times: Floats, services: Floats, ranks: Ints) -> Floats:
     """Waits at one server that goes by rank, and within a rank by who came first.
 
     Args:
-        times: Of arrival, ascending `(n,)`.
+        times: Arrival times, ascending `(n,)`.
         services: `(n,)`
         ranks: The lowest is served first; nobody is interrupted `(n,)`.
     """
@@ -233,7 +233,7 @@ class Batches:
 
     Args:
         sample: The run.
-        count: How many parts.
+        count: Number of parts.
     """
 
     def __init__(self, sample: Sample, count: int) -> None:

@@ -41,7 +41,7 @@ def exact_values(
     Args:
         name: The formula's; None gives nothing.
         parameters: Values, or references such as `$demand.fire.between`.
-        scenario: What the references point into.
+        scenario: Scenario that the references point into.
 
     Raises:
         ConfigError: an unknown formula, parameter or reference, or a law that the formula
@@ -175,17 +175,17 @@ class CaseConfig(Config):
     """One case as it stands in the file.
 
     Attributes:
-        title: What it is, in words.
-        source: Where the answer comes from, if no formula here knows it, or to add to that.
+        title: Title in words.
+        source: Source of the answer, if no formula here knows it, or in addition.
         scenario: A timed scenario.
         formula: Name of the formula that gives the exact values; see `exact.FORMULAS`.
         parameters: Its parameters: numbers, laws, or `$` and where they stand in the scenario,
             such as `$responders.guard.look`.
-        measures: What is compared: the measure's name and the formula's name for it, or a
-            plain number.
-        loosely: The same, of what no precision is asked for: it only has to agree.
+        measures: Measures to compare: the measure's name and the formula's name for it, or a plain
+            number.
+        loosely: Measures without a required precision: they only have to agree.
         runs: Seeds; each is a whole run of the scenario.
-        quick_runs: The same with `--quick`.
+        quick_runs: Number of runs with `--quick`.
         batches: Parts of equal length that the measured time of each run is cut into.
     """
 
@@ -224,13 +224,13 @@ class Case(Config):
 
     Attributes:
         name: Its key in the file.
-        title: What it is, in words.
-        source: Where the exact values come from.
-        scenario: What is played.
+        title: Title in words.
+        source: Source of the exact values.
+        scenario: Scenario to simulate.
         exact: The exact value of each measure.
         loosely: Those of them that no precision is asked for.
         runs: Seeds.
-        quick_runs: The same with `--quick`.
+        quick_runs: Number of runs with `--quick`.
         batches: Parts of each run.
     """
 

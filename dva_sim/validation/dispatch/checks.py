@@ -47,17 +47,16 @@ class Check:
 
     Attributes:
         case: Name of the case.
-        title: What the case is.
-        measure: What was measured.
-        exact: What it should be.
-        found: What it was.
-        verdict: Whether the two agree.
-        source: Where the exact value comes from.
-        events: How many events were played for it.
+        title: Title of the case.
+        measure: Name of the measure.
+        exact: Exact value.
+        found: Estimate from the runs.
+        source: Source of the exact value.
+        events: Number of events simulated for it.
         kind: `result`; `input` for what the scenario put in; `identity` for what holds
             without chance.
-        again: What differed at first, so that the case was played again, longer; empty if
-            nothing did.
+        again: Measures that differed at first, so that the case was run again for longer; empty if
+            none did.
     """
 
     case: str
@@ -93,11 +92,10 @@ def check_cases(
     by all its runs together: what was chance goes away, and what is wrong shows more clearly.
 
     Args:
-        cases: What to play.
-        seed: Of all luck.
+        seed: Random seed.
         quick: Play as little as the cases say for that.
         workers: Processes.
-        progress: Told how many runs are finished.
+        progress: Callback with the number of finished runs.
 
     Raises:
         RunsFailed: a run failed.
@@ -146,8 +144,8 @@ def check_identities(seed: int, progress: Progress = lambda done: None) -> list[
     """Look at everything that must hold exactly, in any world.
 
     Args:
-        seed: Of the luck with which it is looked at.
-        progress: Told how many are finished.
+        seed: Random seed of the checks.
+        progress: Callback with the number of finished checks.
     """
     checks = []
     for done, name in enumerate(IDENTITIES, start=1):

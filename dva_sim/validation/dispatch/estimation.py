@@ -65,9 +65,9 @@ class Estimate:
     Attributes:
         value: The estimate.
         error: Its standard error.
-        plain: The same without control variates.
+        plain: Value without control variates.
         plain_error: Its standard error.
-        batches: How many batches it rests on.
+        batches: Number of batches.
     """
 
     value: float
@@ -83,7 +83,7 @@ def estimate(tops: Floats, bottoms: Floats, controls: Floats | None = None) -> E
     Args:
         tops: Such as the sum of waits in each batch `(n,)`.
         bottoms: Such as the number of customers in each batch `(n,)`.
-        controls: What is known to have mean zero, one row per batch `(n, k)`.
+        controls: Control variates with mean zero, one row per batch `(n, k)`.
     """
     total = float(bottoms.sum())
     if not total:
@@ -129,7 +129,7 @@ def verdict(found: Estimate, exact: float, precision: float | None = PRECISION) 
 
     Args:
         found: The estimate.
-        exact: What it should be.
+        exact: Exact value.
         precision: Standard error asked for, as a share of the exact value; None asks for none.
 
     Returns:

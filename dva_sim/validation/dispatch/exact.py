@@ -58,9 +58,9 @@ def hypercube(
     none is free it waits (first come, first served, whatever the class) or is lost.
 
     Args:
-        arrival_rates: Of each class of calls [1/s].
+        arrival_rates: Arrival rate of each class of calls [1/s].
         preferences: For each class its units, best first, counted from 1.
-        mean_service_s: Of all units, or of each unit.
+        mean_service_s: Mean service time of all units, or of each unit.
         queue: `infinite`, or `none` for loss.
 
     Returns:

@@ -126,8 +126,8 @@ def check_identity(name: str, seed: int) -> list[tuple[str, float]]:
     """Look at one of `IDENTITIES`: what was looked at, and how far off it is.
 
     Args:
-        name: Which.
-        seed: Of the luck with which it is looked at; it must hold whatever that is.
+        name: Name of the identity.
+        seed: Random seed of the check; the identity must hold for any.
     """
     return list(IDENTITIES[name](derive_seed("identity", name, seed)))
 

@@ -63,7 +63,7 @@ def erlang_b(servers: int, load: float) -> float:
     """Probability that all servers are busy if nobody waits.
 
     Args:
-        servers: How many there are.
+        servers: Number of servers.
         load: Arrivals during one mean service time.
 
     References:

@@ -162,8 +162,8 @@ def evidence(
 
     Args:
         checks: Line by line.
-        conditions: How they were played, by name.
-        quick: Whether few runs were made, which may be too rough.
+        conditions: Conditions of the runs, by name.
+        quick: True if only few runs were made, which may be too rough.
     """
     notable = [c for c in checks if c.kind == "result" or c.verdict != "agrees"]
     wrong = ("differs",) if quick else ("differs", "too rough")

@@ -44,9 +44,8 @@ class ModelRuns:
     """Runs of one condition.
 
     Attributes:
-        condition: What is set.
-        runs: How many.
-        depth: How deep they are played.
+        runs: Number of runs.
+        depth: Depth of the simulation.
         without: Mechanisms that are left out.
     """
 
@@ -64,10 +63,9 @@ def play_all(
     Run n of a condition has the same luck at every depth and whatever is left out.
 
     Args:
-        orders: What to play.
-        seed: Of all luck.
+        seed: Random seed.
         workers: Processes.
-        progress: Told how many runs are finished.
+        progress: Callback with the number of finished runs.
 
     Raises:
         RunsFailed: a run failed.
@@ -132,10 +130,10 @@ class NetworkSetting:
     """Scope of a comparison: number of runs.
 
     Attributes:
-        seed: Of all luck.
+        seed: Random seed.
         quick: Few runs.
         workers: Processes.
-        ablate: Whether mechanisms are left out one by one.
+        ablate: True to leave out mechanisms one by one.
     """
 
     seed: int = 1
@@ -167,8 +165,8 @@ class NetworkComparison:
             measures in which runs hardly differ.
         pooled: Means over many runs under loss, by the model as it is.
         rarely: Measures of pooled conditions that tell too little.
-        controls: The same by models that are too simple, by name.
-        ablated: The same with a mechanism left out, by its name.
+        controls: Results of oversimplified models, by name.
+        ablated: Results without one mechanism, by its name.
     """
 
     groups: Sequence[ConditionGroup]

@@ -43,7 +43,7 @@ class Scored:
     """One measure of one pooled condition.
 
     Attributes:
-        cell: What is compared.
+        cell: Measure and condition.
         z: Difference of the means in standard errors.
         error: The standard error.
         p: Two-sided, by the normal law.
@@ -64,7 +64,7 @@ class Pooled:
         significant: Those that are after Holm's correction for their number.
         rms: Root mean square of z.
         expected: The range in which 95 of 100 of them would lie if the model were right.
-        false_alarms: How often something would be significant although the model were right.
+        false_alarms: Expected rate of significant results if the model were right.
         biases: Median over conditions of model / real - 1, by measure; of measures that enough
             conditions have.
     """
@@ -104,7 +104,7 @@ def pool_variant(own: Pooled, variants: Sequence[ComparedCell]) -> Pooled:
     So it cannot gain or lose by how much its own runs differ.
 
     Args:
-        own: What the model as it is comes to.
+        own: Result of the full model.
         variants: Cells of the variant; those that the model is not judged by are left out.
     """
     known = {(c.group.condition, c.measure): c for c in variants if len(c.predicted)}
@@ -126,8 +126,8 @@ def pool(judged: Sequence[ComparedCell], rng: np.random.Generator) -> Pooled:
     """Judge cells of pooled conditions together.
 
     Args:
-        judged: What is compared; see `to_be_pooled`.
-        rng: Luck of the runs that take the sockets' place.
+        judged: Cells to judge; see `to_be_pooled`.
+        rng: Random generator of the runs that replace the sockets.
     """
     scored = [score(cell) for cell in judged]
     null = null_scores(judged, rng)

@@ -38,11 +38,11 @@ class ModelProgram:
     Args:
         clock: The run's clock.
         condition: Rate, time-out, window.
-        log: Is told what happens.
+        log: Log of the run.
         socket: Sends the commands.
 
     Attributes:
-        ended: When the program ended [s]; None as long as it runs.
+        ended: End of the program [s]; None while it runs.
     """
 
     def __init__(self, clock: Clock, condition: Condition, log: RunLog, socket: Session) -> None:
@@ -144,7 +144,7 @@ class ModelCommand(NamedTuple):
     """A command on its way.
 
     Attributes:
-        number: Which one it is.
+        number: Number of the command.
         answer: Sends the reply, if one is wanted.
     """
 
@@ -158,7 +158,7 @@ class Robot:
     Args:
         clock: The run's clock.
         condition: Service time, high-water mark, latest-wins.
-        log: Is told of each application.
+        log: Log that receives each application.
     """
 
     def __init__(self, clock: Clock, condition: Condition, log: RunLog) -> None:
@@ -232,8 +232,7 @@ def predict(
     """Predict a condition: the result columns of one run.
 
     Args:
-        condition: What is set.
-        seed: Of the link's luck.
+        seed: Random seed of the link.
         depth: `message`, `segment` or `datagram`; `auto` takes the cheapest that is exact.
         without: Mechanisms of TCP to leave out, by their names in `WITHOUT`.
 
@@ -286,13 +285,12 @@ class Session:
     """One run: two programs, a link, and as many connections as are opened.
 
     Args:
-        condition: What is set.
-        streams: The link's luck.
-        depth: How deep the connections are played.
+        streams: Random streams of the link.
+        depth: Depth of the simulated connections.
         tcp: Options of TCP at both ends beside those of the condition.
 
     Attributes:
-        log: What happens.
+        log: Log of the run.
     """
 
     def __init__(

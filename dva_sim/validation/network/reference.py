@@ -37,9 +37,9 @@ class SourceConfig(Config):
     Attributes:
         file: CSV file, beside the document or by path.
         made_with: Versions of what it was made with, and the machine.
-        independent: Groups of runs whose luck is their own; the others share one seed, so that
-            nothing can be said of them under loss. Left out: all of them.
-        realtime: Whether the emulated link had real-time priority where the table does not say.
+        independent: Groups of runs with independent random numbers. The others share one seed, so
+            nothing can be concluded from them under loss. By default all are independent.
+        realtime: True if the emulated link had real-time priority where the table does not say.
     """
 
     file: str
@@ -53,13 +53,12 @@ class SocketRun:
     """One run on real sockets.
 
     Attributes:
-        condition: What was set.
         source: `reference` or `own`.
         group: Block of the design it belongs to.
-        seed: Of the emulated link's luck.
-        independent: Whether no other condition had the same luck.
-        realtime: Whether the emulated link had real-time priority.
-        values: What was measured, by column; nan where it is not defined.
+        seed: Random seed of the emulated link.
+        independent: True if no other condition had the same random numbers.
+        realtime: True if the emulated link had real-time priority.
+        values: Measured values by column; nan where not defined.
     """
 
     condition: Condition
@@ -132,10 +131,10 @@ class BlockConfig(Config):
 
     Attributes:
         group: Name of the block in the tables.
-        seeds: Runs of each condition, each with luck of its own.
-        settings: What is the same in the whole block, by column of a condition.
-        links: What lies between, by name.
-        programs: What the two ends do, by name.
+        seeds: Number of runs of each condition, each with random numbers of its own.
+        settings: Settings common to the whole block, by column of a condition.
+        links: Settings of the links, by name.
+        programs: Settings of the programs at both ends, by name.
     """
 
     group: str
@@ -163,7 +162,7 @@ class PlanConfig(Config):
     Attributes:
         reference: The measurements that are shipped.
         own: Those of our own campaign.
-        causes: Why conditions miss, by their labels, as far as that has been found out.
+        causes: Causes of conditions that miss, by their labels, as far as known.
     """
 
     reference: SourceConfig

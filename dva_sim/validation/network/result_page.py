@@ -169,8 +169,7 @@ def evidence(
     """Result of all conditions.
 
     Args:
-        comparison: What was found.
-        conditions: How it was found, by name.
+        conditions: Conditions of the comparison, by name.
         causes: Known causes of misses, by the label of a condition.
     """
     criteria = _sheet("Criteria", SUMMARY_HEADS, summary(comparison))

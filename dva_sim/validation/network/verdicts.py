@@ -32,10 +32,9 @@ class ConditionGroup:
     """All runs of one condition that are looked at together.
 
     Attributes:
-        condition: What was set.
         kind: By which band it is judged.
         runs: The runs.
-        left_out: Why it is not judged at all; empty if it is.
+        left_out: Reason why it is not judged at all; empty if it is.
     """
 
     condition: Condition
@@ -127,8 +126,8 @@ class ComparedMeasure:
 
     Attributes:
         name: Its column.
-        words: What it is.
-        unit: Of its values.
+        words: Description of the measure.
+        unit: Unit of its values.
     """
 
     name: str
@@ -186,9 +185,8 @@ class ComparedCell:
 
     Attributes:
         group: The condition with what was measured.
-        measure: What is compared.
         measured: A value for each run on sockets, without those that are not defined.
-        predicted: The same of the model's runs.
+        predicted: Predicted values, run by run.
     """
 
     group: ConditionGroup
@@ -248,11 +246,10 @@ class CellVerdict:
     """One measure of one condition, judged.
 
     Attributes:
-        cell: What is compared.
         low: From here ...
         high: ... to here it passes; for a single run under loss, of what was measured, else of
             what was predicted.
-        why: Why it is shown only; empty if it is judged.
+        why: Reason why it is shown only; empty if it is judged.
     """
 
     cell: ComparedCell

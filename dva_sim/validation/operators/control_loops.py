@@ -110,7 +110,7 @@ def smith_response(gain: float, delay: float, end: float) -> list[float]:
     loop is closed on the present: y(t) = 1 - exp(-gain (t - delay)) from the delay on.
 
     Args:
-        gain: Of the person [1/s].
+        gain: Gain of the person [1/s].
         delay: Between a command and its effect [s]; a step is a part of it, see `SMITH_STEPS`.
         end: [s]
     """

@@ -70,11 +70,11 @@ class Experiment:
     """A published experiment.
 
     Attributes:
-        name: Of the experiment.
+        name: Name of the experiment.
         scenario: The task, by name; None: a part of the operator, see `looking`.
-        cells: What is changed in each cell that the task itself does not cross.
+        cells: Changes in each cell that the task itself does not cross.
         measure: From the trials to the value of each line.
-        quick: What is changed besides for a quick look.
+        quick: Further changes for a quick look.
     """
 
     name: str
@@ -502,9 +502,9 @@ class OperatorsSetting:
     """Settings of the simulated experiments.
 
     Attributes:
-        strategy: How the persons steer.
-        seed: Of all luck, who the persons are included.
-        persons: How many.
+        strategy: Strategy of the persons.
+        seed: Random seed of everything, the persons included.
+        persons: Number of persons.
         quick: Few trials.
         workers: Processes.
         traits: Medians that take the place of the population's, for a fit.

@@ -56,9 +56,9 @@ def evidence(
 
     Args:
         verdicts: Line by line.
-        outcome: What they come to.
+        outcome: Tally of the verdicts.
         played: The trials of each experiment.
-        conditions: How they were played, by name.
+        conditions: Conditions of the runs, by name.
     """
     groups = list(grouped(verdicts))
     return ValidationResult(

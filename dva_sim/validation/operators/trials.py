@@ -27,8 +27,8 @@ class Trials:
     """Trials of one cell, one after the other.
 
     Attributes:
-        person: Whose each trial is, from 0 `(n,)`.
-        columns: What was measured, by name `(n,)`; nan where nothing was.
+        person: Person of each trial, from 0 `(n,)`.
+        columns: Measured values by name `(n,)`; nan where there are none.
     """
 
     person: Ints
@@ -71,9 +71,9 @@ class Found:
 
     Attributes:
         value: The number.
-        low: Where it may be with other persons: 95 % Monte Carlo interval, given the model.
+        low: Lower end of the 95 % Monte Carlo interval over persons, given the model.
         high: Its other end; both equal `value` where nothing is left to chance.
-        persons: How many it rests on; 0: none.
+        persons: Number of persons; 0: none.
     """
 
     value: float

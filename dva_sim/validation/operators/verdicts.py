@@ -20,8 +20,8 @@ class LineVerdict:
     """One line, and what was simulated.
 
     Attributes:
-        line: What it should be.
-        found: What it is.
+        line: Target line.
+        found: Simulated value.
     """
 
     line: TargetLine

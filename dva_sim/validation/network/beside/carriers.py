@@ -143,7 +143,7 @@ class StreamCarrier(Carrier):
 
     Args:
         between: Both programs.
-        tcp: Of both ends.
+        tcp: TCP options of both ends.
         header: Size of the frame around a message of so many bytes [B], by whether it goes up.
         exchanges: Before the first message.
     """
@@ -256,7 +256,7 @@ class MqttClient:
     Args:
         clock: Virtual time.
         links: From the client, and back.
-        options: Of the transport.
+        options: Options of the transport.
         at_client: Takes what the broker sends.
         at_broker: Takes what the client publishes.
     """

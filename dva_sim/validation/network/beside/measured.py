@@ -32,7 +32,6 @@ def asked_by(study: Study, results: Results | None = None) -> list[AskedCell]:
     """The middleware configurations of a study, with the seeds of their runs.
 
     Args:
-        study: What is asked.
         results: Those of the study, whose scenarios may have been others.
 
     Raises:
@@ -61,8 +60,8 @@ class Measured:
     """The runs of one configuration.
 
     Attributes:
-        values: Of each measure, of the runs that the machine has not disturbed.
-        disturbed: How many it has.
+        values: Values of each measure, without runs that the machine disturbed.
+        disturbed: Number of disturbed runs.
     """
 
     values: Mapping[str, Sequence[float]]
@@ -95,10 +94,9 @@ class BesideRow:
 
     Attributes:
         levels: Its level of each factor.
-        measure: What is compared.
-        values: What was measured, run by run.
+        values: Measured values, run by run.
         band: The prediction; None where the model says nothing.
-        why: Why it says nothing, or why the row is not judged.
+        why: Reason why there is no prediction, or why the row is not judged.
     """
 
     levels: Mapping[str, str]
@@ -154,7 +152,7 @@ class Beside:
     Attributes:
         rows: Every measure of every configuration.
         kept: Configurations whose bands were kept before the study was measured.
-        played: What was predicted now.
+        played: New predictions.
     """
 
     rows: Sequence[BesideRow]
@@ -189,7 +187,7 @@ def beside_of(
     Args:
         asked: The configurations.
         measured: The runs of each; None if there are none, and all are predicted now.
-        plays: Of each seed.
+        plays: Number of simulated runs per seed.
         workers: Processes.
         progress: Gets how many plays are finished, and of how many.
 

@@ -30,8 +30,7 @@ def evidence(beside: Beside, conditions: Mapping[str, str]) -> ValidationResult:
     """Result of all rows.
 
     Args:
-        beside: What was found.
-        conditions: How it was found, by name.
+        conditions: Conditions of the comparison, by name.
     """
     summary = ResultSheet(
         "Rows inside their bands",

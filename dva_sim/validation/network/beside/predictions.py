@@ -88,7 +88,7 @@ class CellPrediction:
         levels: Its level of each factor.
         seeds: Random seeds of the study's runs.
         bands: By measure; none where the model says nothing.
-        why: Why it says nothing.
+        why: Reason why there is no prediction.
     """
 
     config: str
@@ -105,7 +105,7 @@ class AskedCell:
     Attributes:
         config: Its hash.
         levels: Its level of each factor.
-        scenario: What is run; None if it was run with another one than there is today.
+        scenario: Scenario to run; None if it has changed since the measurement.
         seeds: Random seeds of the study's runs.
     """
 

@@ -66,9 +66,9 @@ class VirtualRun:
     """Both programs over a carrier.
 
     Args:
-        scenario: What is sent over what; its transport is one that the model plays.
-        seed: Of the link.
-        times: When the programs start and end.
+        scenario: Scenario with messages and transport; the model must support the transport.
+        seed: Random seed of the link.
+        times: Start times and durations of the programs.
     """
 
     def __init__(self, scenario: MiddlewareScenario, seed: int, times: ProgramTimes) -> None:

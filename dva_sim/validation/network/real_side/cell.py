@@ -65,7 +65,7 @@ class Node:
         pid: Process.
         ended: File descriptor that becomes readable when the process ends.
         channel: Connection to it.
-        notes: What it noted.
+        notes: Notes of the process.
     """
 
     name: str
@@ -100,8 +100,8 @@ def start_node(name: str, program: Program, room: int) -> Node:
     """A process that runs a program and then ends.
 
     Args:
-        name: What it is called.
-        program: What it runs.
+        name: Name of the process.
+        program: Program to run.
         room: Notes that find room.
     """
     here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -146,9 +146,9 @@ class EmulatedJob:
         program: `commands` for operator and robot, `probe` for the link's own check, `nothing`
             to see whether it can be set up.
         wire: The link.
-        seed: Of the link's luck.
+        seed: Random seed of the link.
         bound_s: The run ends after so much time, whatever happens [s].
-        arguments: Of the program.
+        arguments: Arguments of the program.
         congestion: Congestion control of all TCP.
         link: `packets` or `proxy`.
         room: Notes that find room at each end.
@@ -184,9 +184,10 @@ class EmulatedOutcome:
         operator: Notes of the operator.
         robot: Notes of the robot.
         link: Columns of the emulator.
-        way: How the namespaces were made: `root`, `user namespace`, or `proxy` without any.
+        way: Way in which the namespaces were made: `root`, `user namespace`, or `proxy` without
+            any.
         realtime: Real-time priority was granted.
-        problem: Why it failed; empty if it did not.
+        problem: Reason of the failure; empty if it did not fail.
     """
 
     operator: list[Note] = field(default_factory=list)
@@ -213,8 +214,7 @@ class EmulatedCell:
     """One run, from set-up to the last kill.
 
     Args:
-        job: What to do.
-        way: How this process became one that may make namespaces.
+        way: Way in which this process got the right to make namespaces.
     """
 
     def __init__(self, job: EmulatedJob, way: str) -> None:
@@ -349,7 +349,6 @@ def start_job(job: EmulatedJob, out: IO[bytes], err: IO[bytes]) -> subprocess.Po
     """Start the process of a job; it ends when its standard input closes.
 
     Args:
-        job: What to do.
         out: Gets the outcome.
         err: Gets complaints.
     """

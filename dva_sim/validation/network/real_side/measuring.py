@@ -106,8 +106,8 @@ def measure(condition: Condition, seed: int, link: str = PACKETS) -> Row:
     """Run a condition once on real sockets.
 
     Args:
-        condition: What is set.
-        seed: Of the link's luck, together with the condition: no two share theirs.
+        seed: Seed of the link's random numbers, together with the condition: no two conditions
+            share them.
         link: `packets`, or `proxy` where namespaces are forbidden.
 
     Returns:
@@ -283,10 +283,9 @@ def measure_all(
     All conditions come once before any comes twice, so that a table cut short is a fair one.
 
     Args:
-        conditions: What to measure.
-        seeds: A run for each; the luck of a run is that of its condition and seed together.
+        seeds: Seed of each run; together with the condition it decides the random numbers.
         path: CSV file of the results.
-        tell: Told after every run, and at the beginning.
+        tell: Callback at the beginning and after every run.
         group: Name for the column `group`.
         link: `packets` or `proxy`.
 
@@ -362,8 +361,8 @@ def measure_now(
         blocks: The design.
         path: A new table.
         quick: One pair of programs for each link, and a short time.
-        link: What the programs are joined by; a relay can neither lose nor reorder packets, so
-            that only conditions without loss are measured.
+        link: Link between the programs. A relay can neither lose nor reorder packets, so only
+            conditions without loss are measured.
         tell: Hears how far it is.
 
     Raises:

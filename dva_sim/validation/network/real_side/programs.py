@@ -92,8 +92,7 @@ def run_robot(condition: Condition, endpoint: str, channel: socket.socket, notes
     """Bind, say where, then obey one command after the other until killed.
 
     Args:
-        condition: What is set.
-        endpoint: Where to bind.
+        endpoint: Address to bind.
         channel: Gets the endpoint when it is bound.
         notes: Gets the end of each command's processing.
     """
@@ -114,8 +113,7 @@ def run_operator(condition: Condition, channel: socket.socket, notes: Notes) -> 
     """Wait to hear where the robot is, then send commands until the window ends.
 
     Args:
-        condition: What is set.
-        channel: Tells the robot's endpoint.
+        channel: Channel on which the robot's endpoint arrives.
         notes: Gets what happens.
 
     Raises:
@@ -134,9 +132,8 @@ class SocketOperator:
     """Sends commands in one of three patterns.
 
     Args:
-        context: Of its sockets.
-        condition: What is set.
-        endpoint: Of the robot.
+        context: Context of its sockets.
+        endpoint: Endpoint of the robot.
         notes: Gets what happens.
     """
 
@@ -303,11 +300,11 @@ def run_sender(
     Args:
         channel: Says when the other end listens.
         notes: Gets the time of each sending.
-        address: Of the other end.
+        address: Address of the other end.
         count: Datagrams.
-        size: Of each, with all headers [B].
+        size: Packet size including headers [B].
         interval_s: Between two of them [s].
-        linger_s: How long to wait [s].
+        linger_s: Time to wait at the end [s].
     """
     channel.recv(256)
     payload = b"." * (size - HEADERS_BYTES - _NUMBER.size)
@@ -325,9 +322,9 @@ def run_counter(channel: socket.socket, notes: Notes, address: str) -> None:
     """Note when each datagram arrives, until killed.
 
     Args:
-        channel: Is told when this end listens.
+        channel: Channel for the message that this end listens.
         notes: Gets the time of each arrival.
-        address: Of this end.
+        address: Address of this end.
     """
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind((address, _PORT))

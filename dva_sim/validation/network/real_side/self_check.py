@@ -30,10 +30,10 @@ class LinkFinding:
     """One measured property.
 
     Attributes:
-        name: What.
-        unit: Of the numbers.
-        wanted: As the link was told.
-        found: As it was measured.
+        name: Name of the property.
+        unit: Unit of the numbers.
+        wanted: Value set for the link.
+        found: Measured value.
         band: Largest difference that passes.
     """
 
@@ -59,10 +59,10 @@ class Probe:
     """Datagrams in equal steps over a link, and what is found out by them.
 
     Attributes:
-        wire: What the link is told.
+        wire: Settings of the link.
         count: Datagrams.
         interval_s: Between two of them [s].
-        size: Of each with all headers [B].
+        size: Packet size including headers [B].
         find: Findings from the wire, the times of sending and arrival [s] and their numbers.
     """
 
@@ -90,11 +90,11 @@ class Crossing:
     """Datagrams that were sent and that arrived.
 
     Attributes:
-        wire: What the link was told.
-        size: Of each [B].
-        sent: When each was sent [s], shape `(n,)`.
-        numbers: Of those that arrived, in the order of arrival, shape `(m,)`.
-        arrived: When [s], shape `(m,)`.
+        wire: Settings of the link.
+        size: Packet size [B].
+        sent: Send time of each packet [s], shape `(n,)`.
+        numbers: Numbers of the packets that arrived, in the order of arrival, shape `(m,)`.
+        arrived: Arrival times [s], shape `(m,)`.
     """
 
     wire: LinkConfig
