@@ -15,7 +15,7 @@ class Bench:
     """A controller, and messages that arrive when they are decided on.
 
     Attributes:
-        confirms: Whether what comes in the DVA's name is of the DVA, which says so when asked.
+        confirms: True if messages in the DVA's name are the DVA's, which confirms them on request.
     """
 
     def __init__(self) -> None:

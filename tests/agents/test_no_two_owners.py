@@ -27,7 +27,7 @@ class World:
     Attributes:
         said: From the DVA to the robot, in order.
         asked: The robot's question, until the DVA has taken it.
-        answers: Of the DVA, until the robot has them.
+        answers: Replies of the DVA on their way to the robot.
         given: Every session that the DVA has given, and to whom.
         over: Those whose end the DVA has said, and the robot has heard.
     """

@@ -31,7 +31,7 @@ class Case:
     """Benchmark case.
 
     Attributes:
-        per: The unit that its work is told in.
+        per: Unit in which its work is reported.
         prepare: Makes everything ready; returns the work.
         takes_long: Under callgrind, minutes: it is counted there only if it is named.
         optional: It measures another program, which may not be there.

@@ -82,7 +82,7 @@ class Callgrind:
         """Command prefix that counts a process; the count is written to `folder/PID`.
 
         Args:
-            folder: Where accounts are written.
+            folder: Folder for the counts.
             at_once: The whole process is counted.
         """
         options = ["--dump-before=getpriority", f"--callgrind-out-file={folder}/%p"]

@@ -40,8 +40,8 @@ class Supervisor:
 
     Args:
         served: The web process.
-        port: Of the console, or of the phones.
-        tls: Whether that speaks TLS.
+        port: Port of the console, or of the phones.
+        tls: True if the port speaks TLS.
     """
 
     def __init__(self, served: Served, port: int, tls: bool, stack: ExitStack) -> None:

@@ -43,14 +43,13 @@ class Phone:
     """A phone's page without a browser.
 
     Args:
-        at: Where.
-        label: Of the device.
+        label: Label of the device.
 
     Attributes:
-        parts: Of each command: hand to set point, and of that filter and wait for the next
-            command, and link and robot [ms].
+        parts: Parts of each command's delay: hand to set point, and of that filter and wait for the
+            next command, and link and robot [ms].
         line: The newest of its seat.
-        drives: Whether it has a robot.
+        drives: True while it has a robot.
     """
 
     def __init__(self, at: Console, label: str) -> None:

@@ -18,7 +18,7 @@ class ControlRoomDesk:
 
     Attributes:
         decided: By event: what stands in its row beside what the world invents.
-        more: Of the answer to an action.
+        more: Further fields of the answer to an action.
     """
 
     ms: int

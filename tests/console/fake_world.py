@@ -94,7 +94,7 @@ class FakeWorld(PhoneDesk, ControlRoomDesk):
     """The fake itself.
 
     Args:
-        options: Of the command line.
+        options: Options of the command line.
     """
 
     def __init__(self, options: argparse.Namespace) -> None:

@@ -14,8 +14,8 @@ def played(*, round_trip, service=0.0, rate_hz=10.0, lasts=60.0, slower_from=Non
         round_trip: Without the service [s].
         service: Time the server needs for each request [s].
         rate_hz: Wanted requests per second.
-        lasts: How long [s].
-        slower_from: When the round trip becomes twice as long [s].
+        lasts: Length of the run [s].
+        slower_from: Time at which the round trip doubles [s].
 
     Returns:
         Pairs of a time and the size then, and the time each request waited for the server [s].

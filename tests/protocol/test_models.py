@@ -26,7 +26,7 @@ def errors(folder: Path, *defined: str, rule: str = "", model: str = "teleop") -
     """Number of errors that the checker finds in a model with these definitions.
 
     Args:
-        folder: Where to work.
+        folder: Working folder.
         defined: Bounds, and mechanisms that are left out.
         rule: A liveness rule; left out: all assertions.
         model: The name of its file.

@@ -31,8 +31,8 @@ class World(NamedTuple):
 
     Attributes:
         drive: Address with the token for driving.
-        look: The same for looking only.
-        phones: That for phones, by https; empty without one.
+        look: Address for looking only.
+        phones: Address for phones, by https; empty without one.
     """
 
     drive: str
@@ -110,7 +110,7 @@ class Visit:
     """A person's browser: pages with what went wrong on them.
 
     Attributes:
-        errors: What the console of the pages said, and what no script caught.
+        errors: Messages on the consoles of the pages, and uncaught exceptions.
     """
 
     def __init__(self, context: BrowserContext) -> None:

@@ -26,12 +26,12 @@ class AttachedPage:
     """An attached console beside the world of its DVA.
 
     Args:
-        world: Of the DVA.
+        world: World of the DVA.
         audit: File of the audit log.
-        role: That the DVA gives its control room.
+        role: Role that the DVA gives its control room.
 
     Attributes:
-        lines: What the page is told.
+        lines: Lines sent to the page.
     """
 
     def __init__(self, world: PhonePage, audit: Path, role: str = "supervise") -> None:

@@ -29,8 +29,8 @@ class Hand:
 
     Args:
         visit: A browser.
-        address: Of the phone's page, with its token.
-        sensor: Whether there is one.
+        address: Address of the phone's page, with its token.
+        sensor: True if there is a sensor.
     """
 
     def __init__(self, visit: Any, address: str, sensor: bool = True, script: str = "") -> None:

@@ -21,9 +21,7 @@ class Flood:
     """Connections to one port.
 
     Args:
-        host: Where it listens.
-        port: Which.
-        tls: Whether it speaks TLS.
+        tls: True if the port speaks TLS.
     """
 
     def __init__(self, host: str, port: int, tls: bool) -> None:

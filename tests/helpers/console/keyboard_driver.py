@@ -29,7 +29,7 @@ class Driver:
         page: The page for driving.
         base: Address of the console.
         robot: Label.
-        delay: Of the link, one way: what is seen has happened long ago [s].
+        delay: One-way delay of the link [s]: what is seen happened that long ago.
     """
 
     def __init__(self, page: Page, base: str, robot: str, delay: float) -> None:

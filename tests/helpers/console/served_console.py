@@ -73,7 +73,7 @@ class Served:
 
     Args:
         words: More options.
-        begins: Whether the scene is told at once.
+        begins: True to send the scene at once.
     """
 
     def __init__(self, *words: str, begins: bool = True) -> None:

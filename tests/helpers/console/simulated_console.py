@@ -37,8 +37,8 @@ class Page:
     """Actions of a page, and the lines it receives.
 
     Args:
-        measured: Whether what happens is kept for tables.
-        changes: Of the scenario, with `__` for a dot; nobody walks about unless one asks for it.
+        measured: True to keep everything for tables.
+        changes: Changes of the scenario, with `__` for a dot; by default there are no bystanders.
     """
 
     def __init__(

@@ -24,12 +24,12 @@ class HeldPhone:
     """A phone in a simulated hand: samples by its own clock, in its own axes.
 
     Args:
-        page: Of the run.
+        page: Page of the run.
         client: The name of its page.
         hz: Samples per second.
         fast: By which share its clock goes too fast.
-        ios: Whether its signs are those of iOS.
-        orientation: Of its screen [deg].
+        ios: True if its signs are those of iOS.
+        orientation: Orientation of its screen [deg].
     """
 
     def __init__(self, page, client="p1", hz=60.0, fast=0.0, ios=False, orientation=0, part=None):

@@ -74,7 +74,7 @@ class Walk:
     """One day at the desk.
 
     Args:
-        seed: Of everything that happens.
+        seed: Random seed.
         folder: For the memory.
         policy: By name; any if not given.
     """

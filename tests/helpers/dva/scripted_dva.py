@@ -56,13 +56,13 @@ class PretendedDva:
     """Everybody but a real DVA.
 
     Args:
-        robots: How many robots there are.
-        changes: Of the scenario, by dotted key.
+        robots: Number of robots.
+        changes: Changes of the scenario, by dotted key.
 
     Attributes:
-        told: What was told, but for registrations.
+        told: Messages received, without registrations.
         there: Kinds of what is there, wherever a guard of this DVA looks.
-        contained: What guards have dealt with: kind and place.
+        contained: Kinds and places of the events that guards contained.
     """
 
     def __init__(self, robots: int = 0, **changes: object) -> None:

@@ -22,7 +22,7 @@ class Viewer:
     Attributes:
         channels: All that were advertised, by topic.
         came: Time [ns] and content of each message, by topic.
-        times: Of the server [ns].
+        times: Times of the server [ns].
     """
 
     def __init__(self, url: str, wants=lambda topic: True) -> None:

@@ -24,8 +24,8 @@ class BridgedRobot:
     """The robot, its machine, and the DVA.
 
     Attributes:
-        heard: What the DVA was asked.
-        statuses: What the robot has published of itself.
+        heard: Requests to the DVA.
+        statuses: Status messages that the robot has published.
     """
 
     def __init__(self, machine: RosMachine, profile: RosProfile | None = None) -> None:

@@ -31,11 +31,11 @@ class RosMachine:
     Attributes:
         heard: All operations that came, in order.
         commands: Speed and turn rate of each velocity command.
-        x, y, heading, speed, turn_rate: Of the robot.
-        obeys: Whether it follows commands, or goes on as it does.
-        tells: Whether odometry is published.
+        x, y, heading, speed, turn_rate: State of the robot.
+        obeys: True if it follows commands; otherwise it keeps its motion.
+        tells: True if odometry is published.
         lag: By so much odometry is older than it should be [s].
-        pictures: Whether pictures are published.
+        pictures: True if pictures are published.
     """
 
     def __init__(self, frame: str = "odom", pictures: bool = False) -> None:

@@ -30,7 +30,7 @@ class ServedWorld:
     """Everything on one clock; clients are in threads of their own.
 
     Attributes:
-        url: Of the server, with its token.
+        url: Address of the server, with its token.
     """
 
     def __init__(self, *changes: str, token: bool = True) -> None:

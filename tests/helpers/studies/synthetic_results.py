@@ -98,7 +98,7 @@ def drive_rows(persons: int, trials: int, effect_s: float = 12.0, missed: float 
     Args:
         persons: Simulated persons.
         trials: Trials of each.
-        effect_s: What request/reply adds at 1 s, growing with the delay squared.
+        effect_s: Extra time of request/reply at 1 s, growing with the delay squared.
         missed: Share of request/reply runs not confirmed at 1 s.
     """
     rng = np.random.default_rng(1)
@@ -177,7 +177,7 @@ def repeat_rows(effects: dict[tuple[str, int], float]) -> Rows:
     """Repeats at 1 s whose effect is known: of 4 persons with 2 trials each.
 
     Args:
-        effects: What request/reply adds, by strategy and set of parameters.
+        effects: Extra time of request/reply, by strategy and set of parameters.
     """
     rng = np.random.default_rng(4)
     who = list(itertools.product(range(4), range(2)))

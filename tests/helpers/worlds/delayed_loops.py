@@ -71,13 +71,12 @@ def drive(
     """Drive a robot that does at once what it was asked for `delay` [s] ago.
 
     Args:
-        strategy: How.
         route: The way.
         delay: A multiple of a frame [s].
-        seconds: How long.
+        seconds: Length of the drive [s].
         start: Pose [m, rad].
         stop_before: So far before the end [m].
-        told: What the person takes the delay to be, by time [s]; none: as it is.
+        told: Delay as the person perceives it, by time [s]; by default the true one.
         frame: From one to the next [s].
     """
     x, y, heading = start

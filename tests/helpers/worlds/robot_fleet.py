@@ -71,8 +71,8 @@ class Fleet:
     """A world in which each robot looks ten times a second and does what its pilot says.
 
     Args:
-        site: What the world is like; the robots' map is always that of caparica.
-        charge: Of all batteries, at a time [s].
+        site: Site of the world; the robots' map is always that of caparica.
+        charge: Charge of all batteries, at a time [s].
     """
 
     def __init__(
