@@ -42,7 +42,7 @@ class CameraPages:
 
     Args:
         streams: The pictures.
-        labels: Of the robots, in the order of their numbers.
+        labels: Labels of the robots, in the order of their numbers.
     """
 
     def __init__(self, streams: CameraStreams, labels: Sequence[str]) -> None:

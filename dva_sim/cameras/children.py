@@ -33,7 +33,7 @@ class Child:
 
     Args:
         name: For people.
-        module: What it runs.
+        module: Module to run.
         words: Its further arguments.
         others: Sockets that it gets beside its pipe.
         kinds: The kinds of lines that are sent to it.

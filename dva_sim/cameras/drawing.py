@@ -34,8 +34,8 @@ class Eyes:
     """The cameras of a run.
 
     Args:
-        scenario: As told by the run.
-        seed: Of the run.
+        scenario: Scenario as sent by the run.
+        seed: Random seed of the run.
 
     Attributes:
         rate: Frames of a robot in a second of the run [1/s].

@@ -22,9 +22,9 @@ class Picture(NamedTuple):
 
     Attributes:
         robot: Its index in the scene; `ALIVE` for none.
-        number: Of the frame.
-        captured_ms: When it was taken, virtual time [ms].
-        arrived_ms: When it came over the link, virtual time [ms].
+        number: Number of the frame.
+        captured_ms: Capture time, virtual [ms].
+        arrived_ms: Arrival time over the link, virtual [ms].
         jpeg: The picture.
     """
 

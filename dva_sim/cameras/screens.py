@@ -49,9 +49,8 @@ class Screens:
     """The cameras of a run, as far as anybody looks at them.
 
     Args:
-        run: Which.
         screen: Id of a device of its own.
-        numbers: Of everybody, by id or name.
+        numbers: Numbers of all agents, by id or name.
         tell: Takes a line for each frame that has arrived, and the robot's number.
     """
 

@@ -31,7 +31,7 @@ class CameraService:
 
     Args:
         host: Address to listen on.
-        port: Which; if it is taken, or 0, any that is free.
+        port: Port; if it is taken, or 0, any free one.
         clock: Clock of the run.
         tell: Takes a line for the story of the run.
 

@@ -78,7 +78,7 @@ class PanelGroup(TyperGroup):
     """A group whose commands stand under headings; each is made when it is asked for.
 
     Attributes:
-        panels: What it consists of.
+        panels: Panels with their commands.
     """
 
     panels: ClassVar[Panels] = {}

@@ -38,8 +38,8 @@ def compare(
     """Compare two results folders; how it ended, by whether a condition holds.
 
     Args:
-        first: What is compared with.
-        second: What is compared.
+        first: Results to compare with.
+        second: Results to compare.
         measures: `NAME` or `TABLE.NAME`; none for that of the answer.
         by: Factors for whose levels cells are taken together.
         fail_if: Conditions that should not hold.
@@ -72,10 +72,8 @@ def tell(
     """Print which folders and cells are compared, and how each measure differs.
 
     Args:
-        comparison: Of the two folders.
-        measures: Which; none for that of the declared answer.
+        measures: Measures to compare; by default that of the declared answer.
         by: Factors for whose levels cells are taken together; none for every cell.
-        console: Where to.
 
     Raises:
         ConfigError: no such measure or factor.

@@ -19,7 +19,7 @@ def make_keys(folder: Path, names: Iterable[str]) -> str:
     """Create a key pair for each device that has none.
 
     Args:
-        folder: Where keys are kept.
+        folder: Folder of the keys.
         names: Ids, names such as `robot-1` or `dva`, or scenarios: all devices of one.
 
     Returns:

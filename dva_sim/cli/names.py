@@ -115,9 +115,9 @@ class NamedThing:
     """One thing that can be named.
 
     Attributes:
-        name: As one writes it.
-        description: What it is, in a line; empty if nobody said.
-        file: Where it lies, if it is a file.
+        name: Name as one writes it.
+        description: Description in a line; may be empty.
+        file: File of the thing, if it is one.
     """
 
     name: str

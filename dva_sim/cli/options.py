@@ -219,7 +219,7 @@ def takes(function: Callable[..., Any], but: Sequence[str] = ()) -> Callable[[Co
 
     Args:
         function: One of `dva_sim`.
-        but: What only programs have.
+        but: Parameters that only programs have.
     """
 
     def declare(command: Command) -> Command:

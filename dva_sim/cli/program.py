@@ -154,7 +154,8 @@ def call(words: Sequence[str] | None = None) -> int:
     """Do what the words ask for; a mistake ends in one line on standard error.
 
     Args:
-        words: As on the command line, without the program's name; by default those of the process.
+        words: Arguments of the command line, without the program's name; by default those of the
+            process.
 
     Returns:
         The exit code.

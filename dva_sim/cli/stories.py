@@ -109,8 +109,7 @@ def tell_outcome(tables: Tables, how: str, console: Console) -> None:
 
     Args:
         tables: The rows of the run, by table.
-        how: How it came about, after its length in seconds.
-        console: Where.
+        how: Way in which it ran, printed after its length in seconds.
     """
     row = tables["runs"][0]
     lines = [_event(event) for event in tables["events"]]

@@ -251,7 +251,7 @@ class RunPace:
 
     Args:
         clock: Seconds of a clock that only goes forward.
-        things: What is counted.
+        things: Word for what is counted.
     """
 
     def __init__(self, clock: Callable[[], float], things: str = "runs") -> None:

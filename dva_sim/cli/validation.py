@@ -71,12 +71,12 @@ def validate(
 
     Args:
         what: `dispatch`, `operators` or `network`.
-        out: Where tables, figures and the page go.
+        out: Folder for tables, figures and the page.
         case_file: A file of cases, for dispatch and network.
-        strategy: How the operators drive, for operators; left out, as the split file says.
+        strategy: Strategy of the operators, for operators; by default that of the split file.
         quick: Fewer runs.
         jobs: Processes; left out, one per core.
-        seed: Of all luck.
+        seed: Random seed.
         ablate: Leave mechanisms of the network's model out one by one.
         live: Measure sockets now, and compare with that alone.
         measure: Measure the whole design into this table; nothing is compared.

@@ -35,7 +35,6 @@ class FoxgloveServer:
     """Serves one run.
 
     Args:
-        scenario: What is run.
         seed: With which seed.
         port: To listen on; 0 for any that is free.
 

@@ -40,7 +40,7 @@ class LiveOptions:
     Attributes:
         scenario: Name or path.
         changes: Keys of the scenario with new values, `KEY=VALUE`.
-        seed: Decides all luck but that of the real network.
+        seed: Random seed of everything but the real network.
         operators: `simulated` people, or `scripted`.
         host: Address to listen on.
         dva: Address of the DVA, `HOST:PORT`.
@@ -48,15 +48,15 @@ class LiveOptions:
         keys: Folder with the keys of the devices; None to run without.
         record: A recording to make, `.mcap`; or a folder for traces of all decisions.
         state: File in which the DVA keeps what must survive it; None: it keeps nothing.
-        duration: How long the run lasts [s]; None: to the scenario's horizon.
-        overwrite: What was recorded before may be replaced.
+        duration: Length of the run [s]; None: to the scenario's horizon.
+        overwrite: True to replace an earlier recording.
         camera_port: Port of the robots' pictures; None: the usual one, and with keys none.
         emulated: The scenario's link is emulated between the robots and everybody else.
-        transport: What carries the messages, as on the command line; see `carrier_of`.
+        transport: Transport of the messages, as on the command line; see `carrier_of`.
         rosbridge: Port for clients of ROS; None: there is none.
         foxglove: Port for Foxglove; None: there is none.
         shows_run: Parts write all lines, though there is no recording: somebody looks at them.
-        token: Whether such clients have to show a token.
+        token: True if such clients have to show a token.
     """
 
     scenario: str

@@ -46,12 +46,12 @@ class Report:
 
     Attributes:
         part: `dva`, `world` or `operator`.
-        number: Which operator.
+        number: Number of the operator.
         time: Since the start of the run [s].
         rows: See `LivePart.rows`.
         events: The events, from the DVA.
         story: New lines of the timeline: time [s], who, what, kind.
-        counters: What was refused or dropped so far, by reason.
+        counters: Messages refused or dropped so far, by reason.
         settled: See `LivePart.settled`.
         dva: Address of the DVA, from the DVA.
         lateness: The longest that an event had to wait for the processor [s].
@@ -86,11 +86,11 @@ def run_part(
 
     Args:
         name: `dva`, `world` or `operator`.
-        options: What to run and where.
+        options: Scenario, addresses and other options.
         say: Takes a report as soon as the part listens, each second, and one at the end.
-        number: Which operator.
+        number: Number of the operator.
         epoch: Start of the run by `time.monotonic`, which all processes of a machine share [s].
-        supervised: End when standard input does: whoever started this process is gone.
+        supervised: True to end when standard input does: the parent process has gone.
         outlet: Number of the open file that takes what is recorded, and judged. None: this part
             does both alone.
         door: Port for clients of other makes, if this part serves them.

@@ -96,7 +96,7 @@ def readable(file: Path, kept: Path | None = None) -> Iterator[Path]:
 
     Args:
         file: A recording, or the lines of a run.
-        kept: Where the recording that is made stays, if it is wanted.
+        kept: Path at which to keep the recording that is made, if wanted.
 
     Raises:
         DvaSimError: it cannot be made, or there is nothing to be made.

@@ -64,8 +64,8 @@ class LiveRecorder(Recorder):
 
     Attributes:
         log: Takes the facts that this part sees; None: it sees neither robots nor the DVA.
-        is_own: Whether a device, by its id, is of this run: what it sends is kept where it is
-            sent, what others send where it arrives.
+        is_own: Predicate for device ids of this run: their messages are kept where they are sent,
+            those of others where they arrive.
     """
 
     def __init__(self, clock: Clock, outlet: PipeEnd, keeps: bool = True) -> None:
@@ -219,8 +219,8 @@ class TraceFile:
     """Trace in a file, each line before the next decision; a full disk ends it, no robot.
 
     Args:
-        path: Of the file.
-        complain: Told once if no more can be written.
+        path: File of the trace.
+        complain: Callback once no more can be written.
 
     Raises:
         ConfigError: it cannot be written.
@@ -281,13 +281,12 @@ class Keeper:
 
     Args:
         target: The recording that is to be made.
-        scenario: What is run.
         seed: With which seed.
         judge: Judges it by the safety rules meanwhile; None: somebody else does that.
         also: Takes whole lines, too; None: nobody does.
 
     Attributes:
-        inlets: Where parts write.
+        inlets: Files that parts write to.
 
     Raises:
         ConfigError: it cannot be written.

@@ -40,16 +40,16 @@ class RosRobotOptions:
     """Options of a ROS robot: its name, its bridge, and its DVA.
 
     Attributes:
-        ros: Of the rosbridge server, `ws://HOST:PORT`.
-        namespace: Of the robot's topics.
+        ros: Address of the rosbridge server, `ws://HOST:PORT`.
+        namespace: Namespace of the robot's topics.
         profile: By name or path.
-        number: Which robot it is to the DVA, from 1.
-        dva: Where the DVA listens, `HOST:PORT`.
+        number: Number of the robot at the DVA, from 1.
+        dva: Address of the DVA, `HOST:PORT`.
         host: Address of this machine to listen on.
         listen: Port of its requests; its publications have the next one. 0: any two that are free.
         keys: Folder with the keys of the devices; None to run without.
         seed: Random seed.
-        changes: Of the scenario, `KEY=VALUE`, as the pattern by which commands come.
+        changes: Changes of the scenario, `KEY=VALUE`, such as the messaging pattern.
     """
 
     ros: str

@@ -31,7 +31,6 @@ class RunningChannels:
     """Turns lines into messages, one after the other; see `ToldRun` for the lines.
 
     Args:
-        scenario: What is run.
         seed: With which seed.
     """
 

@@ -56,8 +56,8 @@ class Summary:
     Attributes:
         why: `settled`, `the script is done`, `time is up` or `interrupted`.
         latest: The last report of each part, by its name.
-        lost: What was to be recorded and is not, in one line; None: nothing.
-        verdicts: How the safety rules have fared.
+        lost: Recording that was lost, in one line; None: nothing.
+        verdicts: Verdicts on the safety rules.
         link: The packets of the emulated link, if there was one.
     """
 
@@ -72,7 +72,7 @@ class Supervisor:
     """One live run.
 
     Args:
-        options: What to run and how.
+        options: Scenario and other options.
         hear: Takes each report of each part.
         rosbridge: Port for clients of ROS; None: there is none.
         foxglove: Server that shows the run; None: there is none.

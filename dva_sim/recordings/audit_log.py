@@ -56,17 +56,17 @@ class AuditEntry:
     """Entry about one action.
 
     Attributes:
-        time_s: Of the run [s].
+        time_s: Time of the run [s].
         at_utc: By the clock on the wall, as in ISO 8601.
-        author: Who did it, for people.
+        author: Name of the author, for people.
         device: The id of the device by which it was done.
-        role: What its author was entitled to.
-        action: What was done, in a word or two.
+        role: Role of the author.
+        action: Kind of action, in a word or two.
         event: About which event, if any.
         subject: To whom, such as a robot.
-        cause: Why.
+        cause: Reason.
         outcome: `done`, or `refused`, or what else became of it.
-        text: What was said: a note, or why it was refused.
+        text: Text of a note, or reason of a refusal.
         details: More, such as what the policy would have done.
     """
 
@@ -91,7 +91,7 @@ class AuditRow(AuditEntry):
     Attributes:
         number: From 1.
         before: The hash of the row before.
-        hash: Of this row.
+        hash: Hash of this row.
     """
 
     number: int
@@ -113,7 +113,7 @@ class AuditLog:
         path: Made if it does not exist.
 
     Attributes:
-        number: Of the last row.
+        number: Number of the last row.
         head: Its hash.
 
     Raises:
@@ -226,11 +226,11 @@ class Verified:
     """Result of a check of the whole chain.
 
     Attributes:
-        rows: How many rows hold, from the first one on.
+        rows: Number of valid rows, from the first one on.
         head: The hash of the last of them.
         problem: The first row that does not; None if all do.
-        is_ended: Whether the last row says that a console has ended there.
-        doubts: What is odd, and need not be wrong.
+        is_ended: True if the last row says that a console has ended there.
+        doubts: Oddities that need not be wrong.
     """
 
     rows: int

@@ -28,7 +28,7 @@ class ChannelMessage(NamedTuple):
     """One message of a recording.
 
     Attributes:
-        time: When, since the start of the run [s].
+        time: Time since the start of the run [s].
         topic: Its channel.
         schema: Name of its schema, or `XML`.
         content: A JSON object, or the bytes of the protocol.

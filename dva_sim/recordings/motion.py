@@ -42,9 +42,9 @@ class MotionSample(NamedTuple):
     Attributes:
         told: By the phone's clock, from the first one on [s].
         came: By the run's clock [s].
-        at: When it was taken, by the same [s].
-        xyz: What was measured, in the phone's axes [m/s^2].
-        orientation: Of its screen [deg].
+        at: Time of the sample, by the same clock [s].
+        xyz: Measured acceleration in the phone's axes [m/s^2].
+        orientation: Orientation of its screen [deg].
     """
 
     told: float
@@ -60,10 +60,10 @@ class MotionApp:
 
     Attributes:
         at: From when on [s].
-        period: What it was told of the time between two samples [s].
+        period: Nominal time between two samples [s].
         reference: In the phone's axes [m/s^2].
-        ios: Whether the signs are those of iOS.
-        profile: How it reads, filters, maps and sends.
+        ios: True if the signs are those of iOS.
+        profile: Settings of reading, filter, mapping and sending.
     """
 
     at: float
@@ -99,7 +99,7 @@ class MotionWriter:
         path: A new file.
 
     Attributes:
-        name: Of the file.
+        name: Name of the file.
 
     Raises:
         OSError: it cannot be written.
@@ -187,9 +187,9 @@ def replayed(
     """The commands that the apps of a file make of its samples, with their times [s].
 
     Args:
-        motion: What is in the file.
-        looks: When somebody looked; if not given, the app says when.
-        rate_hz: Of commands, for an app that sends always.
+        motion: Content of the file.
+        looks: Times at which the app was read; by default the app decides.
+        rate_hz: Rate of commands, for an app that sends always.
 
     Raises:
         ConfigError: a filter or a mapping that cannot be had.

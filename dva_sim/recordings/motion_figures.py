@@ -21,7 +21,7 @@ class MotionFigures(NamedTuple):
     """Properties of the sensor.
 
     Attributes:
-        samples: How many there are.
+        samples: Number of samples.
         duration_s: From the first to the last [s].
         rate_hz: By the median of the intervals.
         jitter: Standard deviation of the intervals without gaps, as a share of their median.

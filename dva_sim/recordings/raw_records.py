@@ -52,14 +52,14 @@ class RawRecords:
     Attributes:
         made_by: The profile and the library that its head names.
         about: Its metadata, if they are ours.
-        files: What is attached, by name.
+        files: Attached files, by name.
         said: Content of the messages, with their time [s], by topic.
         ends: Source and destination of the channels of XML, by topic.
         order: Facts and messages in the order of the file: time [s], topic, content.
-        time: Of the last message [s].
-        is_cut: Whether the end of the file is missing.
-        written: How many messages each topic was written with; empty if the file does not say.
-        found: How many it has.
+        time: Time of the last message [s].
+        is_cut: True if the end of the file is missing.
+        written: Number of messages written on each topic; empty if the file does not say.
+        found: Number of messages found on each topic.
     """
 
     made_by: tuple[str, str] = ("", "")

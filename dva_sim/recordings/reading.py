@@ -49,7 +49,7 @@ class RecordedHazard(Hazard):
     """A hazard as it was.
 
     Attributes:
-        times: When it was told of [s], in order.
+        times: Times of its records [s], in order.
         sizes: Its radius [m], its danger radius [m] and its severity at those times.
     """
 
@@ -80,8 +80,8 @@ def recorded_hazard(number: int, entry: Mapping[str, Any], said: Said) -> Hazard
     """The stand-in for a hazard.
 
     Args:
-        number: Of its incident, from 1.
-        entry: What the file says of the incident.
+        number: Number of its incident, from 1.
+        entry: Entry of the incident in the file.
         said: The messages about all hazards.
     """
 
@@ -106,9 +106,7 @@ class RecordedSurroundings(Surroundings):
     """Hazard fields over the floor, all hazards together, as last recorded; nothing is simulated.
 
     Args:
-        site: Where.
-        hazards: What happened.
-        grids: What was recorded of each quantity.
+        grids: Recorded values of each quantity.
     """
 
     def __init__(self, site: Site, hazards: Sequence[Hazard], grids: Mapping[str, Said]) -> None:
@@ -144,15 +142,14 @@ class Opened:
     """A recording that has been read.
 
     Attributes:
-        playback: What can be told and shown of the run.
-        about: What its file says of it, such as the version that made it.
-        tables: What was measured, rows by table, with nan for what is missing; None if the
-            file does not say.
-        lasted: How long the run lasted [s]; longer than the playback if the file was cut short.
+        playback: Content of the run.
+        about: Properties stated in the file, such as the version that made it.
+        tables: Measures as rows by table, with nan for missing values; None if the file has none.
+        lasted: Length of the run [s]; longer than the playback if the file was cut short.
         traces: The lines of what was decided, by who decides.
         audit: The rows of the audit log.
         terms: Limits that the safety rules hold the run to; None: the file has no facts.
-        left_out: How many messages of each topic the file lacks, which was filtered.
+        left_out: Number of messages that the file lacks on each topic, for a filtered file.
     """
 
     playback: Playback
@@ -419,13 +416,12 @@ class Lapse:
     """A run as a figure needs it.
 
     Attributes:
-        site: Where it took place.
         tracks: A row for each sampled moment of everybody: `agent`, `t_s`, `x_m`, `y_m`,
             `heading_rad`, `mode`; in order of time for each agent.
         told: A row for each line of the story: `t_s`, `who`, `what`, `kind`.
         incidents: The hazards, with those that were reported and not there.
-        contained: When incidents were dealt with [s], by their place in `incidents`.
-        duration: How long the run lasted, or the file goes [s].
+        contained: Time at which incidents were contained [s], by their index in `incidents`.
+        duration: Length of the run, or of the file [s].
     """
 
     site: Site

@@ -34,7 +34,7 @@ def write_bag(playback: Playback, folder: Path) -> None:
 
     Args:
         playback: The run.
-        folder: Of the bag; must not be there yet.
+        folder: Folder of the bag; must not exist yet.
 
     Raises:
         ConfigError: `rosbags` is not installed, or the folder is there.

@@ -50,7 +50,7 @@ def read_sensor_log(path: Path, unit: Unit | None = None) -> list[MotionSample]:
 
     Args:
         path: The file.
-        unit: Of the axes; None: as the head says, or else as gravity does.
+        unit: Unit of the axes; None: from the header, or else from gravity.
 
     Raises:
         ConfigError: no such log: which columns it needs and has; or a line that is damaged.

@@ -56,8 +56,8 @@ def unpack(files: Mapping[str, bytes], scenario: Scenario, seed: int) -> Site:
 
     Args:
         files: From `pack`.
-        scenario: What was run; of a bare map it tells how many bases there are ...
-        seed: ... and this places them.
+        scenario: Scenario that was run; for a bare map it gives the number of bases.
+        seed: Seed that places those bases.
 
     Raises:
         ConfigError: the files do not hold a site.
@@ -110,8 +110,8 @@ def check_target(path: Path, overwrite: bool = False, **way: str) -> None:
     """Tell what keeps a recording from being made there, before anything is run.
 
     Args:
-        path: Of the recording.
-        overwrite: What is there may be replaced.
+        path: Path of the recording.
+        overwrite: True to replace an existing file.
         way: See `refuse_to_replace`.
 
     Raises:
@@ -174,10 +174,10 @@ def write_recording(
 
     Args:
         playback: The run, simulated with `keep_traffic`.
-        path: Where; what was there is replaced once all is written.
-        tables: What was measured, rows by table; goes with it as JSON.
+        path: Output file; an existing one is replaced once all is written.
+        tables: Measures as rows by table; stored as JSON.
         about: More to say of the run, such as its place in a study.
-        traces: What was decided: lines with their time [s], by who decides.
+        traces: Decisions as lines with their time [s], by author.
         audit: Rows of an audit log, with their time [s].
 
     Raises:

@@ -35,7 +35,7 @@ class RosBody(RobotBody):
 
     Attributes:
         stopped_at: Time since which the robot should slow down and stand [s].
-        has_stood: Whether it has stood since then.
+        has_stood: True if it has stood since then.
     """
 
     def __init__(

@@ -20,7 +20,7 @@ class Subscribed(NamedTuple):
     """A topic that is read.
 
     Attributes:
-        type: Of its messages, as this version of ROS writes it.
+        type: Type of its messages, in the spelling of this version of ROS.
         take: Takes each message.
         largest: Larger ones are dropped unread [B].
         throttle_ms: The server sends no more often.
@@ -37,16 +37,16 @@ class RosbridgeClient:
 
     Args:
         clock: Polls the socket.
-        url: Of the server.
+        url: Address of the server.
         topics: Topics to read, by name.
         advertised: Types of the topics that are published, by name.
-        on_change: Told when the connection is made, with an empty text, and when it is lost or
+        on_change: Callback when the connection is made, with an empty text, and when it is lost or
             cannot be made, with the reason.
-        on_bad: Told what was refused, and of which topic.
+        on_bad: Callback with the reason and the topic of a refused message.
 
     Attributes:
-        is_connected: Whether messages can be sent now.
-        counters: What was refused, by reason.
+        is_connected: True if messages can be sent now.
+        counters: Number of refused messages, by reason.
     """
 
     def __init__(

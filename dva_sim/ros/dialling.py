@@ -20,9 +20,9 @@ class Dialling:
     Args:
         clock: Gives the time to look.
         host: Name or address.
-        port: Of TCP.
+        port: TCP port.
         connected: Takes the socket, which does not block.
-        failed: Told why there is none.
+        failed: Callback with the reason of a failure.
     """
 
     def __init__(

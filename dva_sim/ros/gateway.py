@@ -57,7 +57,7 @@ class ScanReader:
     """Reads the lidar of a robot, with a permission to do so, until `end`.
 
     Args:
-        device: Who reads.
+        device: Device that reads.
         robot: By its id.
         take: Takes ranges [m].
     """
@@ -200,7 +200,7 @@ class RosGateway:
     """The devices through which clients of ROS hear and drive robots.
 
     Args:
-        stage: Where they are made.
+        stage: Stage on which the devices are made.
         console: Gives pattern, rate and limits of the next drive; None: those of the scenario.
 
     Attributes:

@@ -16,7 +16,7 @@ class OpenPort:
 
     Attributes:
         listener: Listening socket.
-        token: That clients have to show; empty: anybody may come.
+        token: Token that clients have to show; empty: none is needed.
         host: Address of this machine that it listens on.
     """
 
@@ -53,9 +53,9 @@ def open_port(host: str, port: int, option: str, has_token: bool = True) -> Open
 
     Args:
         host: Address of this machine to listen on.
-        port: Which; 0 for any that is free.
-        option: Of the command, which names the port.
-        has_token: Whether clients need a token, which is drawn.
+        port: Port; 0 for any free one.
+        option: Command-line option that names the port.
+        has_token: True if clients need a token, which is drawn.
 
     Raises:
         ConfigError: the address is not of this machine, or taken.

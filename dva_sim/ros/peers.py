@@ -70,7 +70,7 @@ class RosPeer:
         host: Its server.
 
     Attributes:
-        wants: What it subscribed to.
+        wants: Subscriptions of the client.
         driver: Its device, from when it first takes control.
     """
 

@@ -106,7 +106,7 @@ class RosLimits(Config):
         max_age_s: And for at most this long after the newest tick that its sender had seen.
         odometry_within_s: Without odometry for longer the robot is stopped.
         picture_within_s: Without pictures for longer none is shown.
-        stands_within_s: It has to stand by then once it is told to.
+        stands_within_s: Time within which it has to stand once ordered to.
     """
 
     max_speed_mps: Positive = 0.5
@@ -125,14 +125,14 @@ class RosProfile(Config):
     Attributes:
         ros: Version of ROS, which says how types and times are written.
         command: Type of the velocity commands.
-        command_hz: How often a command in force is repeated.
+        command_hz: Rate at which a command in force is repeated.
         enable: Service (std_srvs/Trigger) that is called until it succeeds before the robot can be
             driven, as motors or a server of commands may need; null: none.
         site: Site of the DVA, whose frame positions are in.
-        origin: Where on that site the odometry begins.
-        radius_m: Of a circle around the robot.
+        origin: Origin of the odometry on that site.
+        radius_m: Radius of a circle around the robot.
         camera_deg: Angle of view of the camera.
-        frame_hz: How often observations are published.
+        frame_hz: Rate at which observations are published.
         largest_picture_bytes: Larger pictures are dropped.
     """
 

@@ -36,7 +36,7 @@ class RosMotion(NamedTuple):
     """Pose in the site frame [m, rad], and velocity along the heading [m/s, rad/s].
 
     Attributes:
-        stamp: When it was measured, by the robot's clock [s]; None: not said.
+        stamp: Measurement time by the robot's clock [s]; None: unknown.
     """
 
     x: float

@@ -37,14 +37,14 @@ class RosRobot:
     """One robot.
 
     Args:
-        stage: Where its device is made, and the site that its positions are on.
-        number: Which robot it is.
-        profile: How it is connected.
-        url: Of the rosbridge server.
-        namespace: Of its topics.
+        stage: Stage on which its device is made, and the site of its positions.
+        number: Number of the robot.
+        profile: Profile of the connection.
+        url: Address of the rosbridge server.
+        namespace: Namespace of its topics.
 
     Attributes:
-        agent: What obeys the DVA and the driver.
+        agent: Agent that obeys the DVA and the driver.
         bridge: To its rosbridge server.
         on_picture: Takes each picture, as JPEG.
     """

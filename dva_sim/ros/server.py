@@ -59,7 +59,7 @@ class RosbridgeServer:
         listener: Listening socket.
         gateway: The robots.
         site: For the map.
-        token: That clients have to show to drive; empty: anybody may.
+        token: Token that clients have to show to drive; empty: none is needed.
         tell: Adds a line to the story.
     """
 

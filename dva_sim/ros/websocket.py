@@ -35,7 +35,7 @@ class WebSocketConnection:
         sock: Connected, not blocking.
         protocol: The state of this end.
         on_text: Takes each whole text message.
-        on_end: Told once, with the reason, when the connection is over.
+        on_end: Callback once, with the reason, when the connection is over.
 
     Attributes:
         is_open: False once the connection is over.
@@ -196,11 +196,11 @@ class WebSocketDialer:
 
     Args:
         clock: Polls the socket.
-        url: Of the server.
+        url: Address of the server.
         largest: Size of the largest message that is read [B].
-        on_open: Told when the handshake is done.
+        on_open: Callback when the handshake is done.
         on_text: Takes each text message.
-        on_end: Told once when the connection is over, or could not be made.
+        on_end: Callback once, when the connection is over or could not be made.
 
     Attributes:
         connection: Once TCP has connected.

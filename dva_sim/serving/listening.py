@@ -18,8 +18,8 @@ def listen(host: str, port: int, option: str = "--port") -> socket.socket:
 
     Args:
         host: Address of this machine.
-        port: Which; 0 for any that is free.
-        option: Of the command, which names the port.
+        port: Port; 0 for any free one.
+        option: Command-line option that names the port.
 
     Raises:
         ConfigError: the address is not of this machine, or taken.

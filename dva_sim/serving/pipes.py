@@ -59,7 +59,7 @@ class PipeEnd:
         following: Gives what is to be written next; None: nothing.
 
     Attributes:
-        is_open: Whether the other end is still there.
+        is_open: True while the other end is still there.
     """
 
     def __init__(self, end: int, following: Callable[[], bytes | None] = lambda: None) -> None:
@@ -187,7 +187,7 @@ class LineKinds:
     """Kinds of lines, by their `k`, that do not wait as others do.
 
     Attributes:
-        newest: Of these, of one key, only the newest waits.
+        newest: Kinds of which only the newest line of each key waits.
         kept: These are never dropped.
         first_dropped: These before all others.
     """
@@ -241,10 +241,10 @@ class LinePipe(PipeEnd):
 
     Args:
         end: See `PipeEnd`.
-        kinds: Of the lines that are written.
+        kinds: Kinds of the lines that are written.
 
     Attributes:
-        outbox: What waits to be written.
+        outbox: Lines waiting to be written.
     """
 
     def __init__(self, end: int, kinds: LineKinds) -> None:

@@ -24,7 +24,7 @@ class PortConnection:
 
     Attributes:
         places: The connections that it is one of.
-        since: When it was made, or its newest request began or ended [s].
+        since: Time at which it was made, or its newest request began or ended [s].
         rank: Rank of the role that its newest request showed; 0: no token.
         busy: True while a request is in progress or a WebSocket is open.
         drop: Cuts the connection.

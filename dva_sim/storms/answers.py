@@ -31,7 +31,7 @@ class AnswerWatch:
     """Sees what reaches the DVA, robots and people, and what they answer.
 
     Args:
-        recorder: Counts what is refused, and is told what breaks the rule.
+        recorder: Recorder that counts refusals and notes broken rules.
         now: Gives the time [s].
         nodes: Ids of those who have to answer, with their labels.
         heard: Called with each answer: of whom, to whom, its bytes; whether it gets there or not.

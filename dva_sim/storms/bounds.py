@@ -62,7 +62,7 @@ def oversized(roots: Iterable[object], events: int = 0) -> Iterator[tuple[str, i
 
     Args:
         roots: Agents; what they share with the whole run is left out.
-        events: How many the DVA has ever known.
+        events: Number of events that the DVA has ever had.
 
     Yields:
         Class and attribute, number of elements, bound.

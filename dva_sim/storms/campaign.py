@@ -121,10 +121,10 @@ def outcomes(
     """Yield the outcomes of storms, and whether each was known before, as they come.
 
     Args:
-        seeds: Which storms.
-        profile: Which kinds of faults.
+        seeds: Seeds of the storms.
+        profile: Profile of fault kinds.
         journal: Keeps them.
-        workers: Who plays them.
+        workers: Workers that run the storms.
     """
     waiting = set[Future[StormOutcome]]()
     with workers.executor(workers.width, play_seed) as executor:

@@ -40,8 +40,8 @@ def draw(seed: int, profile: str = "all") -> StormPlan:
     """Draw a storm.
 
     Args:
-        seed: Of everything in it.
-        profile: Which kinds of faults it has, as in `PROFILES`.
+        seed: Random seed of the storm.
+        profile: Profile of fault kinds, as in `PROFILES`.
 
     Raises:
         ConfigError: there is no such profile.

@@ -37,7 +37,6 @@ class BusyDriver:
     """One driver: takes a robot, drives it or sends it somewhere, gives it back, takes another.
 
     Args:
-        stage: Where.
         number: From 1.
         robots: Ids of the robots.
         sensors: Names of the sensors that robots have.

@@ -24,10 +24,10 @@ class DvaLives:
         down: Called with True when it is killed, and with False when it is back.
 
     Attributes:
-        memory: Of the present life.
-        kills: How often it was killed.
+        memory: Memory since the last restart.
+        kills: Number of kills.
         full: Number of faults that keep the disk full now.
-        lost: How long the last life could write nothing before it was killed [s].
+        lost: Time for which the last life could write nothing before it was killed [s].
     """
 
     def __init__(self, file: Path, down: Callable[[bool], object]) -> None:

@@ -46,7 +46,7 @@ class FaultKind:
         lasts: Shortest and longest duration [s]; an act takes none.
         value: Lowest and highest strength; `words` say of what.
         on: Messages to the target that it may wait for.
-        weight: How often it is drawn, beside others.
+        weight: Relative frequency of being drawn.
     """
 
     words: str

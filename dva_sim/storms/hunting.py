@@ -18,7 +18,7 @@ class Hunt:
         mutant: Its name.
         storms: Number of storms played.
         rules: Rules that were broken when it was found; none: it was not.
-        acts: How often it has done the wrong thing.
+        acts: Number of wrong actions.
         first: Description of the first time.
     """
 

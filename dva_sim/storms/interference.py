@@ -88,7 +88,7 @@ class Interference:
 
         Args:
             kind: Name of its element, such as `StartTeleOp`.
-            to: How the id of the receiver begins.
+            to: Prefix of the receiver's id.
             then: Called with the id of the receiver.
         """
         self._awaited.append((b"<" + kind.encode(), to, then))
@@ -176,7 +176,7 @@ def holds_tilt(speed: float, chance: random.Random) -> Meddling:
     """Make all commands say the same, as of somebody who has put the phone aside.
 
     Args:
-        speed: What they say [m/s].
+        speed: Speed in the commands [m/s].
         chance: Draws the turn rate.
     """
     turn = chance.uniform(-0.5, 0.5)

@@ -19,8 +19,7 @@ class Intruder:
     """A device that says anything to anybody.
 
     Args:
-        stage: Where.
-        number: Tells it from other intruders.
+        number: Number among the intruders.
         label: Its name.
     """
 

@@ -35,11 +35,11 @@ class Fault:
 
     Attributes:
         kind: Its name, as in `dva_sim.storms.faults.FAULTS`.
-        at_s: When it begins at the earliest [s].
-        for_s: How long it lasts [s]; 0: it is an act, and over at once.
+        at_s: Earliest start [s].
+        for_s: Duration [s]; 0: a single act.
         target: Label of the device that it strikes, such as `robot-1`; empty: any; `robot-*`: the
             robot that the message is for which it waits.
-        source: Of faults of messages: label of the sender; empty: any.
+        source: Label of the sender, for faults of messages; empty: any.
         on: Waits for the first message of this kind to the target, such as `StartTeleOp`; empty:
             it begins at `at_s`.
         value: Its strength; each kind says what that is.
@@ -64,10 +64,10 @@ class StormPlan:
     """A storm.
 
     Attributes:
-        seed: Of all chance in it.
+        seed: Random seed.
         scenario: Keys of a scenario, as in its file.
         faults: In order of time.
-        calm_s: When the last fault has ended [s]; from then on everything has to recover.
+        calm_s: End of the last fault [s]; from then on everything has to recover.
         drivers: Number of drivers who are never idle, beside the operators of the scenario.
     """
 

@@ -18,7 +18,7 @@ class Bug:
 
     Attributes:
         name: Its name.
-        acts: How often it has done the wrong thing.
+        acts: Number of wrong actions.
         first: Description of the first time.
     """
 

@@ -31,10 +31,9 @@ class RecoveryProbes:
     """Probes whether everything works again.
 
     Args:
-        stage: Where.
-        recorder: Told what has not recovered.
+        recorder: Recorder of what has not recovered.
         motion_of: Gives the motion of a robot now, by its id.
-        calm: When the last fault has ended [s].
+        calm: End of the last fault [s].
     """
 
     def __init__(
@@ -60,7 +59,7 @@ class RecoveryProbes:
         Args:
             robots: Ids of the robots that have power.
             others: Ids of the guards and operators.
-            place: Where an event is reported, and where robots are sent.
+            place: Place of the reported event, and destination of the robots.
         """
         self._place, self._beats = place, dict.fromkeys((*robots, *others), 0.0)
         self._open = dict.fromkeys(robots, "gives nobody the robot")

@@ -30,7 +30,7 @@ class RefusedDrivers:
     """Sees what robots tell their drivers, and whether those go on all the same.
 
     Args:
-        recorder: Told who goes on.
+        recorder: Recorder of drivers who continue.
         labels: Names by id.
         drivers: Ids of those who have to stop.
     """

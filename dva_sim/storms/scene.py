@@ -49,8 +49,8 @@ class StormScene:
 
     Attributes:
         run: The run.
-        recorder: What happened.
-        interference: What reaches whom.
+        recorder: Recorder of the run.
+        interference: Control over the delivery of messages.
         intruder: Does what no honest device does.
         flooder: Sends more than anybody can take, and is given nothing.
         dva: Kills and restarts the DVA.

@@ -28,14 +28,14 @@ class Shrinker:
 
     Args:
         plan: A storm that fails.
-        outcome: How.
+        outcome: Failure of the given storm.
         before: Called with each storm before it begins.
-        tries: How many are played at most.
+        tries: Maximum number of storms to run.
 
     Attributes:
         plan: The smallest so far.
         outcome: Its outcome.
-        left: How many may still be played.
+        left: Number of storms that may still be run.
     """
 
     def __init__(

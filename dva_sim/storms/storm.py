@@ -44,14 +44,14 @@ class StormOutcome:
     """Outcome of a storm: its size, and the rules that broke.
 
     Attributes:
-        seed: Of the storm.
-        breaches: Of rules, each by one agent; none if all were held.
+        seed: Seed of the storm.
+        breaches: Breaches of rules, each by one agent; empty if all were held.
         error: Traceback of an exception that ended it; empty if it went to its end.
         faults: Number of faults by kind.
         messages: Number of messages that faults have touched, by kind.
-        simulated_s: How long it lasted [s].
-        cpu_s: What it cost [s].
-        digest: Of all that was sent: the same storm has the same.
+        simulated_s: Simulated time [s].
+        cpu_s: Cost [CPU s].
+        digest: Hash of all messages: equal storms have equal ones.
     """
 
     seed: int

@@ -32,9 +32,9 @@ class DrawnBody:
     """One of them with a trail; for a driven robot also what its operator sees.
 
     Args:
-        ax: Where.
+        ax: Axes to draw on.
         moments: The run.
-        name: Who.
+        name: Name of the robot or person.
     """
 
     def __init__(self, ax: Axes, moments: Moments, name: str) -> None:

@@ -32,7 +32,7 @@ class DrawnFields:
     """All hazards of a run on one map.
 
     Args:
-        ax: Where.
+        ax: Axes to draw on.
         moments: The run.
     """
 

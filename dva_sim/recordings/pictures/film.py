@@ -91,9 +91,9 @@ class _Eye:
     """Picture on the screen of the operator who is driving, or else what a robot sees now.
 
     Args:
-        ax: Where.
+        ax: Axes to draw on.
         moments: The run.
-        step: How long a picture stands [s].
+        step: Display time of a picture [s].
     """
 
     def __init__(self, ax: Axes, moments: Moments, step: float) -> None:

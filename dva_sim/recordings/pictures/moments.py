@@ -31,9 +31,8 @@ class Glance(NamedTuple):
     """Contents of an operator's screen.
 
     Attributes:
-        operator: Whose.
         robot: The robot that took the picture, by its label.
-        captured: When it was taken [s].
+        captured: Capture time [s].
     """
 
     operator: str

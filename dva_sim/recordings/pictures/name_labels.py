@@ -50,8 +50,8 @@ class Names:
     """The names on one map; bystanders have none, there are too many.
 
     Args:
-        ax: Where, with the names of rooms already written.
-        bodies: Whose names.
+        ax: Axes, with the names of rooms already written.
+        bodies: Bodies to label.
     """
 
     def __init__(self, ax: Axes, bodies: Sequence[DrawnBody]) -> None:

@@ -29,9 +29,9 @@ class Sheet:
     """An empty picture that is as high as what it has to hold.
 
     Args:
-        runs: What is shown; all at the same place.
-        maps: How many maps there are.
-        columns: How many of them stand abreast.
+        runs: Runs to show; all at the same place.
+        maps: Number of maps.
+        columns: Number of maps in a row.
         heading: Above all; of a single map it is the title.
         below: Height left free below each column of maps.
         dpi: Pixels of an inch.
@@ -39,7 +39,7 @@ class Sheet:
     Attributes:
         figure: The picture.
         maps: The maps, row by row, in their final size and still empty.
-        title: Of a single map.
+        title: Title of a single map.
     """
 
     def __init__(

@@ -27,7 +27,7 @@ class Wanted:
         strip: Several moments in one figure, likewise.
         at: The moments of still or strip [s], separated by commas; left out, the end for a
             still, or of two runs the moment when the first is done, and even steps for a strip.
-        panels: How many moments a strip shows.
+        panels: Number of moments in a strip.
         camera: A robot by its label; the still is what its camera sees, `.png` or `.jpg`.
         inset: Show in the film what a robot's camera sees.
 

@@ -18,9 +18,9 @@ class RunVerdict(NamedTuple):
     Attributes:
         time: From when on that is so [s].
         text: In words; empty if it is not known.
-        good: Whether every event was confirmed, and every false alarm refuted.
-        ahead: How much earlier than the other of two runs that was [s]; infinite if the other
-            never came to it, negative if this one was later.
+        good: True if every event was confirmed, and every false alarm refuted.
+        ahead: Lead over the other of two runs [s]; infinite if the other never got there, negative
+            if this one was later.
     """
 
     time: float

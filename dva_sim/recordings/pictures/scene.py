@@ -29,11 +29,11 @@ class Scene:
     """A map that can show any moment of a run; a run that has ended stays as it was at its end.
 
     Args:
-        ax: Where; it has its size already.
+        ax: Axes to draw on, with their final size.
         moments: The run.
-        verdict: How it ended, told below the map from then on.
+        verdict: Outcome, shown below the map from then on.
         title: Above the map on the left.
-        outlook: Told below the map until then; None for the newest line of the story.
+        outlook: Text below the map until then; None for the newest line of the story.
     """
 
     def __init__(

@@ -16,7 +16,7 @@ class Traffic:
     """Messages to the robots above the line, from them below.
 
     Args:
-        ax: Where.
+        ax: Axes to draw on.
         moments: A run made with `keep_traffic`.
     """
 
