@@ -114,7 +114,7 @@ class AgentDevice:
     def register(self, then: Callable[[], object] = do_nothing, hears_dva: bool = True) -> None:
         """Make oneself known to the DVA until it has answered, then renew that now and then.
 
-        A DVA that was started anew so comes to know everybody again.
+        So a restarted DVA learns of every device again.
 
         Args:
             then: Called when the DVA has answered for the first time.

@@ -92,7 +92,7 @@ class CorrectingHabits(Sparse):
     Attributes:
         evidence_rad: Sum of the error of the turn rate over time at which a correction begins.
         grows_s: Time for which a correction grows.
-        unnoticed: Share of the last correction below which an error is no evidence.
+        unnoticed: Share of the last correction below which an error does not count.
     """
 
     evidence_rad: Annotated[

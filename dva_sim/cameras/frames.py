@@ -1,7 +1,7 @@
 """Pictures on their way from the process that draws them to the one that serves them.
 
 A record is the length of a header (4 bytes, big-endian), the header as JSON, and a JPEG of as many
-bytes as the header says. Whoever draws may die in the middle of a record and begin again on the
+bytes as the header says. The renderer may die in the middle of a record and begin again on the
 same pipe, so the reader finds the next whole record by itself.
 """
 

@@ -1,7 +1,7 @@
 """Frames that somebody looks at: noted when they are taken, told when they have arrived.
 
 They come over the modelled link, to the seat that holds the robot, or else to a screen of the
-console. What is told of a frame is what was true when it was taken.
+console. The data of a frame are those of the time when it was taken.
 """
 
 from __future__ import annotations

@@ -159,7 +159,7 @@ class PictureService(CameraService):
         self._await_viewers()
 
     def show(self, jpeg: bytes) -> None:
-        """Pass a picture to whoever looks; without viewers it goes nowhere."""
+        """Pass a picture to the viewers; without viewers it goes nowhere."""
         self._number += 1
         if self._child is not None and self._is_watched:
             now = round(1000 * self._clock.now)

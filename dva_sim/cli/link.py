@@ -48,7 +48,7 @@ def link(
     """Run any two programs over a link you choose.
 
     Each command runs in the shell, in its own network namespace. An emulated link is the only
-    connection between the two: there is no internet, no name server and no access to this computer,
+    connection between the two: no internet, no name server and no access to this computer,
     except for published ports at the near end. Both commands find the addresses of the two ends in
     DVA_LINK_NEAR and DVA_LINK_FAR. Their output is passed through.
 

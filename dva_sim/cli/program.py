@@ -1,6 +1,6 @@
 """The program: all commands in their groups, how their help is laid out, and how each of them ends.
 
-A mistake in the words of a call is told in one line that says what would be right.
+A mistake on the command line is reported in one line that says what would be right.
 """
 
 from __future__ import annotations

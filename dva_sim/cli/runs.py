@@ -427,7 +427,7 @@ def robot(
 
 
 def _say_at_once(line: str) -> None:
-    """A line for whoever waits for it, also through a pipe."""
+    """Print a line at once, also through a pipe."""
     typer.echo(line)
     sys.stdout.flush()
 

@@ -131,7 +131,7 @@ def _loaded(request: RunRequest) -> StudyPlan:
 
 
 def _checked(study: Study) -> StudyPlan:
-    """Find mistakes before the first run; where that takes a while, it is told."""
+    """Find mistakes before the first run; print a note if that takes a while."""
     count = size(study) * len(study.parts) + cells_of_repeats(study)
     if count < _MANY:
         plan = rehearse_all(study)

@@ -1,6 +1,6 @@
 """Decisions with author, reason and outcome: the facts of an audit log.
 
-A fact is a value: whoever keeps facts needs nothing else of the DVA. The DVA hands each out once
+A fact is a value: a recorder of facts needs nothing else of the DVA. The DVA hands each out once
 (`AuditTrail.take`), and decides nothing by them.
 """
 

@@ -315,7 +315,7 @@ REST = 10.0  # a robot has stood idle for so long before it sets out [s]
 class Patrols:
     """Sends idle robots round their beats.
 
-    The DVA holds such a robot itself. Its hold yields: whoever asks for the robot gets it, and
+    The DVA holds such a robot itself. Its hold yields: any requester gets the robot, and
     the higher session ends the patrol. A robot that comes to stand on its round, for whatever
     reason, is sent home, where it is charged; and when it has rested, on its round again.
 

@@ -58,7 +58,7 @@ class Dva:
         orders: Current orders.
         dispatcher: Dispatcher that chooses responders.
         control_rooms: Answers those where people decide.
-        trail: Decisions, to be taken by whoever records them.
+        trail: Decisions, to be taken by a recorder.
         counters: Counters by name.
         refused: Messages that were refused.
     """

@@ -1,7 +1,7 @@
 """Handing a robot over: who has it, who asks for it, and when the next one may have it.
 
 A robot changes hands at a standstill (S2): its holder gives it up, or a supervisor takes it; the
-robot is told that the session is over and says that it has heard; it is seen to stand; only then
+robot acknowledges that the session is over; it is seen to stand; only then
 is the next session granted. Meanwhile it is nobody else's.
 """
 

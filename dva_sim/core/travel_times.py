@@ -39,7 +39,7 @@ class Travel(Protocol):
     ) -> tuple[Floats, Floats]:
         """Path length [m], and expected time to arrival with mobilisation [s].
 
-        Both of shape `(goals, starts)`; infinite where there is no way.
+        Both of shape `(goals, starts)`; infinite where no path exists.
         """
 
 
@@ -57,7 +57,7 @@ class SiteKnowledge:
 
     Attributes:
         preference: Place of each device on the list for events at a position, from 0;
-            infinite for who is not on it. None if there are no lists.
+            infinite for who is not on it. None without such lists.
         stations: Waiting places for guards.
         reach: From each station to each zone [s], shape `(stations, zones)`.
         demand: Share of events expected in each zone, shape `(zones,)`.

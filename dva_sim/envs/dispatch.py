@@ -64,8 +64,8 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
     Observations (float32 but for the mask; rows of what is not there are 0):
         tasks: `(tasks, columns)` as in `TASK_COLUMNS`, longest reported first.
         units: `(units, columns)` as in `UNIT_COLUMNS`, guards and robots as the scenario has them.
-        eta_s: `(tasks, units)`, expected time to arrival [s]; -1 for whoever cannot go.
-        distance_m: The same as a way [m].
+        eta_s: `(tasks, units)`, expected time to arrival [s]; -1 for units that cannot go.
+        distance_m: Path length [m], in the same form.
         bids_s: With `auctions`: what each unit has offered [s]; -1 without a bid.
         cover_s: With `relocates`: `(units, stations)`, way to each station [s]; -1 if it cannot.
         bound_for: With `relocates`: `(units, stations)`, 1 for the station a guard is bound for.

@@ -1,4 +1,4 @@
-"""Check what a file says against a pydantic model; mistakes are told by key.
+"""Check a file against a pydantic model; mistakes are reported by key.
 
 What pydantic finds is said in words without Python: what is wrong, and what would be right. An
 unknown key is answered with the one that was meant: beside it, elsewhere in the file, or by another

@@ -1,4 +1,4 @@
-"""Configurations with some keys changed, as by `--set`; a mistake is told where it was made."""
+"""Configurations with some keys changed, as by `--set`; mistakes name their origin."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def build(
     complete: Callable[[M, Fail], M],
     locate: Callable[[dict[str, Any], Sequence[Path]], object] = lambda data, folders: None,
 ) -> M:
-    """A configuration with some keys changed, whose mistakes are told with their place.
+    """Build a configuration with some keys changed; mistakes are reported with their place.
 
     Args:
         model: Class of the configuration.

@@ -84,7 +84,7 @@ class Plugins(Generic[T]):
             base: Folder as for `find`.
 
         Raises:
-            ConfigError: as `find`; a bad option is told when it is made, as by `make`.
+            ConfigError: as `find`; a bad option is reported when it is made, as by `make`.
         """
         factory, own, word = self.find(name, base), dict(options or {}), word_of(name)
         finish = None if factory in self.shipped.values() else self.finish
@@ -220,7 +220,7 @@ class Plugins(Generic[T]):
 
 
 class Guard:
-    """Asks a plug-in in a run; what it gets wrong is counted, and whoever asks goes on without.
+    """Calls a plug-in in a run; failures are counted, and the caller continues without it.
 
     Attributes:
         failures: Number of missing or invalid answers.

@@ -78,7 +78,7 @@ make_issued = maker(Issued)
 
 
 class Accepted(NamedTuple):
-    """A command that a robot accepted, whoever sent it.
+    """A command that a robot accepted from any sender.
 
     Attributes:
         robot: Id of the robot.
@@ -380,7 +380,7 @@ class Recorder:
         )
 
     def drive_ordered(self, drive: DriveLog) -> None:
-        """An operator shall drive a robot."""
+        """Record that an operator was ordered to drive."""
         self.drives.append(drive)
         self.newest_drive[drive.robot] = drive
 

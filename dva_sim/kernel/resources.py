@@ -149,7 +149,7 @@ def refuse_to_replace(
 
 
 def is_file(path: Path) -> bool:
-    """Return True if there is such a file; a name that no file can have is no error."""
+    """Return True if there is such a file; False for names that no file can have."""
     return _is_there(path.is_file)
 
 

@@ -1,6 +1,6 @@
-"""Named random streams: one seed per run, one stream per source of luck.
+"""Named random streams: one seed per run, one stream per source of randomness.
 
-Adding an agent changes nobody else's luck, because a stream depends only on the
+Adding an agent changes nobody else's random numbers, because a stream depends only on the
 seed and its own name, never on how many streams were made before it.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 
 
 class Streams:
-    """All luck of one run.
+    """All random numbers of one run.
 
     Args:
         seed: The run's seed, any non-negative integer.

@@ -1,4 +1,4 @@
-"""Read YAML 1.2 as plain data, with line and column of every key for what is told of mistakes."""
+"""Read YAML 1.2 as plain data, with line and column of every key for error messages."""
 
 from __future__ import annotations
 

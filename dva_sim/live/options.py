@@ -55,7 +55,7 @@ class LiveOptions:
         transport: Transport of the messages, as on the command line; see `carrier_of`.
         rosbridge: Port for clients of ROS; None: there is none.
         foxglove: Port for Foxglove; None: there is none.
-        shows_run: Parts write all lines, though there is no recording: somebody looks at them.
+        shows_run: True if parts write all lines even without a recording, for viewers.
         token: True if such clients have to show a token.
     """
 

@@ -11,7 +11,7 @@ HIGHEST: Final = 65_534  # port; a device listens at the next one, too
 
 
 def check_address(text: str, where: str = "") -> None:
-    """Refuse what is no address.
+    """Reject an invalid address.
 
     Args:
         text: Address as given.

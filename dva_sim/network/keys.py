@@ -123,7 +123,7 @@ class KeyRing:
         """The public and the secret key of a device.
 
         Raises:
-            ConfigError: one is missing or broken, they are no pair, or others may read the
+            ConfigError: one is missing or broken, they do not match, or others may read the
                 secret. That is refused, as ssh does: a warning would scroll by, and a key that
                 others could read must be taken for lost.
         """

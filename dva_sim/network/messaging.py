@@ -135,7 +135,7 @@ class Requester:
     """Asks one peer; each request is answered, or fails after a number of attempts.
 
     With a window of 1 it is a REQ socket: the next request goes when the last one is
-    answered, and after a time-out the connection is closed and opened anew. A wider window
+    answered, and after a time-out the connection is closed and reopened. A wider window
     is a DEALER: so many requests may be under way at once, over one connection.
     The same bytes are sent again after a time-out, so a receiver can tell a repetition.
 

@@ -427,7 +427,7 @@ class _Node:
 
 
 class _Wire:
-    """Requests to one peer, whose replies are told by what is unique to it; see `Wire`."""
+    """Requests to one peer, matched to replies by a unique tag; see `Wire`."""
 
     def __init__(self, network: MqttNetwork, node: str, peer: str, on_reply: OnReply) -> None:
         self._network, self._node, self._peer = network, network.node(node), peer

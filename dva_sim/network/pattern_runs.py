@@ -78,7 +78,7 @@ class Condition:
         delay_ms: One-way delay.
         jitter_frac: Half-width of a uniform law, as a share of the delay.
         loss: Share of packets lost, each direction.
-        rate_kbit: Rate of each direction [kbit/s]; infinite is no limit.
+        rate_kbit: Rate of each direction [kbit/s]; infinite: unlimited.
         queue_pkts: Packets that find room before the link, drop-tail.
         reorder: Packets may overtake one another.
         cc: Congestion control.

@@ -2,7 +2,7 @@
 
 A pattern is an object. Its attributes say what everybody else has to know of it: what it is called,
 whether the robot subscribes, which of the commands that wait the robot obeys. Its methods are what
-the app does with each command. Whoever lists patterns or names one looks here.
+the app does with each command. Patterns are listed and looked up here.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class Line(Protocol):
         then: Callable[[bytes], object],
         failed: Callable[[], object],
     ) -> None:
-        """Send a command to be answered: `then` gets the reply; `failed` is told of none."""
+        """Send a command; `then` gets the reply, `failed` is called if none arrives."""
 
     def publish(self, command: Command) -> None:
         """Publish a command on the robot's topic, to be heard or not."""

@@ -349,7 +349,7 @@ class Security:
             self._drop(monitor)
 
     def close(self) -> None:
-        """Release everything. From now on servers refuse whoever knocks."""
+        """Release everything. From now on servers refuse all clients."""
         for monitor in list(self._watches):
             self._drop(monitor)
         for socket in list(self._greetings):
@@ -444,7 +444,7 @@ class Security:
             self._note_client(watch.device, watch.peer, endpoint, event, value)
 
     def _note_server(self, device: str, endpoint: str, event: int, value: int) -> None:
-        """A bad key is told with the question for it; a peer that just leaves is no refusal."""
+        """Note a bad key, reported with the request; a peer that just leaves is not a refusal."""
         if event == zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL:
             reason, why = at_server(self._has_keys, device, value)
             refusal = Refusal(device, None, endpoint, reason, why)

@@ -113,7 +113,7 @@ class VirtualNetwork:
             client.drop()
 
     def come_back(self, node: str) -> None:
-        """The node is there again; those who want something of it connect anew, a little later."""
+        """Bring a node back; its clients reconnect a little later."""
         if node in self._gone:
             self._gone.discard(node)
             for client in self._clients[node]:
@@ -166,7 +166,7 @@ class VirtualClient:
         self._is_up = False
 
     def reopen(self) -> None:
-        """Connect anew, unless that has been done, or nobody wants it any more."""
+        """Reconnect, unless that has been done or nobody needs it any more."""
         if not self._is_up:
             self.connection = self._new_connection()
             self._open()

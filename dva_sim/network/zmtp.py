@@ -42,7 +42,7 @@ class Pipe(Generic[T]):
 
     Args:
         mark: High-water mark, in messages.
-        conflate: True to keep only the newest message; there is no high-water mark then.
+        conflate: True to keep only the newest message, without a high-water mark.
 
     Attributes:
         on_room: Called when there is room again after a refusal.
@@ -209,7 +209,7 @@ class ZmtpEnd:
         """Put a message of `size` bytes on the wire [B] into the pipe; see `framed`.
 
         Returns:
-            False if the high-water mark is reached, or the connection is no more.
+            False if the high-water mark is reached, or the connection has ended.
         """
         if self.closed or not self.pipe.put((payload, size)):
             return False

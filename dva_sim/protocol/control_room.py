@@ -67,7 +67,7 @@ class Assign:
 
 @dataclass(frozen=True, slots=True)
 class TakeOff:
-    """A guard or a robot shall not go to an event any longer, nor be sent there by the policy.
+    """Recall a guard or a robot from an event; the policy may not send it there again.
 
     Attributes:
         event_id: The event.
@@ -114,7 +114,7 @@ class Escalate:
 
 @dataclass(frozen=True, slots=True)
 class AddNote:
-    """Something about an event that others shall know, up to 256 characters."""
+    """Add a note on an event for others, up to 256 characters."""
 
     event_id: int
     text: str
@@ -129,7 +129,7 @@ class GetProposal:
 
 @dataclass(frozen=True, slots=True)
 class Revoke:
-    """Take a robot from whoever holds it, to be nobody's.
+    """Take a robot from its holder, so that it is free.
 
     Attributes:
         device: Id of the robot.

@@ -6,7 +6,7 @@ from dva_sim.kernel.errors import DvaSimError
 
 
 class ProtocolError(DvaSimError):
-    """Bytes that are no message, or values that no message can hold.
+    """Bytes that do not form a message, or values that no message can hold.
 
     Args:
         code: The reply code that tells the sender; see `dva_sim.protocol.messages`.

@@ -19,7 +19,7 @@ def is_absurd(session: int, known: int) -> bool:
     """Return True for a session number that no honest DVA can have reached by now.
 
     It is more than a day ahead of the highest that is known, or leaves no room for another day.
-    Whoever knows none yet (0) cannot tell the former.
+    Without any known session (0) the former cannot be checked.
     """
     count, newest = session >> LOW_BITS, (1 << LOW_BITS) - 1
     return count > newest - A_DAY or (bool(known) and count > (known >> LOW_BITS) + A_DAY)
@@ -76,8 +76,8 @@ class _Kept:
 class ReplyCache:
     """Replies already given, so that a request sent again acts once.
 
-    A request is known by its bytes and by whose key it came: what an impostor was told is not
-    for the one it played. A device that starts anew counts its MessageIDs from 1
+    A request is known by its bytes and by whose key it came: a reply to an impostor is not
+    for the one it played. A device that restarts counts its MessageIDs from 1
     again, and must not be given the answers of its former life.
 
     Args:
@@ -153,7 +153,7 @@ class Nuisances:
         return READ if count > self.UNANSWERED else ANSWERED
 
     def bad(self, peer: Hashable, now: float) -> None:
-        """It has sent what is no message."""
+        """Note that it has sent an invalid message."""
         self._counts[peer] = min(self.MOST, self._count(peer, now) + 1.0), now
         self._counts.move_to_end(peer)
         if len(self._counts) > self.PEERS:

@@ -365,7 +365,7 @@ class TaskBid:
 
 @dataclass(frozen=True, slots=True)
 class TaskAward:
-    """The bid is taken: the device shall go to the event, as by an `Order`."""
+    """The bid is accepted: the device has to go to the event, as by an `Order`."""
 
     event_id: int
 

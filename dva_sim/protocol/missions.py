@@ -16,7 +16,7 @@ class GoTo:
 
 @dataclass(frozen=True, slots=True)
 class Patrol:
-    """Visit these places in this order, 1 to 64 of them, and begin anew.
+    """Visit these places in this order, 1 to 64 of them, and repeat.
 
     Attributes:
         waypoints: The places of one lap.

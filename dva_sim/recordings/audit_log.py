@@ -2,9 +2,9 @@
 
 Each row carries the SHA-256 of its content and of the row before, so that a row that was changed,
 removed or moved breaks the chain there. Numbers are never given twice, and a run of the console
-ends with a row that says so: a log whose end was cut lacks one of both. Whoever can write the file
-can also compute a new chain; then only the hash of the last row, told when the console ends and
-kept in the recording, shows it.
+ends with a row that says so: a log whose end was cut lacks one of both. Those who can write the
+file can also compute a new chain; then only the hash of the last row, printed when the console ends
+and kept in the recording, shows it.
 
 References:
     Schneier, B., and Kelsey, J., "Secure audit logs to support computer forensics", ACM TISSEC 2

@@ -1,4 +1,4 @@
-"""The channels of a recording: who is where, hazards, what a viewer draws, what is told and said.
+"""The channels of a recording: positions, hazards, drawings for viewers, events and messages.
 
 Robots and people with where they are taken to be; smoke, radiant heat, gas and water as grids over
 the floor; walls, names of rooms and bodies for a viewer; the story, messages and commands.

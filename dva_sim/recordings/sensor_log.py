@@ -1,6 +1,6 @@
 """Logs of an accelerometer as common logger apps export them: time and three axes, with a head.
 
-Separators, decimal commas and the order of columns are told from the file; units by its head, by
+Separators, decimal commas and the order of columns are detected; units by the header, by
 what is asked for, or by gravity, which every phone at rest measures.
 """
 

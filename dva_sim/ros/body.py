@@ -22,8 +22,9 @@ STILL: Final = 0.02  # below this it counts as standing [m/s, rad/s]
 class RosBody(RobotBody):
     """A body that no physics moves: `place` says where it is, and `send` takes its commands.
 
-    A command is repeated while it is in force. After its end the robot is told to stand until it
-    does, and for `STILL_TOLD` in any case; then nothing is published, so that others may drive it.
+    A command is repeated while it is in force. After its end the robot gets stop commands until it
+    stands, and for `STILL_TOLD` in any case; then nothing is published, so that others may drive
+    it.
 
     Args:
         world: The site; physics of others pass it by.

@@ -31,7 +31,7 @@ class RosTopics(Config):
 
     Attributes:
         odometry: nav_msgs/Odometry; null: the pose comes from `tf`.
-        tf: tf2_msgs/TFMessage, read if there is no odometry.
+        tf: tf2_msgs/TFMessage, read without odometry.
         battery: sensor_msgs/BatteryState.
         picture: sensor_msgs/CompressedImage, as JPEG.
         scan: sensor_msgs/LaserScan.

@@ -62,7 +62,7 @@ class HttpProtocol(H11Protocol):
         self.transport.abort()
 
     def send_400_response(self, msg: str) -> None:
-        """Answer what is no HTTP, unless an answer is under way or given: then only end it."""
+        """Reject input that is not HTTP; if an answer has begun or ended, only close."""
         if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
             super().send_400_response(msg)
         else:

@@ -1,6 +1,6 @@
 """Several levels at once: means over persons with a band that holds all of them.
 
-It rests on means in units of their standard error, as they come out when persons are drawn anew.
+It rests on means in units of their standard error, as found by resampling persons.
 
 How far an interval reaches is decided on each side by itself: where a few persons are far off,
 the mean errs to one side more often and farther. Measured with 24 persons in 10,000 studies each:
@@ -61,7 +61,7 @@ def moments(values: Floats, weights: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def studentised(values: Floats, mean: Floats, error: Floats, resamples: int) -> Floats:
-    """By how many standard errors a mean of persons drawn anew is too large `(resamples, k)`.
+    """Excess of each resampled mean in standard errors `(resamples, k)`.
 
     A draw that happens to repeat the same few persons has next to no spread of its own; it is
     given at least a quarter of the sample's. Without that a level at which most persons do not
@@ -157,7 +157,7 @@ def band(differences: ArrayLike, level: float = LEVEL, resamples: int = RESAMPLE
     """A band that holds all levels at once with the given confidence.
 
     It is each level's own interval at a stricter confidence, the same for all levels: the one at
-    which all of them hold at once when persons are drawn anew. That respects how the levels
+    which all of them hold at once when persons are resampled. That respects how the levels
     depend on each other and how skewed each is. A deviation counts by how rare it is at its own
     level, so that a level at which next to nobody differs, whose deviations are large in standard
     errors, widens no other. A level with fewer than 6 persons gets Bonferroni's t, and the others

@@ -112,7 +112,7 @@ class VarianceReduction:
 
 
 def pair_correlation(a: ArrayLike, b: ArrayLike) -> float:
-    """Pearson's correlation of paired runs: how much of their luck two treatments share.
+    """Pearson's correlation of paired runs: the randomness that two treatments share.
 
     Nan with fewer than two pairs, or where one side does not vary.
     """

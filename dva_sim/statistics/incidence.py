@@ -59,7 +59,7 @@ class Incidence:
         """Mean of the smaller of `limit` [s] and the time to a cause; without it, `limit`.
 
         It is the area above the curve. Where all are watched until the limit it is the plain
-        mean of `min(time, limit)`, in which whoever never meets the cause counts `limit`.
+        mean of `min(time, limit)`, in which an event that never meets the cause counts `limit`.
         """
         if not self.events:
             return float("nan")

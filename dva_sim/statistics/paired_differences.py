@@ -110,7 +110,7 @@ def permutation_test(a: ArrayLike, b: ArrayLike, person: ArrayLike) -> float:
         person: Person of each run `(n,)`.
 
     Returns:
-        Chance of a difference at least as large, either way, if the labels were swapped by luck;
+        Chance of a difference at least as large, either way, if the labels were swapped at random;
         nan without persons.
 
     References:

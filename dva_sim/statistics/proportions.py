@@ -54,8 +54,8 @@ def interval_of_share(share: float, variance: float, persons: int, runs: int) ->
 def quantile_interval(values: ArrayLike, person: ArrayLike, q: float = 0.5) -> Interval:
     """A quantile of all runs, between the values whose own shares are compatible with it.
 
-    Of a high quantile few persons may not tell how high it is: if all of them can lie below it
-    by luck, the upper end is infinite. With 24 persons and 5 trials the 95th percentile of runs
+    Few persons may not bound a high quantile: if all of them can lie below it
+    by chance, the upper end is infinite. With 24 persons and 5 trials the 95th percentile of runs
     that hardly cluster has two ends, and mostly one where the trials of each are much alike.
 
     Args:

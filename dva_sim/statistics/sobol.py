@@ -40,7 +40,7 @@ def sobol_indices(
 
     The outcome of a cell is the mean over persons. The design has `N` blocks of `d + 2`
     cells for `d` factors: a point `A`, for each factor `A` with that factor taken from `B`,
-    and the point `B`. The interval comes from drawing blocks and persons anew, both at once.
+    and the point `B`. The interval comes from resampling blocks and persons at once.
 
     Args:
         levels: For each factor, its value in each run `(n,)`.

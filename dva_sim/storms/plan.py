@@ -117,7 +117,7 @@ def load_plan(path: Path) -> StormPlan:
     """Read a plan from its file.
 
     Raises:
-        ConfigError: it cannot be read, or is no plan.
+        ConfigError: it cannot be read, or is not a plan.
     """
     data = load_yaml(path).data
     try:

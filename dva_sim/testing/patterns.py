@@ -86,8 +86,8 @@ class TriedDrive:
         network: Transport of the messages.
         pattern: This drive's.
         service: Processing time of a command at the robot [s].
-        refuses: With which code the robot answers whatever comes; 0: it obeys. None: with
-            bytes that are no message.
+        refuses: Code of the robot's reply to everything; 0: it obeys. None:
+            invalid bytes.
         node: Id of the phone.
         robot: Id of the robot.
         rate_hz: See `Line`, as the next three.

@@ -248,9 +248,9 @@ def check_policy(
 ) -> Outcome:
     """See that a policy keeps what every policy promises.
 
-    Two of it are made, and shown the same generated situations, all kinds in turn, with the same
-    luck: they must advise the same. What the quicker one took is how long a decision takes,
-    without what is only done once.
+    Two instances get the same generated situations, all kinds in turn, with the same
+    random numbers: they must advise the same. What the quicker one took is how long a decision
+    takes, without what is only done once.
 
     Args:
         policy: By name, as in a scenario, or its class.

@@ -40,7 +40,7 @@ def job_of(
     """A job of a validation.
 
     Args:
-        name: With its seed it is no other's.
+        name: Name of the job, unique together with its seed.
         seed: Random seed.
         scenario: Scenario to run; a job without one has everything in `asked`.
         person: Person of the job.

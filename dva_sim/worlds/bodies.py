@@ -1,6 +1,6 @@
 """Contacts, jams and how they end: the rules, and what counts them.
 
-There is no reverse, so whoever has driven into something has to turn away from it, or waits
+Robots have no reverse: one that has driven into something has to turn away from it, or waits
 for help. The rules:
 
 - **A contact** begins when a robot touches a wall, another robot or a person, having touched
@@ -253,7 +253,7 @@ class Body:
         return self._world.time if self.in_contact else self._touch.last
 
     def push(self, tick: int, dt: float) -> bool:
-        """Apply its own forces for one tick; False if it stands and shall stand."""
+        """Apply its own forces for one tick; False if it stands as requested."""
         raise NotImplementedError
 
     def counts(self, other: Body | None) -> tuple[Contacts, ...]:
@@ -299,7 +299,7 @@ class Lock:
     """Wheels that are locked: the floor holds them along, across and turning, up to its grip.
 
     Friction is solved together with contacts, as forces from one tick to the next would let
-    whoever is leant against creep away. Nothing draws the body back to where it was.
+    a robot that is leant against creep away. Nothing draws the body back to where it was.
 
     Args:
         space: Space of the body.
@@ -452,7 +452,7 @@ class RobotBody(Body):
         return speed, turn_rate, end * self._world.dt if speed or turn_rate else 0.0
 
     def push(self, tick: int, dt: float) -> bool:
-        """Apply the motors' forces for one tick; False if the robot stands and shall stand.
+        """Apply the motors' forces for one tick; False if the robot stands as requested.
 
         Wheels hold along and across together no more than the grip of the floor: beyond that
         they slip, and the force keeps its direction (a friction circle). Who has come to rest

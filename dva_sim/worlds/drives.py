@@ -22,7 +22,7 @@ CREEP: Final = 0.01  # below this a car stands, and its steering turns nothing [
 class Drive:
     """Motors of a robot that steers itself; derive from this to make another kind.
 
-    It is told what is wanted within the limits of `spec`, and keeps nothing from one tick to
+    It gets a set point within the limits of `spec`, and keeps nothing from one tick to
     the next: the same values give the same answer.
 
     Args:
@@ -159,7 +159,7 @@ class GuardedDrive(Guard, Drive):
         self.turning_radius, self.drive = drive.turning_radius, drive
 
     def set_point(self, speed: float, turn_rate: float) -> tuple[float, float]:
-        """Within the limits; a stop where there is no answer."""
+        """Limit the set point; stop on an invalid answer."""
         got = self._answer(self.drive.set_point, speed, turn_rate)
         if got is None:
             return 0.0, 0.0
@@ -170,7 +170,7 @@ class GuardedDrive(Guard, Drive):
     def accelerations(
         self, speed: float, turn_rate: float, now_speed: float, now_turn_rate: float, dt: float
     ) -> tuple[float, float]:
-        """Within the limits, and no faster than they allow; brakes where there is no answer."""
+        """Limit the accelerations; brake on an invalid answer."""
         spec, given = self.spec, (speed, turn_rate, now_speed, now_turn_rate, dt)
         got = self._answer(self.drive.accelerations, *given)
         along, turn = got or (-now_speed / dt, -now_turn_rate / dt)
@@ -187,7 +187,7 @@ class GuardedDrive(Guard, Drive):
     def _judge_motion(
         self, along: float, turn: float, now_speed: float, now_turn_rate: float, dt: float
     ) -> None:
-        """Check the result of a tick; braking after a push beyond a limit is no fault."""
+        """Check the result of a tick; braking after a push beyond a limit is allowed."""
         spec, most = self.spec, self.spec.max_turn_acceleration
         speed = now_speed + dt * _within(along, -spec.max_deceleration, spec.max_acceleration)
         turn_rate = now_turn_rate + dt * _within(turn, -most, most)
@@ -285,7 +285,7 @@ def load_drive(
 
     Raises:
         ConfigError: there is none of that name, its file or package cannot be loaded, or it is
-            not a drive; a bad option is told when it is made.
+            not a drive; a bad option is reported when it is made.
     """
     if isinstance(name, str) and name in DRIVES and not options:
         return DRIVES[name]

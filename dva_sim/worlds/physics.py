@@ -79,7 +79,7 @@ class PersonBody(Body):
         self._circle.unsafe_set_radius(radius)
 
     def push(self, tick: int, dt: float) -> bool:
-        """Apply the force of the legs for one tick; False if the person stands and shall stand."""
+        """Apply the force of the legs for one tick; False if the person stands as requested."""
         wx, wy = self._asked.at(tick)
         vx, vy = self.velocity
         if wx == wy == 0.0 and abs(vx) + abs(vy) < AT_REST:

@@ -64,7 +64,7 @@ class Planner:
                 map, some hundredths of a second: ask only when blocked.
 
         Returns:
-            Points about `STEP` apart, shape `(n, 2)`, or None if there is no way.
+            Points about `STEP` apart, shape `(n, 2)`, or None if no path exists.
         """
         roadmap = self._roadmap.around(tuple(avoid)) if avoid else self._roadmap
         way = roadmap.way(_plain(start), _plain(goal))

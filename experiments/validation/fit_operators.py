@@ -4,7 +4,7 @@
 
 Free are the traits in FREE, between their ends. The rule is fixed beforehand: POINTS sets of
 medians fill that box evenly (Latin hypercube, on a logarithmic scale); as many MORE fill a smaller
-box around the best of them. The smallest of so many noisy losses is small by luck as well, so it
+box around the best of them. The smallest of so many noisy losses is small by chance as well, so it
 decides nothing: the FINALISTS with the smallest are played again by AGAIN other groups of persons,
 the same for each of them. Taken is the one with the smallest mean loss over these; its loss in the
 search is not among them. A trait's band reaches over all finalists whose mean loss is within ERRORS

@@ -5,8 +5,8 @@
     meter.py --only WORD          cases whose name has the word, such as drive or start-up
 
 Both versions are measured by this list of cases and by the same interpreter. A case that one of
-them cannot do is told as such. Under callgrind a command's start and the report are counted only
-where --only names them, since that takes minutes; their CPU time is always there.
+them cannot do is reported as such. Under callgrind a command's start and the report are counted
+only where --only names them, since that takes minutes; their CPU time is always there.
 """
 
 from __future__ import annotations

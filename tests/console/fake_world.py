@@ -1,7 +1,7 @@
 """A world that is not one, for work on the pages: `python tests/console/fake_world.py --no-token`.
 
 It runs the web process as its child, moves invented robots over a real site, grows invented
-hazards, paints numbers instead of camera pictures, and obeys whoever takes control, roughly.
+hazards, paints numbers instead of camera pictures, and roughly obeys anyone who takes control.
 """
 
 from __future__ import annotations

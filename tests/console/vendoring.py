@@ -4,7 +4,7 @@
 
 Needs node and npm, which neither the program nor its other tests do. `vendor.toml` says what;
 a tarball or a written file that differs from its hash there is refused. After a change of version,
-`--accept` notes the hashes of the written files anew.
+`--accept` notes the new hashes of the written files.
 """
 
 import hashlib

@@ -171,7 +171,7 @@ def test_levels_at_which_nothing_differs_neither_widen_the_band_nor_break_it(stu
 def pairs_and_what_is_known(persons, n, rng):
     """Skewed differences of 8 s, by a trait of the person and the way of its only trial.
 
-    Who has more of the trait loses less on long ways; on these luck weighs more.
+    Who has more of the trait loses less on long ways; on these chance weighs more.
     """
     trait, way = rng.normal(size=(2, persons, n))
     luck = (1 + 0.3 * abs(way)) * (rng.lognormal(0, 0.5, (persons, n)) - np.exp(0.125))

@@ -1,7 +1,7 @@
 """A control room: what it knows of the events, and what people there ask of the DVA.
 
-Everything goes by messages, as from anybody's console: whoever has the agent sends bodies of
-`protocol/control_room.py` by `ask`, and is told by callbacks of what the DVA publishes.
+All control goes by messages, as from any console: the owner of the agent sends bodies of
+`protocol/control_room.py` by `ask`; callbacks deliver the DVA's publications.
 """
 
 from __future__ import annotations

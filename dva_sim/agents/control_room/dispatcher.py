@@ -42,7 +42,7 @@ class ScriptedDispatcher:
     Args:
         room: Control room that it sees and acts by.
         profile: Working habits.
-        luck: A random stream by name: each delay and each whim has its own.
+        luck: Random stream by name; each delay and each whim has its own.
     """
 
     def __init__(

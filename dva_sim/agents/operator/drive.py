@@ -305,7 +305,7 @@ class Teleoperation(Work):
     # --- steering ----------------------------------------------------------------------
 
     def _way(self, seen: Observation) -> Route | None:
-        """The way to the goal, for the strategy; planned anew when the robot does not get on."""
+        """Route to the goal for the strategy; planned again when the robot makes no progress."""
         if self._is_stuck(seen):
             self._route = self._lent = self._asked_since = None
             self._let_go_until = self._clock.now + self._stuck.lets_go_s

@@ -397,7 +397,7 @@ class HeldRobot:
         return goes_on
 
     def _lost(self, why: str) -> None:
-        """Nobody answers: whatever still gets through shall stop the robot."""
+        """Nobody replies: stop the robot by every path that may still work."""
         self.end("lost link")
         self._alert(f"{self.label}: link lost: {why}")
         self.device.ask(self.robot, m.Emergency(), session=self.session)

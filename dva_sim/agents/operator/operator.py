@@ -58,7 +58,7 @@ class OperatorAgent:
         return f"{verb} {self.device.label_of(work.robot)}"
 
     def put_down(self) -> None:
-        """Leave: what is going on ends here, and the robots are told to stop."""
+        """Leave: end all current work and stop the robots."""
         self._waiting.clear()
         for work in list(self.works.values()):
             work.end("gave up", "the operator leaves")

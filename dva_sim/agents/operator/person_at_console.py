@@ -132,7 +132,7 @@ class PersonAgent:
         self._each(lambda held, each: held.stop("stopped", each), said)
 
     def emergency(self, robots: Sequence[str], said: Said) -> None:
-        """Stop robots at once, whoever drives them."""
+        """Stop robots at once, regardless of their drivers."""
         answers = Gathered(len(robots), said)
         for robot in robots:
             held = self.robots.get(robot)
@@ -234,7 +234,7 @@ class PersonAgent:
             self.device.progress(held.event, "departed")
 
     def _decline_alone(self, order: m.Order) -> None:
-        """Nobody sits here: others shall go."""
+        """Decline the order, as nobody sits here."""
         if self.order is order and not self.attended:
             self.device.tell(f"declines event {order.event_id}: nobody sits here", "order")
             self._put_down("declined")

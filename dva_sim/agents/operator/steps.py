@@ -1,6 +1,6 @@
 """Steps of driving a robot, for persons and simulated operators: picture, start, release.
 
-Pure of any judgement: each step says how it went, and whoever takes it decides what follows.
+Each step only reports its result; the caller decides what follows.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ def give_back_unanswered(
 
 
 def ask_emergency(device: AgentDevice, robot: str, session: int, said: Said) -> None:
-    """Send a robot an emergency, which it obeys whoever sends it."""
+    """Send a robot an emergency, which it obeys from any sender."""
     label = device.label_of(robot)
     device.ask(
         robot,

@@ -12,7 +12,7 @@ What one does, as its `activity` tells:
 - **safe**: out.
 - **incapacitated**: it stays where it is, for everybody else to walk around.
 
-Bystanders have no device: nobody is told of them but the recorder. They work at places drawn in
+Bystanders have no device: only the recorder knows of them. They work at places drawn in
 the rooms of a site (`draw_places`).
 """
 

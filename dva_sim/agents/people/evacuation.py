@@ -196,7 +196,7 @@ AirAt = Callable[[float, float, float], Conditions]
 
 
 def clean_air(x: float, y: float, time: float) -> Conditions:
-    """The air where there are no hazards."""
+    """Air without hazards."""
     return CLEAR
 
 

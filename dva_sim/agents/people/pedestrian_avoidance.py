@@ -231,7 +231,7 @@ def past(
     room: Callable[[Floats], Floats],
     sideways: float = USUAL.sideways_m,
 ) -> Point | None:
-    """Return the next step to squeeze past a robot, sideways [m]; None: there is no gap.
+    """Return the next step to squeeze past a robot, sideways [m]; None without a gap.
 
     First in front of the wider gap, then straight through it.
 

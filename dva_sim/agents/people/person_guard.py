@@ -252,7 +252,7 @@ class PersonGuard(OnFoot):
             self.device.clock.call_after(DECLINED_AFTER, self._decline_alone, errand.order)
 
     def _decline_alone(self, order: m.Order) -> None:
-        """Nobody sits here: others shall go."""
+        """Decline the order, as nobody plays the guard."""
         if self.order is order and not self.attended:
             self._give_back("declined", "nobody sits here")
 

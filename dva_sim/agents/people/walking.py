@@ -9,7 +9,7 @@ push towards:
   than the left, and slow down.
 - **In doors** one gives way, by its rules of doors.
 - **Held up by a robot**, one turns sideways and squeezes past, if there is a gap.
-- **Blocked**: who has come no nearer for some seconds looks for a way around whoever stands
+- **Blocked**: a person who gets no nearer for some seconds looks for a path around those who stand
   there, again and again at longer intervals; who has come no nearer for long says so, and
   it is for the agent to decide what then. So nobody is stuck for ever.
 - **At a crowded place** one is there as soon as others keep one from coming nearer.

@@ -1,6 +1,6 @@
 """A robot's computer: it takes one message at a time, each for its processing time.
 
-That time is always the same, or drawn from a distribution. Whoever holds the robot has every second
+That time is always the same, or drawn from a distribution. The robot's holder has every second
 turn, and all strangers together, however many, at most a fifth of the time while it is driven, if
 they can behind the holder's messages: what they take must not grow with their connections, which
 cost them nothing. An emergency waits for the one message that is being worked on, and one
@@ -89,7 +89,7 @@ LineOf = tuple[Hashable, bool]  # whose, and whether it is of commands
 class FairQueue:
     """A line for the control and one for the commands of each connection; lines have turns.
 
-    Whoever sends much waits for itself. A connection that is not the holder's has `EACH` places;
+    A busy sender delays only itself. A connection that is not the holder's has `EACH` places;
     where there is no room at all, the newest of the longest line makes some, strangers first.
 
     Args:

@@ -72,7 +72,7 @@ class Confirmations:
             clock.call_at(due, self._ask_again)
 
     def keep(self, letter: Letter, message: m.Message) -> bool:
-        """Let a message wait until the DVA has been asked; False if there is no room."""
+        """Queue a message until the DVA has answered; False if the queue is full."""
         of_peer = sum(one.letter.peer == letter.peer for one in self._waiting)
         if of_peer >= EACH or len(self._waiting) >= OTHERS:
             return False

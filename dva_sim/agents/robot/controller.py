@@ -205,7 +205,7 @@ class RobotController:
         return False
 
     def hang(self) -> None:
-        """Its computer hangs, and starts anew idle: an order that was under way is given up."""
+        """Hang the computer; it will restart idle, and the current order is dropped."""
         self._idle("its computer hung")
 
     def restart(self, clock_offset: float, now: float) -> None:
@@ -251,7 +251,7 @@ class RobotController:
 
         Args:
             who: Person, by the name under which the robot was taken.
-            speed: [m/s]; there is no reverse.
+            speed: [m/s]; not negative.
             turn_rate: [rad/s]
             now: Time [s].
         """
@@ -317,7 +317,7 @@ class RobotController:
     def _revoked(self, message: m.Message, body: m.PermissionRevocation) -> Decision:
         """A session is over, or is said to be: it ends at once, and the DVA may restore it.
 
-        Whoever forges this stops a drive, as an emergency would, and takes the robot from nobody.
+        A forged revocation stops a drive, as an emergency would, but takes the robot from nobody.
         """
         if message.source != self.dva:
             return Decision(m.NOT_PERMITTED, "only the DVA revokes permissions")
@@ -362,7 +362,7 @@ class RobotController:
         return Decision(m.OK, set_point=STAND)
 
     def _full(self, observer: str) -> Decision | None:
-        """Refuse one more observer if there is no room; the driver drives on."""
+        """Refuse one more observer if the limit is reached; the driver continues."""
         if observer in self.observers or len(self.observers) < MOST_OBSERVERS:
             return None
         return Decision(m.BUSY, f"{MOST_OBSERVERS} observers are all that this robot serves")

@@ -99,7 +99,7 @@ def replay(
         Each message, what was decided then, and what is decided now (reply contents left out).
 
     Raises:
-        ConfigError: the file cannot be read or is no trace, or its last line is not whole.
+        ConfigError: the file cannot be read or is not a trace, or its last line is not whole.
     """
     try:
         lines = path.read_bytes().splitlines() if lines is None else lines

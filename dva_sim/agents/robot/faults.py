@@ -75,7 +75,7 @@ class RobotFaults:
         self._robot.inbox.request(lost)
 
     def freeze(self, on: bool) -> None:
-        """Let its computer hang, or start anew: idle, in nobody's hand, with what was told last."""
+        """Hang its computer, or restart it: idle, without a driver, with the latest settings."""
         if on is self.frozen:
             return
         self.frozen, robot = on, self._robot

@@ -107,7 +107,7 @@ class MissionLoop:
         self._number = 0
 
     def begin(self, mission: Mission, frame: GeoFrame) -> None:
-        """Drive a mission until it ends, or the robot is told something else."""
+        """Drive a mission until it ends, or the robot gets another order."""
         body, around = self._around.body, self._around
         errand = MissionGoal.of(mission, frame.to_xy, self._base)
         pilot = Pilot(

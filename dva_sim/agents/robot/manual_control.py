@@ -57,7 +57,7 @@ class ManualControl:
         return decision
 
     def press_emergency(self) -> None:
-        """The button at the robot itself: it stands until somebody orders it anew."""
+        """Press the button at the robot itself: it stands until the next order."""
         robot, now = self._robot, self._robot.device.clock.now
         before = self._controller.mode
         decision = self._controller.press_emergency(now)

@@ -1,6 +1,6 @@
 """Missions: how a robot gets somewhere by itself, and what it does about who is in the way.
 
-Pure: it is told what the robot knows at a moment, and says how to move and how the mission stands.
+Pure: from what the robot knows at a moment it decides the motion and the state of the mission.
 The rules, in the order in which they are asked:
 
 1. A battery that is nearly empty ends any mission but the way home.
@@ -10,7 +10,7 @@ The rules, in the order in which they are asked:
 4. Where no lane is free it stops short. Who has to let the other one go first steps aside until the
    other has passed. Who is still blocked after `AROUND_AFTER` looks for a way around everybody in
    sight, now and then; beside people who do not move it squeezes past after `SQUEEZE_AFTER`;
-   after `GIVE_UP_AFTER` there is no way.
+   after `GIVE_UP_AFTER` it gives up.
 """
 
 from __future__ import annotations
@@ -304,7 +304,7 @@ class Pilot:
         return self._go_on_with(self._manoeuvre, seen)
 
     def _way_around(self, seen: Sensed) -> PilotStep | None:
-        """Plan anew with everybody in sight as part of the map."""
+        """Plan again with everybody in sight as part of the map."""
         self._looked_around, before = seen.now, self._closed
         self._closed = [Disc(o.x, o.y, o.radius + o.keep + AROUND) for o in seen.nearby]
         points = self._planner.path(seen.here, self._goal, self._closed)

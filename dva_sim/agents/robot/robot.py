@@ -229,7 +229,7 @@ class RobotAgent:
         return abs(self.body.turn_rate) > STANDING or abs(self.body.speed) > STANDING
 
     def hang(self) -> None:
-        """Its computer hangs: it hears and says nothing, and is idle when it starts anew.
+        """Hang the computer: it neither hears nor sends, and restarts idle.
 
         The motors keep what they were told last until its watchdog stops them; a mission, which the
         computer steers, stops at once.
@@ -400,7 +400,7 @@ class RobotAgent:
         return decision
 
     def _unable(self, body: m.Body) -> Decision | None:
-        """Return why the robot cannot do what it is asked, whoever asks; None if it can.
+        """Return why the robot cannot fulfil a request of any sender; None if it can.
 
         It obeys an emergency as far as it reaches the motors, and does not promise more.
         """
@@ -524,7 +524,7 @@ class RobotAgent:
     # --- what it does by itself --------------------------------------------------------
 
     def _take_frame(self) -> None:
-        """Film for whoever watches; a frame is left out while the last one still waits."""
+        """Send a frame to the viewers; skip it while the last one still waits."""
         network, me, size = self.device.network, self.device.id_tag, self._setup.frame_bytes
         if self.device.silent or self.blind or self._encoding or not network.ready(me, FRAME, size):
             return

@@ -1,10 +1,10 @@
 """Sensors of a robot: what they make of what is there, how they fail, and who has subscribed.
 
-A sensor samples at its own rate, whoever listens. Between the world and the value that is
+A sensor samples at its own rate for all subscribers. Between the world and the value that is
 published stand, in this order: a first-order lag, noise, the ends of its range, and its
 resolution. The noise of a sample is keyed by the sensor and the number of the sample: that
 somebody reads one sensor, or reads it more often, changes no other value. A sensor with a lag is
-switched on by whoever subscribes first, shows what is there at once, and follows from then on.
+switched on by the first subscriber, shows what is there at once, and follows from then on.
 
 A sensor that is *lost* gives nothing from then on; one that is *stuck* gives its last values
 for ever.
@@ -113,7 +113,7 @@ class SensorSubscriptions:
             del self._subscribed[key]
 
     def end_all(self) -> None:
-        """End all subscriptions, as whoever starts anew knows of none."""
+        """End all subscriptions, as after a restart."""
         self._subscribed.clear()
 
     def _forget_who_vanished(self, now: float) -> None:
@@ -264,7 +264,7 @@ class RobotSensor:
     Args:
         config: Properties of the sensor.
         source: True value at a time [s].
-        luck: Streams of its own, by what they are for.
+        luck: Random streams of its own, by purpose.
     """
 
     def __init__(self, config: SensorConfig, source: Source, luck: StreamsByName) -> None:
@@ -371,7 +371,7 @@ def make_ports(
     Args:
         configs: Sensors to make.
         sources: Sources of true values, by name.
-        luck: A new stream from its beginning, by name; the same name gives the same stream.
+        luck: Random stream from its beginning, by name; the same name gives the same stream.
 
     Raises:
         ConfigError: two sensors of one name.

@@ -1,4 +1,4 @@
-"""The accelerometer: from the angles of a phone to what its app is told, sample by sample."""
+"""The accelerometer: from the angles of a phone to the samples that its app gets."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ class Accelerometer:
         self.begin_session()
 
     def begin_session(self) -> None:
-        """The phone is taken into the hand anew: it is warmer or colder than when calibrated."""
+        """Begin a session: the phone is warmer or colder than when it was calibrated."""
         x, y, z = self._sessions.normal(0.0, self._warming, 3).tolist()
         self._x, self._y, self._z = self.offset[0] + x, self.offset[1] + y, self.offset[2] + z
 

@@ -1,7 +1,7 @@
 """The phone's app: samples of an accelerometer go in with their times, commands come out.
 
-Calibration -> filter -> mapping -> a rule for when something is sent. It is the same app whoever
-tilts the phone: a simulated hand, a person whose input is turned into tilt, or a real phone that
+Calibration -> filter -> mapping -> a rule for when something is sent. The app is the same for all
+who tilt the phone: a simulated hand, a person whose input is turned into tilt, or a real phone that
 tells what its own part measures.
 """
 

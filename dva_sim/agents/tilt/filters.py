@@ -1,7 +1,7 @@
 """Filters between the accelerometer and the command: one class each, shipped or a user's.
 
-All take samples one by one and are asked for a value when one is due. A filter is told the mean
-time between samples and nothing else: no clock, no luck.
+All take samples one by one and are asked for a value when one is due. A filter knows the mean
+time between samples and nothing else: no clock, no random numbers.
 """
 
 from __future__ import annotations
@@ -255,12 +255,13 @@ def load_filter(
     options: Mapping[str, Any] | None = None,
     base: Path | None = None,
 ) -> Callable[[float], Filter]:
-    """Return a factory for the filter of a name, which is told the mean time between samples [s].
+    """Return a factory for a named filter; it takes the mean time between samples [s].
 
     Arguments as of `Plugins.load`.
 
     Raises:
-        ConfigError: as `Plugins.load`; a bad `batch` or `age` of a user's is told when it is made.
+        ConfigError: as `Plugins.load`; a bad `batch` or `age` of a user's is reported when it is
+            made.
     """
     return PLUGINS.load(name, options, base)
 
@@ -281,7 +282,7 @@ def check_filter(filter_: Filter) -> None:
     """Refuse a filter with which a phone could not work.
 
     Raises:
-        ConfigError: its `batch` is neither None nor from 1 to 1000, or its `age` is no age.
+        ConfigError: its `batch` is neither None nor from 1 to 1000, or its `age` is invalid.
     """
     batch, age = filter_.batch, filter_.age
     if batch is not None and not (type(batch) is int and 1 <= batch <= MOST_BATCH):
@@ -299,7 +300,7 @@ def is_age(age: object) -> bool:
 class GuardedFilter(Guard, Filter):
     """A filter of a user; where it gives no answer, the reading is that of a phone at rest.
 
-    What it says after a sample that it did not take is no answer, either: it would be an old one.
+    Its value after a sample that it did not take does not count either: it would be an old one.
 
     Args:
         filter_: The user's own.

@@ -254,7 +254,7 @@ def load_mapping(
 
     Raises:
         ConfigError: there is none of that name, its file or package cannot be loaded, or it is
-            not a mapping; a bad option is told when it is made.
+            not a mapping; a bad option is reported when it is made.
     """
     return PLUGINS.load(name, options, base)
 

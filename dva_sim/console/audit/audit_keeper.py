@@ -1,6 +1,6 @@
 """Rows for the audit log, written by a thread of its own: the world waits for no disk.
 
-Whoever asked for an action is told that it is done when its row is on the disk. While no row can
+An action is reported as done once its row is on the disk. While no row can
 be written, nothing new is begun (an emergency stop always is), and what waits is tried again.
 """
 

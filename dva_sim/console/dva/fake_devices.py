@@ -1,7 +1,7 @@
 """Fake devices: registered by hand, on every list, and deaf to all messages.
 
 They register as others do, by messages, and register again before the DVA could miss them; nothing
-on the wire tells them from others. Nobody takes the requests to them, so that whoever asks one has
+on the wire tells them from others. Nobody takes the requests to them, so that a request ends in
 a time-out.
 """
 

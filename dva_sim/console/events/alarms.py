@@ -2,7 +2,7 @@
 
 An alarm is a condition that somebody has to act on, and whether somebody has said to have seen it.
 Both together are its state: unacknowledged, acknowledged, or returned (over, and nobody has seen
-it). What is over and seen is no alarm any more. Whoever cannot act now may shelve an alarm, always
+it). An alarm that is over and seen is removed. A person who cannot act now may shelve one, always
 with an end. There is one list, the gravest on top. In a flood, alarms of one kind and place are one
 row ("7 x fire, Corridor 2"), so that the list stays short enough to be read.
 

@@ -1,8 +1,8 @@
 """Taking a robot over by hand: from its holder, with what it was sent to, step by step.
 
 A supervisor's control room revokes the holder's session and calls the robot off; it is sent to the
-same event anew, to be driven by the person's own seat; and the seat asks for it, which succeeds
-once it stands. Where there is no seat, it is called off, and asked for otherwise. Each
+same event again, to be driven by the person's own seat; and the seat asks for it, which succeeds
+once it stands. Without a seat, it is recalled and requested again. Each
 step is a message, and the DVA may refuse any.
 """
 

@@ -1,6 +1,6 @@
 """The colours of the pages: those of the reports and films, in light and in dark.
 
-Colours mean "look here": idle robots and good links are grey, floors pale. Nothing is told by
+Colours mean "look here": idle robots and good links are grey, floors pale. Nothing is shown by
 colour alone; each mode, severity and state has a glyph and a word, too. This module writes
 `static/palette.css` (custom properties) and `static/js/palette.js` (the same for canvases):
 

@@ -1,7 +1,7 @@
 """Actions at a robot's windows: driving it by hand, and injecting faults.
 
 The page only says what it wants, again and again while something is held; the robot's controller
-decides. Whoever falls silent, hides the page or leaves it, asks for standstill by that.
+decides. A page that falls silent, is hidden or is left, so asks for standstill.
 """
 
 from __future__ import annotations

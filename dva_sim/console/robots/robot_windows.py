@@ -1,8 +1,8 @@
 """Windows of a robot: its motion, its driver, and the latency of its messages.
 
 A robot's own clock tells how old the picture was behind a command (`SeenTick`): from the robot to
-its driver and back. How long a message took one way is known where whoever sent it is a device of
-this process; no two clocks agree, so of others it is not.
+its driver and back. The one-way time of a message is known only if its sender is a device of
+this process, as no two clocks agree.
 """
 
 from __future__ import annotations

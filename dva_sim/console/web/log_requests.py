@@ -157,7 +157,7 @@ def archive(entries: Iterable[Entry], names: dict[str, str]) -> bytes:
     """Messages as files of an archive, and a table of them.
 
     Below `messages/` stands what is valid, so that `dva-sim check messages/*` finds no fault;
-    below `refused/` what is no message, as it came.
+    below `refused/` everything else, as received.
     """
     made = io.BytesIO()
     table = io.StringIO()

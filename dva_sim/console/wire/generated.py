@@ -3,7 +3,7 @@
     python -m dva_sim.console.wire.generated
 
 writes `static/js/declared.js` (how long an answer is waited for, and limits), `static/js/lines.js`
-(the types of all that pages are told).
+(the types of all lines sent to pages).
 """
 
 from __future__ import annotations

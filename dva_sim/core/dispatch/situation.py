@@ -90,13 +90,13 @@ class Situation:
         now: [s]
         tasks: Open tasks, longest detected first.
         responders: Available responders in order of registration: guards, then robots.
-        distance: Path length [m], shape `(tasks, responders)`; infinite where there is no way,
+        distance: Path length [m], shape `(tasks, responders)`; infinite where no path exists,
             or where the responder cannot do the task.
         eta: Expected time to arrival [s], same shape: mobilisation plus travel.
         preference: Place of each responder on the list of the event's zone, same shape, from 0;
             infinite if it is not on it. Empty if no lists are configured.
-        bids: Arrival that each responder has offered [s from now], same shape; nan where there
-            is no bid. Empty unless the policy `auctions`.
+        bids: Arrival that each responder has offered [s from now], same shape; nan without
+            a bid. Empty unless the policy `auctions`.
         operators: Number of robots that operators can take on; each robot sent takes one.
         cover: Waiting places for guards; None unless the policy `relocates`.
     """

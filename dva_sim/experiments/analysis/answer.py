@@ -37,7 +37,7 @@ class Finding:
         factor: Factor whose levels `first` and `second` are compared.
         over: Factor along which the difference is followed, with its `levels` `(k,)`.
         within: Levels of the other factors.
-        mean: First minus second, at each level `(k,)`; nan where there is no pair.
+        mean: First minus second, at each level `(k,)`; nan without pairs.
         low: Lower edge of the simultaneous 95 % band `(k,)`; nan if none can be given.
         high: Its upper edge `(k,)`.
         persons: Number of persons (clusters) behind the band.

@@ -44,7 +44,7 @@ def _effect(f: Finding) -> str:
 def _size(f: Finding, stop: int) -> str:
     """`A takes 4.5 s longer than B at a one-way delay of 1 s (95 % band 3.0 to 6.0 s)`.
 
-    Of `4.5 s less` the band is told as `3.0 to 6.0 s`, too.
+    The band of `4.5 s less` is given as `3.0 to 6.0 s`.
     """
     side = -1 if f.mean[stop] < 0 else 1
     low, high = sorted((side * float(f.low[stop]), side * float(f.high[stop])))

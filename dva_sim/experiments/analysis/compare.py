@@ -1,8 +1,8 @@
 """Two results folders side by side: what changed, cell by cell, and how sure that is.
 
-Where both ran the same person and trial on the same seed, runs are compared in pairs: what luck
-does to both cancels. Otherwise persons of the one are compared with persons of the other. A
-difference is always the second folder minus the first.
+Where both ran the same person and trial on the same seed, runs are compared in pairs: random
+effects common to both cancel. Otherwise persons of the one are compared with persons of the other.
+A difference is always the second folder minus the first.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Comparison(MatchedResults):
     def changed(self) -> tuple[list[str], int]:
         """Measures that are not the same in every pair of runs, and how many there are in all.
 
-        None where no run of both has the same luck.
+        None if no runs have the same random numbers.
         """
         names = self.columns.get("runs", [])
         return [name for name in names if self._is_changed(name)], len(names)

@@ -63,7 +63,7 @@ class KeptEpisode:
         incidents: Kind, start [s] and place [m] of each, where a recording tells them.
         kept: Number of kept runs to choose from.
         rank: Share of all runs with a smaller value.
-        span: Part of the run that the measure spans; None if it is no duration, or never ended.
+        span: Part of the run that the measure spans; None if it is not a duration, or never ended.
     """
 
     setting: Setting

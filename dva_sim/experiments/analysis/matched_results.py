@@ -117,7 +117,7 @@ class MatchedResults:
     def rows(self, side: int, table: str, column: str, group: GateGroup) -> Rows:
         """The values of a column in some cells of the first (0) or second (1) folder.
 
-        Where both have runs with the same luck, only those are looked at. The cells bear the
+        Where both have runs with the same random numbers, only these are used. The cells bear the
         numbers of the first folder, so that runs can be paired.
         """
         rows, shared = self.own_rows(side, table, column, group), self.shared(group)

@@ -69,7 +69,7 @@ class IntervalLaw:
     def power(self, effect: float, persons: int) -> float:
         """The chance that the interval of so many lies beyond zero if the true mean is `effect`.
 
-        Beyond zero means on the side of the effect; the other side is no success.
+        Beyond zero means on the side of the effect; the other side does not count.
 
         Raises:
             ValueError: fewer than two persons.

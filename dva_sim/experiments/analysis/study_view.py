@@ -78,7 +78,7 @@ class StudyView:
     def panels(self) -> list[Setting]:
         """Settings of all other factors, the last fastest; of each, the answer's level first.
 
-        Settings that the design leaves out are no panels.
+        Settings that the design leaves out have no panel.
         """
         names = [f.name for f in (self.line, self.over) if f]
         every = list(self.part.settings(but=names))

@@ -1,6 +1,6 @@
 """Journal of a running study: one row per run, safe against a kill.
 
-From it a study is gone on with, and shown while it still runs.
+Used to resume a study and to show progress while it runs.
 """
 
 from __future__ import annotations

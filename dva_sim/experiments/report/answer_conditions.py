@@ -1,7 +1,7 @@
 """Conditions of an answer, beside its numbers: the persons, the settings, the delays.
 
 A number can be reproducible to the last digit and still hang on what was assumed. So each of
-these is told beside the answer, with what was measured of it in the same study.
+these is stated beside the answer, with its measurements from the same study.
 """
 
 from __future__ import annotations

@@ -78,7 +78,7 @@ def cell_table(
         support: Coverage by published data, which marks extrapolations.
         possible: Least and greatest value of the measure.
         is_listed: True if the design lists its cells, so that those without a run do not exist.
-        points: Factors that are no axes, whose values are shown for each cell.
+        points: Factors other than axes, whose values are shown for each cell.
     """
     settings = list(part.settings())
     columns: list[_Column | None] = [_value(part, name) for name in points]

@@ -1,6 +1,6 @@
 """One run of a scenario as somebody asks for it: changed, played, drawn and kept.
 
-Nothing is printed here; what was written is told in lines.
+Nothing is printed here; functions return lines about the files written.
 """
 
 from __future__ import annotations

@@ -182,7 +182,7 @@ def read(file: Path) -> KeptAnswer:
     """Read an answer.
 
     Raises:
-        ConfigError: the file cannot be read, or is no answer.
+        ConfigError: the file cannot be read, or is not an answer.
     """
     try:
         data = json.loads(file.read_text(encoding="utf-8"))

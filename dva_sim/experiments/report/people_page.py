@@ -1,6 +1,6 @@
 """The page of a run in which people drove: their drives, one by one; nothing is tested.
 
-There is no contrast, and one run is no sample: what people did is shown by person, messaging
+Without a contrast, and with only one run, actions of people are shown by person, messaging
 pattern and link, and never averaged over them.
 """
 

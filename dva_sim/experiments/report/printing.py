@@ -34,7 +34,7 @@ def print_page(page: Path, to: Path) -> None:
         to: The PDF.
 
     Raises:
-        DvaSimError: there is no browser, or it printed nothing.
+        DvaSimError: no browser was found, or it printed nothing.
     """
     program = browser()
     if program is None:

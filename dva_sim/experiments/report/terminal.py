@@ -1,6 +1,6 @@
 """Results as a terminal shows them: the answer and every cell, a table, or what columns mean.
 
-Whoever has a console prints here: `dva-sim show`, and `dva_sim.show` of a program.
+Used by the command `dva-sim show`, and by programs as `dva_sim.show`.
 """
 
 from __future__ import annotations

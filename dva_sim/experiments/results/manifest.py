@@ -126,7 +126,7 @@ def status_of(manifest: Mapping[str, Any]) -> Status:
     """Status of the results; judged from the settings if the manifest states none.
 
     A confirmation has all the runs that were registered. Runs that took too long are others on
-    another machine. Verdicts are replaced whenever they are told, by the program as it is then.
+    another machine. The current program computes the verdicts again whenever they are shown.
     """
     if "status" in manifest:
         status = Status.model_validate(manifest["status"])

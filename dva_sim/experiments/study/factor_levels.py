@@ -1,12 +1,12 @@
 """The level of every factor in every cell of a study, and how many cells and runs that makes.
 
 A design makes rows, each with a level for some of the factors. All other factors cross them: every
-row meets every combination of their levels. Without a design there are no rows, and the cells are
+row meets every combination of their levels. Without a design there are zero rows, and the cells are
 the full grid.
 
 The answer's contrast is repeated under other models of persons: each strategy with the usual
 parameters (set 0) and with sets drawn from the bands within which calibration leaves them open.
-Repeats share persons and luck with the study's own runs, so that nothing but the model differs.
+Repeats share persons and random numbers with the study's runs, so that only the model differs.
 """
 
 from __future__ import annotations

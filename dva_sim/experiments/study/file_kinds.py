@@ -1,6 +1,6 @@
 """Kinds of YAML files, told by their keys and folders; studies opened by name.
 
-A file of another kind than the one that is asked for is told what it is, and which command takes
+The error for a file of the wrong kind says what it is, and which command takes
 it. Files of evidence are known above (`testing/file_kinds.py`).
 """
 

@@ -1,7 +1,7 @@
 """Registration: what a confirmatory run will be, fixed before anything of it is run.
 
-The hash of all that is fixed gives the run its seed. So its persons and its luck are others than
-in any run before, and a study that is changed and registered anew meets others again.
+The hash of all that is fixed gives the run its seed. So it uses different persons and random
+numbers from any earlier run, and a study that is changed and registered again gets new ones.
 """
 
 from __future__ import annotations

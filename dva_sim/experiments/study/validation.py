@@ -191,7 +191,7 @@ def of_claims(study: Study) -> Iterator[Problem]:
 def kept_claims(study: Study) -> Study:
     """The study without what was declared about parts, factors or levels that are gone.
 
-    Predictions stay: of each is told that it was not run.
+    Predictions stay; each is reported as not run.
     """
     lost: dict[str, object] = {}
     lost["map"] = _kept_map(study)

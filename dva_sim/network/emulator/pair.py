@@ -63,7 +63,7 @@ def run_pair(
         published: Listening sockets of this machine, led to the same ports of the near end.
 
     Raises:
-        EmulatorError: there is no shell.
+        EmulatorError: no shell was found.
         LinkEnded: the link has ended by itself; so have both commands.
     """
     if shutil.which("sh") is None:

@@ -36,7 +36,7 @@ Wobble = Callable[[float], float]
 
 
 def by_quantile(quantile: Quantile, luck: UniformNumbers) -> Wobble:
-    """Any law: the deviation [s] that is not exceeded with the probability that luck gives."""
+    """Draw from any law: the quantile of the deviation [s] at a random probability."""
     return lambda now: quantile(luck.draw(now))
 
 
@@ -53,7 +53,7 @@ class ConstantDelay(Config):
         return delay, 0.0
 
     def play(self, delay: float, streams: Streams, name: str, make: MakeNumbers) -> None:
-        """See `_Law`: there is no deviation."""
+        """No deviation; see `_Law`."""
 
 
 class _Law(Config):
@@ -84,7 +84,7 @@ class _Law(Config):
         """Deviations from `delay_s` [s] by probability."""
 
     def play(self, delay: float, streams: Streams, name: str, make: MakeNumbers) -> Wobble:
-        """Deviations from `delay_s` [s], with luck of that name.
+        """Deviations from `delay_s` [s], from the random stream of that name.
 
         Args:
             delay: The link's `delay_s` [s].

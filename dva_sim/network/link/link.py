@@ -1,8 +1,8 @@
 """One direction of a link: drop-tail queue, serialisation, loss, delay.
 
 A packet's fate is known when it is sent, because the queue is first-in-first-out:
-no event is spent inside the link. Luck is a function of virtual time, so that two
-patterns that send at different moments still meet the same weather. A link may end in a last hop
+no event is spent inside the link. Random draws are keyed by virtual time, so that two
+patterns that send at different moments still meet the same conditions. A link may end in a last hop
 through the air, whose quality depends on the place, and a partition may keep two nodes apart.
 """
 
@@ -324,7 +324,7 @@ class Reception(Protocol):
 
     @property
     def loss(self) -> float:
-        """Probability that a packet is lost, each way; 1: there is no reception."""
+        """Probability that a packet is lost, each way; 1 without reception."""
 
     @property
     def rate_bps(self) -> float:

@@ -78,12 +78,12 @@ class Bursts(Config):
 
 
 def chance(loss: float, luck: UniformNumbers) -> Fate:
-    """Every packet by itself, with a probability; luck gives each its number."""
+    """Independent losses with a fixed probability; one random number per packet."""
     return lambda now, left_at: luck.draw(now) < loss
 
 
 def timed_bursts(spells: Spells, loss: float, luck: UniformNumbers) -> Fate:
-    """Packets sent in bad times, with the probability then; luck gives each its number."""
+    """Losses of packets sent in bad times, with the probability then."""
     return lambda now, left_at: spells.is_on(now) and luck.draw(now) < loss
 
 
@@ -97,7 +97,7 @@ def counted_bursts(
         share: Share of all packets that are in a burst.
         length: Mean length of a burst, in packets.
         loss: Probability in a burst.
-        luck: Gives each packet its number.
+        luck: Random number of each packet.
     """
     ends, begins = 1.0 / length, share / (1.0 - share) / length
     steps = _uniform(rng)

@@ -60,7 +60,7 @@ def read_trace(path: str) -> Floats:
 
 
 def columns_of(path: str) -> int:
-    """Count the words in the first line of a recorded link that is no comment; 0 without any."""
+    """Count the words in the first line of a recorded link, comments skipped; 0 without any."""
     lines = (text for _, text in _lines(path, "recorded link") if text[0] != "#")
     return len(re.split(r"[\s,;]+", next(lines, "").strip()))
 

@@ -45,7 +45,7 @@ class Replay:
 
 
 def period_of(log: DelayLog) -> float:
-    """After how long a log begins anew [s]: a typical step after its last probe."""
+    """Period after which a log repeats [s]: a typical step after its last probe."""
     steps = np.diff(log.times)
     return float(log.times[-1] - log.times[0] + np.median(steps[steps > 0]))
 

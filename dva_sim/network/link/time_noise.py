@@ -1,4 +1,4 @@
-"""Luck as a function of virtual time, so that whoever sends when meets the same weather.
+"""Random numbers keyed by virtual time, so that all senders meet the same conditions.
 
 Time only goes forward here: what was drawn for long ago is forgotten.
 """
@@ -35,7 +35,7 @@ MakeNumbers = Callable[[Streams, str], UniformNumbers]
 
 
 class Weather:
-    """Luck that is new in each millisecond, drawn in blocks when first looked at.
+    """Random numbers that are new in each millisecond, drawn in blocks on demand.
 
     Packets of the same millisecond have numbers of their own, which follow from that one.
 
@@ -103,7 +103,7 @@ def _scrambled(seed: float, count: int) -> float:
 
 
 class SlowWeather:
-    """Luck that changes slowly: packets sent close together have about the same.
+    """Random numbers that change slowly: packets sent close together get similar ones.
 
     An Ornstein-Uhlenbeck process, exact at each millisecond, seen through the normal law's
     distribution function. The correlation of the process at a distance `t` is exp(-t / time).

@@ -49,7 +49,7 @@ class Rendezvous:
 
 
 class TransportEnd(ABC):
-    """One end of a transport; it works in the thread of whoever calls it, or in its own."""
+    """One end of a transport; it works in the thread of its caller, or in its own."""
 
     @abstractmethod
     def send(self, data: bytes) -> bool:

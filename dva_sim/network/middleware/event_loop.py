@@ -18,7 +18,7 @@ _AGAIN: Final = 0.1  # between two attempts to connect [s]
 
 
 class LoopEnd(TransportEnd):
-    """Runs coroutines in the thread of whoever serves it."""
+    """Runs coroutines in the thread that serves it."""
 
     def __init__(self) -> None:
         self._loop = asyncio.new_event_loop()

@@ -222,7 +222,7 @@ class Alarm:
         self._timer.set(self._timeout_at)
 
     def delay_timeout(self, now: float) -> None:
-        """The first segment has just been sent again: its time-out begins anew."""
+        """Restart the time-out, as the first segment has just been sent again."""
         self._timeout_at = now + self.timeout()
 
     def watch(

@@ -1,6 +1,6 @@
 """Laws of rate: how often a datagram may be sent; small state machines without a clock.
 
-A law is told three things: the first round trip it may count on, that a round trip has passed
+A law gets three inputs: the first round trip it may count on, that a round trip has passed
 without loss, and that something was lost (once per round trip at most). It answers with the gap
 between two datagrams. A rate that nobody used says nothing about the network, so none grows
 further while the gap holds nothing back (RFC 7661 gives the reason, for TCP).

@@ -1,4 +1,4 @@
-"""One run on one map: the site, its hazards, everybody on it, what is told, and how it ended."""
+"""One run on one map: the site, its hazards, everybody on it, its story, and its outcome."""
 
 from __future__ import annotations
 

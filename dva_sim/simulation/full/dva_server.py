@@ -98,7 +98,7 @@ class DvaAgent:
         return not self.is_gone
 
     def close(self) -> None:
-        """End all sessions: nobody drives by a permission of a DVA that is no more."""
+        """End all sessions: permissions of a DVA that has ended are void."""
         self._carry_out(self.desk.close())
 
     def silence(self, silent: bool) -> None:
@@ -193,7 +193,7 @@ class DvaAgent:
             subscription.close()
 
     def _meet(self, device: m.Device) -> None:
-        """Listen to what a device publishes, anew when it has moved to another address.
+        """Subscribe to a device, again when its address has changed.
 
         Detectors only speak when they have something to report.
         """

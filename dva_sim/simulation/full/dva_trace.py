@@ -37,7 +37,7 @@ T = TypeVar("T", Reaction, list[Send])
 
 
 class TracedDva:
-    """A desk that is written down: whoever has it asks as if it were the desk itself.
+    """Recording wrapper of the DVA core with the same interface.
 
     Args:
         desk: Core that makes the decisions.

@@ -214,7 +214,7 @@ class EventLedger:
                     self._tells_holder(message.destination, reply.content)
 
     def _tells_holder(self, robot: str, told: m.Permission) -> None:
-        """A robot that is told who holds it now knows by that whose session is over."""
+        """Note that a robot informed of its new holder also knows that the old session is over."""
         for right in [right for right in self._untold if right.robot == robot]:
             if right.session != told.session and told.level != "sensors":
                 del self._untold[right]
@@ -385,11 +385,10 @@ class EventLedger:
     def _not_told(
         self, before: Iterable[Right], rights: Sequence[Right], now: float, works: bool
     ) -> Iterator[Broken]:
-        """Yield sessions that are over in the book, and whose end the robot is not told of.
+        """Yield sessions that are over in the book, and whose end the robot has not learnt.
 
-        Time in which the robot is not heard does not count, nor does that of a silenced DVA. Who
-        is given the same robot again, in another session, is told so by that; so is a robot that is
-        told who holds it now.
+        Time in which the robot is not heard does not count, nor does that of a silenced DVA. A
+        robot also learns of it by a new session for its holder, and from a report of its holder.
         """
         held = {(right.robot, right.holder) for right in rights}
         for right in before:
@@ -439,7 +438,7 @@ class EventLedger:
             yield "S6", f"event {event.number}: {self._name(debt.who)} {what} for {owed:.0f} s"
 
     def _look(self, event: Event, old: Seen | None, now: float) -> Seen:
-        """Waiting ends when somebody takes it up, and begins anew when it is confirmed."""
+        """Track waiting: it ends when somebody accepts the event, and restarts on confirmation."""
         found = FOUND.intersection((*event.times, event.state.value))
         old = old or Seen(found - FOUND, (), now, now)
         word, hands = self._word(event.number), _in_hand(event)

@@ -1,8 +1,8 @@
 """An audit of the safety rules from outside: what it can see itself, it believes nobody.
 
 It takes the facts of a run (`observations`): so it knows which permissions the DVA really gave,
-when a robot was told that one is over, and when an emergency reached it; how bodies move, and what
-motors are asked for; every command that a robot accepted, whoever sent it, and every hand that
+when a robot learnt that one is over, and when an emergency reached it; how bodies move, and what
+motors are asked for; every command that a robot accepted from any sender, and every hand that
 drove one at the robot itself. `CHECKED` says which rules it holds that against. Nothing of a run
 is asked for anything else, so that a recording can be judged as the run itself was.
 """
@@ -611,7 +611,7 @@ def _note_question(witness: Witness, question: m.Message | None, now: float) -> 
 
 
 def _learn_offset(witness: Witness, status: m.Message | None, now: float) -> None:
-    """A status shows the offset roughly: where it is not known, or the robot has started anew."""
+    """Take the rough offset from a status, if it is unknown or the robot has restarted."""
     if status is None or not isinstance(status.body, m.RobotStatus):
         return
     offset = now - status.body.tick / 1000

@@ -55,8 +55,8 @@ FLAMES_THROUGH = 8.0  # optical depth at which what shines is lost in smoke (T. 
 class TeamBuilder:
     """Makes who takes part, and puts them where they begin.
 
-    Whoever is to begin a given way from the event begins on the way to it from anywhere else on
-    the site, chosen by the run's seed: that way, cut off where so much of it is left.
+    A robot or guard with a given distance to the event begins on a path to it from elsewhere on
+    the site, chosen by the run's seed, at the point where that distance is left.
 
     Args:
         world: The physics.

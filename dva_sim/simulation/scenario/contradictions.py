@@ -1,7 +1,7 @@
 """Contradictions within a scenario, reported before it runs.
 
-A contradiction is no mistake: the scenario can be run, and somebody may want to see what happens.
-Each is one sentence that names the keys and says what would go together.
+A contradiction is not a mistake: the scenario can be run, and somebody may want to see what
+happens. Each is one sentence that names the keys and says what would go together.
 """
 
 from __future__ import annotations

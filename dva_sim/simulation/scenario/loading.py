@@ -141,7 +141,7 @@ def _pattern_key(problem: ConfigError) -> KeyPath:
 
 
 def _place(problem: ConfigError, part: str, key: str, options: str) -> KeyPath:
-    """The key that a problem is told at: the option that it speaks of, or the name."""
+    """Key for reporting a problem: the option that it mentions, or the name."""
     found = _OPTION.search(problem.problem)
     return (part, options, found[1]) if found else (part, key)
 

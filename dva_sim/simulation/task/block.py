@@ -33,7 +33,7 @@ FINE = 0.01  # resolution at which the delay is learnt from a cursor [s]
 def play(scenario: TaskScenario, seed: int, recording: RecordedDelays | None = None) -> list[Row]:
     """Do all trials; one row each, in order.
 
-    The luck of a trial is its own: it depends on seed, person and number alone, so that two
+    The random numbers of a trial depend on seed, person and number alone, so that two
     devices or delays meet the same noise.
 
     Args:

@@ -1,7 +1,7 @@
 """Controlled systems: cursors by place or by velocity, a slow arm, a vehicle.
 
 A vehicle is a unicycle that follows speed and turn rate with one time constant, as the drive of
-the robot does within its limits of acceleration; there is no contact, so that walls are crossed
+the robot does within its limits of acceleration; contacts are not modelled: walls are crossed
 and counted.
 """
 

@@ -2,7 +2,7 @@
 
 References:
     R. J. Snowden, O. J. Braddick: The temporal integration and resolution of velocity signals.
-    Vision Research 31, 1991 (the speed of what is seen for longer than about 100 ms is told apart
+    Vision Research 31, 1991 (speeds seen for longer than about 100 ms are discriminated
     no better).
     D. C. Burr: Temporal summation of moving images by the human visual system. Proc. R. Soc.
     Lond. B 211, 1981 (moving dots are summed over about 100 ms).

@@ -2,7 +2,7 @@
 
 **The bound of an event** is the response if the best unit for it stood idle at its base, or at a
 station, at the moment of the report: no queue, no limit of operators, nothing to wait for; with
-the event's own luck. No policy beats it with units that set out from a base or a station.
+the event's own random numbers. No policy beats it with units that set out from a base or a station.
 
 It is *not* a bound for who is out already: walking back, redirected on the way, or going on from
 one event to the next, one may be nearer than any base and needs no time to get ready. Nor where

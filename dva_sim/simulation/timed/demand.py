@@ -20,7 +20,7 @@ CALLERS = 32  # devices that report a stream's events in turn, where reports are
 
 
 class EventDraws:
-    """The luck of a stream's events, by their index.
+    """Random draws of a stream's events, by their index.
 
     Args:
         name: Name of the stream.

@@ -1,7 +1,7 @@
 """Random numbers with an index: draw number `k` is the same for every caller, at any time.
 
 Policies are compared on the same events. What befalls an event must therefore hang on its
-place in its stream, never on how often luck was drawn before. Draws are made in blocks, each
+place in its stream, never on the number of earlier draws. Draws are made in blocks, each
 from a random stream of its own, so that any of them can be made again.
 """
 
@@ -55,7 +55,7 @@ class Draws(Generic[T]):
 
 
 class Always(Draws[T]):
-    """No luck at all."""
+    """Constant in place of random draws."""
 
     def __init__(self, value: T) -> None:
         self._value = value

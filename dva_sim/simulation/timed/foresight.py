@@ -36,7 +36,7 @@ def oracle_for(scenario: TimedScenario, seed: int) -> OraclePolicy:
 
 
 def instance_of(shift: Shift, incidents: list[Incident]) -> Instance:
-    """A run's own luck, as the solver wants it."""
+    """Convert a run's random draws to an instance for the solver."""
     arrival = np.array(
         [
             [shift.mobilisation(u, i) + shift.trip(u, u.base, i.place) for u in shift.units]

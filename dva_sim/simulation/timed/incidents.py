@@ -13,7 +13,7 @@ from dva_sim.worlds.hazards import Hazard, make_hazard
 
 @dataclass(slots=True, eq=False)
 class Incident:
-    """One event of the world, with all the luck that is its own.
+    """One event of the world, with its own random draws.
 
     Attributes:
         stream: Number of its stream.

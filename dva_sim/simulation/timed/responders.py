@@ -44,7 +44,7 @@ class ShiftWorld(Protocol):
         """Return how long this unit takes this time to get ready [s]."""
 
     def trip(self, unit: Unit, start: Place, goal: Place) -> float:
-        """Time to get somewhere [s]; infinite if there is no way."""
+        """Time to get somewhere [s]; infinite if no path exists."""
 
     def look(self, unit: Unit, incident: Incident) -> float:
         """From arrival to being sure [s]."""
@@ -104,7 +104,7 @@ ROUNDING = 2e-6  # of the clock [s]
 
 
 class Unit:
-    """A guard, or a robot with whoever drives it.
+    """A guard, or a robot with its driver.
 
     Args:
         number: Among all units, from 0.

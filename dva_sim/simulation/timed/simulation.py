@@ -216,7 +216,7 @@ class Shift:
         self.terrain.remember(incident.place)
 
     def _noticed(self, incident: Incident) -> None:
-        """The first report; later ones and the withdrawal are luck of the event, too."""
+        """Handle the first report; draw later reports and the withdrawal by event."""
         luck = self.demand.luck[incident.stream]
         incident.noticed = self.clock.now
         self._report(incident, "caller")
@@ -370,7 +370,7 @@ class Shift:
         return self._drawn("mobilisation", unit.group.mobilisation, incident, unit.name)
 
     def trip(self, unit: Unit, start: Place, goal: Place) -> float:
-        """Time to get somewhere [s]; infinite if there is no way."""
+        """Time to get somewhere [s]; infinite if no path exists."""
         way = self.scenario.way
         if isinstance(way, str):
             return self.terrain.length(start, goal) / unit.speed
@@ -379,17 +379,17 @@ class Shift:
         return self._drawn("travel", way, goal.about, unit.name)
 
     def look(self, unit: Unit, incident: Incident) -> float:
-        """From arrival to being sure [s]: luck of the event, whoever looks."""
+        """Time from arrival to certainty [s]; random by event, the same for every responder."""
         law = self.scenario.demand[incident.stream].look or unit.group.look
         return self._drawn("look", law, incident)
 
     def act(self, unit: Unit, incident: Incident) -> float:
-        """Return how long it takes to contain it [s]; random by event, whoever does it."""
+        """Time to contain it [s]; random by event, the same for every responder."""
         law = self.scenario.demand[incident.stream].act or unit.group.act
         return self._drawn("act", law, incident)
 
     def _drawn(self, purpose: str, law: Law, incident: Occurrence, whose: str = "") -> float:
-        """Draws by the event's index; two laws for one purpose share their luck."""
+        """Draws by the event's index; two laws for one purpose share their random numbers."""
         key = purpose, incident.stream, whose, id(law)
         draws = self._luck.get(key)
         if draws is None:
@@ -425,7 +425,7 @@ class Shift:
             self.records[unit.number].exposure[stage] += seconds
 
     def moving(self, unit: Unit, moves: bool) -> None:
-        """A unit begins or ceases to move; the DVA is told of those it might call."""
+        """Note that a unit starts or stops moving; inform the DVA of units it might call."""
         if moves and (unit.job is None or self.desk.dispatcher.policy.preempts):
             self._moving[unit] = None
         else:

@@ -1,4 +1,4 @@
-"""A shift that halts whenever the DVA asks its policy, for whoever decides outside of it."""
+"""A shift that pauses whenever the DVA asks its policy, for external decisions."""
 
 from __future__ import annotations
 

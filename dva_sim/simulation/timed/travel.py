@@ -40,7 +40,7 @@ NUMBERED = 4096  # positions at one place before they repeat
 
 
 class Place:
-    """A place: x, y [m], as it is told in messages, and its zone (-1: none).
+    """A place: x, y [m], its form in messages, and its zone (-1: none).
 
     Attributes:
         fixed: The place that is there in every run, if there is one: ways to it are kept.

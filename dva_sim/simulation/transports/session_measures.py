@@ -222,7 +222,7 @@ def jain(rates: Sequence[float]) -> float:
 
 
 def _way_row(config: ContestConfig, contest: Contest, way: Any) -> Row:
-    """Rates and fairness in one direction; nan where there is no competitor."""
+    """Rates and fairness in one direction; nan without competitors."""
     per_byte, line = 8.0 / (contest.until - contest.since), config.bottleneck.rate_bps
     session = contest.session_bytes[way] * per_byte
     bulk = [took * per_byte for took in contest.bulk_bytes[way]]

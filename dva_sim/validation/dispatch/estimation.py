@@ -5,7 +5,7 @@ A run is cut into batches, long enough to be almost independent; a measure is a 
 
 **Control variates.** Some batches wait long because many came, or because looking took long.
 How many came and how long looking takes *on average* is known: it is in the scenario. So what
-is explained by the luck of the inputs can be taken off, and much smaller errors remain. The
+is explained by random inputs can be taken off, and much smaller errors remain. The
 weights come from regression, on *other* batches than the ones they are used on: what is taken
 off a batch has mean zero whatever the weights are, so nothing is biased. But a wrong *input*
 would be taken off too, and a control whose mean comes from a wrong formula would hide that it
@@ -15,11 +15,11 @@ estimate *without* controls has to agree as well.
 The controls are sums over batches whose mean is zero, whatever serves whom. First order: how many
 events came, how long looking and going took, against what the scenario says of their means. Second
 order: whether long services met short intervals *in a row*. The product of one service's surplus
-with the faded surplus of those before it has mean zero too, since each is drawn anew; where it is
-large, queues were longer than the averages explain. And a queue beside it: the same events at *one*
-server, as fast as all responders together. Its waits follow from the inputs alone, and their mean
-is known (Pollaczek and Khinchine; Cobham; G/M/1). Where there is one responder only, that server is
-5 % faster: an exact copy would leave nothing to be estimated.
+with the faded surplus of those before it has mean zero too, since each is drawn independently;
+where it is large, queues were longer than the averages explain. And a queue beside it: the same
+events at *one* server, as fast as all responders together. Its waits follow from the inputs alone,
+and their mean is known (Pollaczek and Khinchine; Cobham; G/M/1). Where there is one responder only,
+that server is 5 % faster: an exact copy would leave nothing to be estimated.
 
 References:
     S. S. Lavenberg & P. D. Welch, Manage. Sci. 27 (1981) 322-335 (control variates; external
@@ -195,7 +195,7 @@ def controls(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
 def inputs(batches: Batches, scenario: TimedScenario) -> dict[str, tuple[Floats, Floats]]:
     """Observed and expected inputs: number of events and looking times.
 
-    A control takes the luck of the inputs off; that the inputs are right must be seen apart:
+    A control removes the randomness of the inputs; the inputs themselves are checked separately:
     their means, and their shapes by one value of the Laplace transform. That is a mean of
     numbers between 0 and 1, so that even long tails leave it an honest error.
     """

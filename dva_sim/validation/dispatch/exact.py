@@ -1,6 +1,6 @@
 """Exact answers by name: one waiting line, units with preferences, priorities, ways in a square.
 
-Units that are told apart, each call with its own list of preferred units (the hypercube); a fixed
+Distinct units, each call with its own list of preferred units (the hypercube); a fixed
 number of machines that need somebody from time to time, such as robots and their operators; the
 more urgent first, but nobody is called back: class 1 is the most urgent, and measures are
 `wait_1_s`, `wait_2_s`, ... of the classes, `wait_s` of all, `utilisation`. In a square all sides

@@ -60,7 +60,7 @@ def play_all(
 ) -> dict[ModelRuns, list[Row]]:
     """The results of every run of some orders.
 
-    Run n of a condition has the same luck at every depth and whatever is left out.
+    Run n of a condition has the same random numbers at every depth and with every ablation.
 
     Args:
         seed: Random seed.

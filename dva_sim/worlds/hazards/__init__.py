@@ -68,7 +68,7 @@ def find_hazard(kind: str) -> type[Hazard]:
             name under which an installed package offers one (entry point, `dva_sim.hazards`).
 
     Raises:
-        ConfigError: there is none of that name, or it cannot be loaded, or is no hazard.
+        ConfigError: there is none of that name, or it cannot be loaded, or is not a hazard.
     """
     return cast(type[Hazard], PLUGINS.find(kind))
 

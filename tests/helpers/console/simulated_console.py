@@ -38,7 +38,7 @@ class Page:
 
     Args:
         measured: True to keep everything for tables.
-        changes: Changes of the scenario, with `__` for a dot; by default there are no bystanders.
+        changes: Changes of the scenario, with `__` for a dot; by default without bystanders.
     """
 
     def __init__(

@@ -1,7 +1,7 @@
 """The command line, called in this process: its words, what it prints, its exit code.
 
 To start a program takes a second or more of computing. Only one test of `test_command_line` does,
-and whoever needs a process that can be stopped: see `programs`.
+and for a process that can be stopped see `programs`.
 """
 
 import contextlib

@@ -1,7 +1,8 @@
 """Links without laws of delay and bursts: their numbers stay the same, bit by bit.
 
 The digests were recorded with the link of version 0.5.0 where nothing is left to chance; with
-loss or jitter they are of version 0.6.0, which gave packets of one millisecond luck of their own.
+loss or jitter they are of version 0.6.0, which gave packets of one millisecond random numbers of
+their own.
 """
 
 import hashlib

@@ -10,7 +10,7 @@ the longer the delay, the more of it is spent watching before acting again.
   those of `Pursuit`, for the delay with half of a correction and half of the period added.
 - It moves and waits where it likes that better: by the times that it expects, and by an unease at
   a late picture that is the person's own. Hardly anybody does under a short delay and nearly
-  everybody under a long one, and persons differ: in the mean over them there is no step.
+  everybody under a long one, and persons differ, so their mean has no step.
 - A command that is given for less time than the period at which commands get through may be lost,
   so no move is shorter than the period that the person has seen; `PeriodEstimate`.
 

@@ -126,7 +126,7 @@ class GuardedStrategy(Guard, Strategy):
         self.strategy = strategy
 
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
-        """Within the limits of the robot; it stands where there is no answer."""
+        """Limit the command to the robot's range; an invalid answer stops it."""
         speed, turn = self._answer(self.strategy.drive, route, view, stop_before) or (0.0, 0.0)
         most = self.reach.turn_rate
         speed = self._held("wants [m/s]", speed, 0.0, self.reach.speed)

@@ -69,7 +69,7 @@ def load_strategy(
 
     Raises:
         ConfigError: there is none of that name, its file or package cannot be loaded, or it is
-            not a strategy; a bad option is told when it is made.
+            not a strategy; a bad option is reported when it is made.
     """
     factory, given, word = PLUGINS.find(name, base), dict(options or {}), word_of(name)
 
@@ -87,7 +87,7 @@ def load_strategy(
 
 
 def _load_used(option: str, name: object, person: Person, reach: Reach) -> Strategy:
-    """The strategy that another one is told to use, by an option of that name.
+    """Strategy that another one uses, by an option of that name.
 
     Raises:
         ConfigError: it is none, or it sees nothing.

@@ -147,7 +147,7 @@ class Truth(Generic[S]):
 class Oracle:
     """`pursuit` with the true state and without delay: a reference, not a person.
 
-    It is no `Strategy`, as it sees nothing. Nothing derives from it: it alone is told the truth.
+    It is not a `Strategy`, as it sees nothing. It alone gets the true state; do not derive from it.
 
     Args:
         person: Gain, caution and pace.

@@ -88,7 +88,7 @@ class CellPrediction:
         levels: Its level of each factor.
         seeds: Random seeds of the study's runs.
         bands: By measure; none where the model says nothing.
-        why: Reason why there is no prediction.
+        why: Reason for not predicting it.
     """
 
     config: str

@@ -4,7 +4,7 @@ It happens in a fresh interpreter with one thread, told what to do by one line o
 `start`). Its standard input stays open as long as somebody waits for the answer: when it closes,
 the run ends. Each end is a process with a network of its own where packets are emulated. A
 namespace here has no name: it ends with its process, and the process ends with the one that
-started it. So nothing can be left behind, whoever is killed. `run_job` starts such a process, waits
+started it. So no kill leaves anything behind. `run_job` starts such a process, waits
 for its outcome, and says in one line why there is none.
 """
 

@@ -1,7 +1,7 @@
 """The operator and the robot as real pyzmq programs, and what they note while they run.
 
 The operator connects, the robot binds. A command is 400 bytes whose first eight are its number;
-a reply is 200 with the same number. Notes go to memory shared with whoever started a program:
+a reply is 200 with the same number. Notes go to memory shared with the parent process:
 noting costs about a microsecond, and the notes outlive it, which may be killed at any moment.
 Two more programs measure the link itself: they number datagrams and note when these leave and
 arrive.
