@@ -84,7 +84,7 @@ class Linear(Policy):
         self.weights = np.array(weights, dtype=np.float64)
 
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        """See `Policy`."""
+        """Assign responders to due tasks by the weighted features."""
         tasks, team = situation.tasks, situation.responders
         due = [t.due and t.engaged is None for t in tasks]
         if not any(due):

@@ -120,7 +120,7 @@ class _Line:
         return self._found
 
     def _nearest(self, last: _Place, x: float, y: float, reach: float) -> _Place:
-        """See `next_place`.
+        """Nearest place on the line; see `next_place`.
 
         The way along a route is no shorter than the straight one: who is so much farther from a
         place on it than from the nearest one need not look at what comes within as much behind it.

@@ -262,7 +262,7 @@ class ToldRun:
         self._contained[number] = when
 
     def _event(self, number: int, kind: str, at: list[float], state: str, *more: Any) -> None:
-        """See `event_facts`; facts that an earlier version did not record stay unknown."""
+        """Read an event; facts that an earlier version did not record stay unknown."""
         times, severity, sent = (*more, 0.0, {})[:3]
         event = Event(
             number, kind, Position(*at), severity, state=State(state), times=times, **sent

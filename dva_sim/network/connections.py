@@ -159,7 +159,7 @@ class _PlainEnd:
         """Nothing waits here: what a program cannot take is for it to drop."""
 
     def resume(self) -> None:
-        """See `pause`."""
+        """Nothing to resume; see `pause`."""
 
     def backlog_bytes(self, now: float) -> float:
         """Bytes that wait before the link [B]."""

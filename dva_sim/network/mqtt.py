@@ -436,7 +436,7 @@ class _Wire:
         self._node.wires[self._id] = self
 
     def send(self, tag: int, data: bytes) -> None:
-        """See `Wire`; a peer that nobody has introduced is not there."""
+        """Send a request; a peer that nobody has introduced cannot be reached."""
         self._network.note(self._node.name, data)
         if self._network.address(self._peer) is None:
             self._network.counters["not sent"] += 1
@@ -462,7 +462,7 @@ class _Wire:
 
 
 class _Subscription:
-    """See `Subscription`; what comes while it is paused waits here."""
+    """A subscription that queues publications while it is paused."""
 
     def __init__(
         self,

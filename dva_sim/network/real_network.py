@@ -55,7 +55,7 @@ class RealNetwork(ABC):
         self._addresses[node] = address
 
     def forget(self, node: str) -> None:
-        """See `Transport`; whoever still has a connection to it closes that first."""
+        """Forget a node's address. Close all connections to it first."""
         self._addresses.pop(node, None)
 
     def address(self, node: str) -> str | None:
@@ -91,26 +91,26 @@ class RealNetwork(ABC):
         """Close everything; what was sent last has a moment to leave."""
 
     def serve(self, node: str, service: Service) -> None:
-        """See `Transport`; the node must have joined."""
+        """Set the handler of a node's requests; the node must have joined."""
         self._services[node] = service
 
     @abstractmethod
     def connect(self, node: str, peer: str, on_reply: OnReply, pipelined: bool) -> Wire:
-        """See `Transport`."""
+        """Return a connection for requests from a node to a peer."""
 
     @abstractmethod
     def publish(self, node: str, topic: str, payload: Any, size: int) -> None:
-        """See `Transport`; what is not bytes packs itself into bytes."""
+        """Publish to all subscribers of a topic; a payload other than bytes packs itself."""
 
     @abstractmethod
     def ready(self, node: str, topic: str, size: int) -> bool:
-        """See `Transport`."""
+        """True if a topic has a subscriber, and a payload of this size need not wait."""
 
     @abstractmethod
     def subscribe(
         self, node: str, publisher: str, topic: str, handler: Callable[[Any], object]
     ) -> Subscription:
-        """See `Transport`."""
+        """Subscribe a node to a topic of a publisher."""
 
     def note(self, node: str, payload: Any, sent: bool = True) -> None:
         """Somebody may want to know what is said here."""

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 import zmq
+from typing_extensions import override
 
 from dva_sim.kernel.clock import US, Clock
 
@@ -263,8 +264,9 @@ class PacedClock(LiveClock):
             return self._base
         return self._base + round((time.monotonic_ns() // 1000 - self._since) * self._factor)
 
+    @override
     def _wait(self, end: float) -> None:
-        """See `LiveClock`; pulses have their turn between events and messages."""
+        # Pulses have their turn between events and messages.
         wait = LONGEST_WAIT
         if not self._halted:
             wait = (min(self.env.peek(), end) - self._real()) / US / self._factor
@@ -279,8 +281,9 @@ class PacedClock(LiveClock):
             if handler is not None:
                 handler()
 
+    @override
     def _catch_up(self, end: float) -> None:
-        """See `LiveClock`; whoever heeds the lag hears of it before what comes too late happens."""
+        # Those who watch the lag are notified before late events happen.
         env = self.env
         for _ in range(AT_ONCE):
             due = env.peek()

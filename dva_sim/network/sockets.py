@@ -96,8 +96,9 @@ class ReqWire(SocketWire):
         self._socket.setsockopt(zmq.REQ_CORRELATE, 1)
         self._tag = 0
 
+    @override
     def send(self, tag: int, data: bytes) -> None:
-        """See `Wire`; the last one sent must have been answered."""
+        # A REQ socket: the previous request must have been answered.
         self._tag = tag
         self._network.note(self._node, data)
         # It throws away what it still has to read before it sends: its file tells what comes.

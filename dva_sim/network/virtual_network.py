@@ -68,7 +68,7 @@ class VirtualNetwork:
         """See `Transport`: here everybody is found by name."""
 
     def forget(self, node: str) -> None:
-        """See `Transport`."""
+        """Forget a node."""
 
     def serve(self, node: str, service: Service) -> None:
         """Implement `Transport`."""
@@ -211,8 +211,9 @@ class VirtualWire(VirtualClient):
         self._waiting.append((tag, data))
         self._go_on()
 
+    @override
     def drop(self) -> None:
-        """See `VirtualClient`; what has not left the pipe goes over the next connection."""
+        # Messages still in the pipe go over the next connection.
         super().drop()
         self._is_open = False
         if isinstance(self.connection, ZmtpConnection):

@@ -116,8 +116,9 @@ class ReceivePipe(Pipe[T]):
 
     flow: Flow | None = None
 
+    @override
     def put(self, item: T) -> bool:
-        """See `Pipe`; a connection that cannot wait loses what comes while the pipe is full."""
+        # A connection that cannot wait loses what comes while the pipe is full.
         taken = super().put(item)
         if self.full and self.flow is not None:
             self.flow.pause()

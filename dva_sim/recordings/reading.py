@@ -116,8 +116,9 @@ class RecordedSurroundings(Surroundings):
     def contain(self, number: int, time: float) -> None:
         """See `Surroundings`: it was, and the file shows what came of it."""
 
+    @override
     def raster(self, what: str, time: float, cell: float = 0.25) -> Raster:
-        """See `Surroundings`; cells are as wide as they were recorded."""
+        # Cells are as wide as they were recorded.
         what = "smoke" if what == "layer" else what
         west, south, east, north = self._site.extent
         said = self._grids.get(what, ())

@@ -87,11 +87,11 @@ class RosbridgeServer:
         return int(self._listener.getsockname()[1])
 
     def tell(self, what: str) -> None:
-        """See `PeerHost`."""
+        """Add a line to the story."""
         self._tell(what)
 
     def now(self) -> float:
-        """See `PeerHost`."""
+        """Current time [s]."""
         return self._clock.now
 
     # --- connections ---------------------------------------------------------------------
@@ -190,12 +190,12 @@ class RosbridgeServer:
         return own | ROSAPI
 
     def type_of(self, topic: str) -> str | None:
-        """See `PeerHost`; of a robot that may still come, what it would be."""
+        """Message type of a topic; for a robot that may still come, its future type."""
         name, _, rest = topic.lstrip("/").partition("/")
         return SHARED.get(topic) or (TYPES.get(rest) if name else None)
 
     def subscribed(self, peer: RosPeer, topic: str) -> None:
-        """See `PeerHost`."""
+        """Handle a client's subscription to a topic."""
         self.changed()
         if topic == "/map":
             self._map = self._map or self._packed("/map", published.occupancy(self._site.grid))
@@ -248,7 +248,7 @@ class RosbridgeServer:
     # --- control -------------------------------------------------------------------------
 
     def command(self, peer: RosPeer, topic: str, speed: float, turn_rate: float) -> str:
-        """See `PeerHost`."""
+        """Drive a robot for a client; returns the reason if it is refused."""
         name, _, rest = topic.lstrip("/").partition("/")
         robot = self._gateway.robots.get(name)
         if rest != "cmd_vel" or robot is None:
@@ -258,7 +258,7 @@ class RosbridgeServer:
         return peer.driver.drive(robot.id_tag, speed, turn_rate)
 
     def call(self, peer: RosPeer, service: str, args: Any, answer: Answer) -> None:
-        """See `PeerHost`."""
+        """Call a service for a client."""
         if service in ROSAPI:
             values = self._rosapi(service, args if isinstance(args, dict) else {})
             answer(True, values)

@@ -132,11 +132,11 @@ class _Tap:
         self._answers, self._node = answers, node
 
     def serve(self, service: Service, request: Request) -> None:
-        """See `RequestTap`."""
+        """Serve a request, and watch for its reply."""
         service(self._answers.opened(self._node, request))
 
     def heard(self, publisher: str, payload: Any) -> None:
-        """See `RequestTap`."""
+        """Ignore publications."""
 
 
 def is_message(data: bytes) -> bool:

@@ -58,7 +58,7 @@ class Interference:
         self._past: dict[tuple[str, bool], deque[PassingMessage]] = {}
 
     def __call__(self, source: str, to: str, payload: Any, take: Take) -> None:
-        """See `VirtualNetwork.interference`."""
+        """Deliver, drop, delay or replace a message; see `VirtualNetwork.interference`."""
         passing = PassingMessage(source, to, payload, take)
         if isinstance(payload, bytes):
             kind = to, any(often in payload for often in BY_THE_DOZEN)

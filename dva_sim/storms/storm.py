@@ -239,7 +239,7 @@ class _Witness:
         self.sent, self.accepted, self.moves = storm.sent, storm.accepted, storm.moves
 
     def _nothing(self, *_: object) -> None:
-        """See `Observer`."""
+        """Ignore the observation."""
 
     delivered = by_hand = shows = deafened = slowed = _nothing
 

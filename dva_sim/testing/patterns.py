@@ -205,7 +205,7 @@ class TriedDrive:
     def request(
         self, command: Any, then: Callable[[bytes], object], failed: Callable[[], object]
     ) -> None:
-        """See `Line`; the app reads every answer."""
+        """Send a command as a request; the app reads every reply."""
 
         def answered(reply: bytes) -> None:
             if why := self._refusals.answered(self.code_of(reply), self.clock.now):

@@ -24,7 +24,7 @@ class FakeDva:
         self.fakes: list[dict[str, Any]] = []
 
     def server(self) -> dict[str, Any]:
-        """See `DvaPort.line`."""
+        """Line about the DVA's server, as from `DvaPort.line`."""
         address = f"192.168.0.2:{self.port}"
         return {"listens": self.listens, "address": address, "port": self.port, "modelled": True}
 
@@ -44,7 +44,7 @@ class FakeDva:
         return {"k": "log", "log": "dva", "lines": lines}
 
     def devices(self, robots: list[Any]) -> dict[str, Any]:
-        """See `DeviceRows`."""
+        """Rows of the table of devices, as from `DeviceRows`."""
         rows = [self.row(robot.label, ROBOT[:-2] + f"{n:02X}") for n, robot in enumerate(robots)]
         rows[0] |= {"holder": PHONE, "holder_label": HOSTILE, "level": "both", "ends_s": 90.0}
         return {"k": "devices", "devices": rows + self.fakes}

@@ -197,7 +197,7 @@ class CommandSender:
     def open_requests(
         self, window: int = 1, *, timeout: float | None = None, attempts: int | None = None
     ) -> None:
-        """See `Line`."""
+        """Connect to the robot's service; see `Line`."""
         self._requester = Requester(
             self._device.network,
             self._device.id_tag,
@@ -211,13 +211,13 @@ class CommandSender:
 
     @property
     def busy(self) -> bool:
-        """See `Line`."""
+        """True if a further request would have to wait."""
         return self._asking().busy
 
     def request(
         self, command: Made, then: Callable[[bytes], object], failed: Callable[[], object]
     ) -> None:
-        """See `Line`; once the drive is over nothing goes."""
+        """Send a command as a request; nothing is sent once the drive is over."""
         requester = self._asking()
         if not self._on:
             return
@@ -245,25 +245,25 @@ class CommandSender:
         return self._requester
 
     def publish(self, command: Made) -> None:
-        """See `Line`; once the drive is over nothing goes."""
+        """Publish a command; nothing is sent once the drive is over."""
         if self._on:
             data = encode(self._message(command))
             self._device.network.publish(self._device.id_tag, self._topic, data, len(data))
 
     def newest(self, command: Made) -> Made:
-        """See `Line`."""
+        """Return the phone's present command, if the app keeps sending; else the command itself."""
         return (self._make() or command) if self._phone.keeps_alive else command
 
     def supersede(self, command: Made) -> None:
-        """See `Line`."""
+        """Count a command that is not sent, since a newer one took its place."""
         self.drive.superseded += 1
 
     def code_of(self, reply: bytes) -> int | None:
-        """See `Line`."""
+        """Code in a reply; None if it cannot be read."""
         message = self._device.read(reply, self.drive.robot)
         return message.body.code if message and isinstance(message.body, Reply) else None
 
     def lost(self, why: str = "") -> None:
-        """See `Line`."""
+        """Alert, as nobody obeys any more, and end the drive."""
         self.drive.alerts += 1
         self._on_lost(why or "no answer and no picture")

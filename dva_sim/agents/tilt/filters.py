@@ -14,6 +14,8 @@ from numbers import Real
 from pathlib import Path
 from typing import Any, Final
 
+from typing_extensions import override
+
 from dva_sim.agents.tilt.calibration import NEUTRAL, Reading
 from dva_sim.kernel import options
 from dva_sim.kernel.errors import ConfigError
@@ -91,8 +93,8 @@ class BatchMedian(Filter):
         self._filled, self._taken, self._age = 0, 0, 0.0
         self._speed, self._turn, self._rise = [0.0] * slots, [0.0] * slots, [0.0] * slots
 
+    @override
     def add(self, sample: Reading) -> None:
-        """See `Filter`."""
         self._taken += 1
         if self._filled < self._slots:
             self._speed[self._filled], self._turn[self._filled] = sample
@@ -110,8 +112,8 @@ class BatchMedian(Filter):
         return median(self._speed), median(self._turn)
 
     @property
+    @override
     def age(self) -> float:
-        """See `Filter`; of the value that was taken last."""
         return self._age
 
 
@@ -143,20 +145,20 @@ class MovingMedian(Filter):
         self._speed: deque[float] = deque(maxlen=window)
         self._turn: deque[float] = deque(maxlen=window)
 
+    @override
     def add(self, sample: Reading) -> None:
-        """See `Filter`."""
         self._speed.append(sample[0])
         self._turn.append(sample[1])
 
+    @override
     def value(self) -> Reading:
-        """See `Filter`."""
         if not self._speed:
             return NEUTRAL
         return median(self._speed), median(self._turn)
 
     @property
+    @override
     def age(self) -> float:
-        """See `Filter`."""
         return 0.5 * (len(self._speed) - 1) if self._speed else 0.0
 
 
@@ -176,15 +178,15 @@ class OnePole(Filter):
         self._speed = self._turn = 0.0
         self._begun = False
 
+    @override
     def add(self, sample: Reading) -> None:
-        """See `Filter`."""
         keep = self._keep if self._begun else 0.0
         self._begun = True
         self._speed = sample[0] + (self._speed - sample[0]) * keep
         self._turn = sample[1] + (self._turn - sample[1]) * keep
 
+    @override
     def value(self) -> Reading:
-        """See `Filter`."""
         return self._speed, self._turn
 
     @property
@@ -200,12 +202,12 @@ class NoFilter(Filter):
         super().__init__(period)
         self._sample = NEUTRAL
 
+    @override
     def add(self, sample: Reading) -> None:
-        """See `Filter`."""
         self._sample = sample
 
+    @override
     def value(self) -> Reading:
-        """See `Filter`."""
         return self._sample
 
 
@@ -316,8 +318,8 @@ class GuardedFilter(Guard, Filter):
         self._filter, self.batch = filter_, filter_.batch
         self._took = True
 
+    @override
     def add(self, sample: Reading) -> None:
-        """See `Filter`."""
         try:
             self._filter.add(sample)
             self._took = True
@@ -325,13 +327,13 @@ class GuardedFilter(Guard, Filter):
             self._took = False
             self._count(said(error))
 
+    @override
     def value(self) -> Reading:
-        """See `Filter`."""
         return (self._answer(self._filter.value) if self._took else None) or NEUTRAL
 
     @property
+    @override
     def age(self) -> float:
-        """See `Filter`; what is no age is none."""
         try:
             age = self._filter.age
             if is_age(age):

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+from typing_extensions import override
+
 from dva_sim.agents.tilt.accelerometer import GRAVITY, Triple
 from dva_sim.agents.tilt.app import TIE, TiltApp, TiltCommand, calibrated
 from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL
@@ -47,8 +49,9 @@ class GivenTilt(TiltApp):
         self._wanted = limited(speed / SPEED_PER_LEVEL, math.degrees(turn_rate))
         self._tilt = self._tilted()
 
+    @override
     def look(self, now: float) -> TiltCommand | None:
-        """See `TiltApp`; of an ideal phone, what is wanted."""
+        # An ideal phone sends the desired command.
         if self._ideal:
             self.shown = self._wanted
             self._stems_from, self._captured = now, self._trail.asked

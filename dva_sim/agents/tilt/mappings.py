@@ -79,15 +79,15 @@ class AbsoluteMapping(Mapping):
         share = options.number("dead_zone", dead_zone, least=0, below=1)
         self._dead_level, self._dead_turn = share * LEVELS, share * MAX_TURN_DEG
 
+    @override
     def command(self, level: float, turn: float, dt: float) -> Reading:
-        """See `Mapping`."""
         return limited(
             self._speed_gain * outside(level, self._dead_level),
             self._gain * outside(turn, self._dead_turn),
         )
 
+    @override
     def tilt_for(self, wanted: Reading, shown: Reading, within: float) -> Reading:
-        """See `Mapping`; the display is not needed."""
         level = beyond(wanted[0] / self._speed_gain, self._dead_level)
         return level, beyond(wanted[1] / self._gain, self._dead_turn)
 
@@ -109,18 +109,18 @@ class DifferentialMapping(AbsoluteMapping):
         super().__init__(gain, speed_gain, dead_zone)
         self._turn = 0.0
 
+    @override
     def begin(self) -> None:
-        """See `Mapping`."""
         self._turn = 0.0
 
+    @override
     def command(self, level: float, turn: float, dt: float) -> Reading:
-        """See `Mapping`."""
         grown = self._turn + self._gain * outside(turn, self._dead_turn) * dt
         level, self._turn = limited(self._speed_gain * outside(level, self._dead_level), grown)
         return level, self._turn
 
+    @override
     def tilt_for(self, wanted: Reading, shown: Reading, within: float) -> Reading:
-        """See `Mapping`."""
         return super().tilt_for((wanted[0], (wanted[1] - shown[1]) / within), shown, within)
 
 
@@ -144,8 +144,9 @@ class LeakyMapping(DifferentialMapping):
         super().__init__(gain, speed_gain, dead_zone)
         self._leak = options.number("leak_s", leak_s, above=0)
 
+    @override
     def command(self, level: float, turn: float, dt: float) -> Reading:
-        """See `Mapping`; exact for a reading that stands for all of `dt`."""
+        # Exact for a reading that is constant over `dt`.
         keep = math.exp(-dt / self._leak)
         steady = self._gain * outside(turn, self._dead_turn) * self._leak
         grown = steady + (self._turn - steady) * keep
@@ -276,20 +277,23 @@ class GuardedMapping(Guard, Mapping):
         self._mapping = mapping
         self.integrates = bool(mapping.integrates)
 
+    @override
     def begin(self) -> None:
-        """See `Mapping`; failures are counted by drives."""
+        # Failures are counted by drive.
         self.failures, self.first_failure = 0, ""
         try:
             self._mapping.begin()
         except FAILURES as error:
             self._count(said(error))
 
+    @override
     def command(self, level: float, turn: float, dt: float) -> Reading:
-        """See `Mapping`; within the limits: who wants to stand may ask for less than nothing."""
+        # Limited, as a person who wants to stand may ask for less than zero.
         level, turn = self._answer(self._mapping.command, level, turn, dt) or NEUTRAL
         level = self._held("asks for level", max(level, 0.0), 0.0, LEVELS)
         return level, self._held("asks for [deg/s]", turn, -MAX_TURN_DEG, MAX_TURN_DEG)
 
+    @override
     def tilt_for(self, wanted: Reading, shown: Reading, within: float) -> Reading:
-        """See `Mapping`; the hand holds the phone at rest where it is told nothing."""
+        # Without an answer the hand holds the phone at rest.
         return self._answer(self._mapping.tilt_for, wanted, shown, within) or NEUTRAL

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from typing_extensions import override
+
 from dva_sim.agents.tilt.accelerometer import Triple
 from dva_sim.agents.tilt.app import TiltApp
 from dva_sim.agents.tilt.calibration import Reading
@@ -18,8 +20,9 @@ class MeasuredTilt(TiltApp):
     complete may not be, as its last samples are still on their way.
     """
 
+    @override
     def sample(self, at: float, acceleration: Triple) -> None:
-        """See `TiltApp`; what was taken before the drive began does not count in it."""
+        # Samples from before the drive do not count.
         if at >= self._sampled_at:
             self.followed(at)
             super().sample(at, acceleration)
@@ -28,6 +31,7 @@ class MeasuredTilt(TiltApp):
         """Return the calibrated reading of a sample, without limits: level, turn [deg/s]."""
         return self._app.reading(*acceleration)
 
+    @override
     def next_look(self, now: float, rate_hz: float) -> float:
-        """See `TiltApp`; never now."""
+        # A late batch is looked for again after `SOONEST`, not at once.
         return max(super().next_look(now, rate_hz), now + SOONEST)

@@ -13,6 +13,7 @@ from collections import deque
 from typing import Final
 
 import numpy as np
+from typing_extensions import override
 
 from dva_sim.agents.population import Person
 from dva_sim.agents.tilt.accelerometer import Accelerometer, load_part
@@ -138,8 +139,9 @@ class Phone(TiltApp):
         if not self._watches:
             self._aim = self._aim_at(self.shown)
 
+    @override
     def look(self, now: float) -> TiltCommand | None:
-        """See `TiltApp`; of an ideal phone, what is wanted."""
+        # An ideal phone sends the desired command.
         if self._ideal:
             self.shown = limited(*self._wanted)
             self._stems_from, self._captured = now, self._trail.asked

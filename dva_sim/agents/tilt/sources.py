@@ -42,19 +42,19 @@ class TiltSources:
         self.pick_up(0.0)
 
     def pick_up(self, now: float) -> None:
-        """See `TiltApp`."""
+        """Begin a drive."""
         self._measured.pick_up(now)
         self._given.pick_up(now)
 
     def sample(self, at: float, acceleration: Triple) -> None:
-        """See `TiltApp`."""
+        """Take a sample of the phone's part."""
         if self._acting is not self._measured and at - self._given_at > STICK_HOLDS:
             self._measured.pick_up(at)
             self._acting = self._measured
         self._measured.sample(at, acceleration)
 
     def ask(self, now: float, speed: float, turn_rate: float) -> None:
-        """See `GivenTilt`."""
+        """Take the position of a stick; see `GivenTilt`."""
         if self._acting is not self._given:
             self._given.pick_up(now)
             self._acting = self._given
@@ -66,11 +66,11 @@ class TiltSources:
         self._given_at = -math.inf
 
     def next_look(self, now: float, rate_hz: float) -> float:
-        """See `TiltApp`."""
+        """Time of the next look [s]."""
         return self._acting.next_look(now, rate_hz)
 
     def look(self, now: float) -> TiltCommand | None:
-        """See `TiltApp`."""
+        """Return a command, if one is to be sent now."""
         return self._acting.look(now)
 
     def reading(self, acceleration: Triple) -> Reading:
@@ -79,16 +79,16 @@ class TiltSources:
 
     @property
     def waits(self) -> bool:
-        """See `TiltApp`."""
+        """True if it sends from within the call that takes a sample; see `TiltApp`."""
         return self._acting.waits
 
     def hold(self) -> None:
-        """See `TiltApp`."""
+        """Hold the samples while a request is open."""
         self._measured.hold()
         self._given.hold()
 
     def release(self, now: float) -> None:
-        """See `TiltApp`."""
+        """Resume after the reply."""
         self._measured.release(now)
         self._given.release(now)
 
@@ -99,7 +99,7 @@ class TiltSources:
 
     @property
     def keeps_alive(self) -> bool:
-        """See `TiltApp`."""
+        """True if the newest value is sent at every chance, changed or not."""
         return self._acting.keeps_alive
 
     @property
@@ -109,10 +109,10 @@ class TiltSources:
 
     @property
     def samples(self) -> int:
-        """See `TiltApp`."""
+        """Number of samples in the batches of this drive."""
         return self._acting.samples
 
     @property
     def values(self) -> int:
-        """See `TiltApp`."""
+        """Number of batches."""
         return self._acting.values

@@ -13,7 +13,7 @@ from dva_sim.protocol import messages as m
 
 
 class ToldFacts:
-    """See `AlarmFacts`; of a robot's watchdog no message tells, but its silence can be heard.
+    """Alarm facts from messages alone; a robot's watchdog shows only as silence.
 
     Args:
         system: To which the console is attached.

@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final, Unpack
 
+from typing_extensions import override
+
 from dva_sim.console.asking.refusal import Said
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import AuditKeeper
@@ -62,8 +64,9 @@ class AttachedAudit(Audited):
         self._system = system
         self._asked: dict[str, AskedDecision] = {}  # by the id of the action
 
+    @override
     def answered(self, what: str, client: str, line: Asked, said: Said) -> Said:
-        """See `Audited`; a decision that was taken waits a moment for the DVA's record of it."""
+        # A decision waits a moment for the DVA's record of it.
         told = super().answered(what, client, line, said)
         if ACTIONS[what].audit is not Audit.DVA and what != "revoke":
             return told

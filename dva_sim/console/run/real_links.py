@@ -150,7 +150,7 @@ class ConsoleSockets:
         self._recorder.tell(self._clock.now, "console", line, "link")
 
     def join(self, kind: str, number: int) -> str:
-        """See `RealLinks`.
+        """Open the ports of a device; see `RealLinks`.
 
         Raises:
             NetworkError: a port that is taken, or a host that is not this machine.

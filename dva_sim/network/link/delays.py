@@ -187,21 +187,13 @@ class Empirical(_Law):
     def check(self, delay: float) -> None:
         """See `_Law`: any will do."""
 
+    @override
     def moments(self, delay: float) -> tuple[float, float]:
-        """See `_Law`.
-
-        Raises:
-            ConfigError: the file cannot be read.
-        """
         delays = self._delays()
         return delay + fmean(delays), pstdev(delays)
 
+    @override
     def quantile(self, delay: float) -> Quantile:
-        """See `_Law`.
-
-        Raises:
-            ConfigError: the file cannot be read.
-        """
         delays = sorted(self._delays())
         count = len(delays)
         return lambda u: delays[min(count - 1, int(u * count))]

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from math import inf
 
+from typing_extensions import override
+
 from dva_sim.network.tcp.parameters import TcpOptions
 
 MIN_WINDOW = 2.0  # ssthresh is never below two segments (RFC 5681, equation 4)
@@ -89,8 +91,9 @@ class Cubic(Reno):
         self._last = 0.0
         self._saved = 0
 
+    @override
     def reduce(self, now: float) -> float:
-        """See `Reno`; with fast convergence (RFC 9438, section 4.7)."""
+        # With fast convergence (RFC 9438, section 4.7).
         self._epoch, self._saved = -1.0, 0
         whole = float(int(self.window))
         falling = whole < self._peak

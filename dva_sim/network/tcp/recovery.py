@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from math import inf
 
+from typing_extensions import override
+
 from dva_sim.network.tcp.congestion import RateReduction, Reno
 from dva_sim.network.tcp.parameters import TcpOptions
 from dva_sim.network.tcp.retransmission_timer import SOONEST_S, RoundTrip
@@ -123,8 +125,8 @@ class ByCount(ByTime):
 
     __slots__ = ()
 
+    @override
     def detect(self, board: Scoreboard, now: float, recovering: bool) -> float:
-        """See `ByTime`; there is nothing to wait for."""
         later = board.sacked
         for sent in board.queue:
             if sent.sacked:

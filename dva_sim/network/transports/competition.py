@@ -134,8 +134,9 @@ class Passing(Serialiser):
         self.rate_bps, self._line = rate_bps, line
         self._seconds_per_byte, self._free_at = 8.0 / rate_bps, 0.0
 
+    @override
     def backlog_bytes(self, now: float) -> float:
-        """See `Serialiser`; packets without priority make way, so only these count."""
+        # Packets without priority make way, so only these count.
         return max(0.0, self._free_at - now) / self._seconds_per_byte
 
     @override

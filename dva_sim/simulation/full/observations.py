@@ -350,7 +350,7 @@ class FactLog:
         self._book = _BookDiff()
 
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:
-        """See `Observer`; an answer goes with how the robot moves, an order with the book."""
+        """Note a message: an answer with the robot's motion, an order with the book."""
         if isinstance(payload, bytes):
             if source in self._robots and b"<reply>" in payload:
                 self._note_motions(now, {source: self._look(source)})

@@ -110,7 +110,7 @@ class RealLinks(Protocol):
         """Open the sockets of a device by its kind and number: its address."""
 
     def time_of_day(self) -> tuple[float, bool]:
-        """See `AgentDevice`."""
+        """Start of the run [s since midnight], and True for exact timestamps."""
 
     def watch(self, listener: Listener) -> None:
         """Tell of each message that is sent or arrives."""

@@ -144,8 +144,9 @@ class PointGoal(ToTarget):
         since, wait = self._inside_since, self._task.dwell_s
         return inside and (self._task.selection == "first_entry" or now - (since or 0.0) >= wait)
 
+    @override
     def row(self, trial: CursorTrial) -> dict[str, Any]:
-        """See `Goal`; a trial that was given up counts with its horizon."""
+        # A trial that was given up counts with its horizon.
         from_movement = self._task.timed_from == "movement"
         begun = (trial.moved_at or 0.0) if from_movement else 0.0
         return {
@@ -187,20 +188,17 @@ class TrackGoal(ToTarget):
     def target(self, now: float) -> Pair:
         return (0.0 if self.stands else self._sum(now)), 0.0
 
+    @override
     def pushed(self, now: float, wanted: Velocity) -> Velocity:
-        """See `Goal`; what was told is kept, as the answer to the push."""
+        # The command is kept, as the answer to the push.
         self._told = wanted[0]
         return (wanted[0] + self._sum(now), wanted[1]) if self.stands else wanted
 
     def _sum(self, now: float) -> float:
         return sum(a * math.sin(w * now + p) for a, w, p in self._waves)
 
+    @override
     def check(self, now: float, x: float, y: float, dt: float) -> bool:
-        """See `Goal`.
-
-        A push P and an answer U of the person make an open loop of -H/(1+H) with H = U/P, which is
-        that of a target P and a cursor -U.
-        """
         task = self._task
         if now < task.warm_up_s + 0.5 * dt:
             return False
@@ -210,8 +208,9 @@ class TrackGoal(ToTarget):
             self._cursors.append(-self._told if self.stands else x)
         return self._steps * dt >= task.record_s - 0.5 * dt
 
+    @override
     def row(self, trial: CursorTrial) -> dict[str, Any]:
-        """See `Goal`; without a whole record there is no crossover."""
+        # Without a whole record the crossover is nan.
         targets, cursors = np.array(self._targets), np.array(self._cursors)
         found = movement_laws.Crossover(math.nan, math.nan)
         if trial.over:

@@ -13,6 +13,8 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, NamedTuple
 
+from typing_extensions import override
+
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
@@ -107,8 +109,9 @@ class Asking(ModelProgram):
         else:
             self._clock.call_at(deadline, self._expire, number, attempt)
 
+    @override
     def replied(self, number: int) -> None:
-        """See `ModelProgram`; a socket that was closed delivers nothing."""
+        # A closed socket delivers nothing.
         super().replied(number)
         self._waiting = None, 0
         self._go_on()

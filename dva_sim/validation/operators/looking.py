@@ -51,7 +51,7 @@ class _Vehicle:
     done: float = 0.0
 
     def look_away(self) -> None:
-        """See `Screen`."""
+        """Do nothing: the vehicle drives on by itself."""
 
     def drive(self, seen: bool, dt: float) -> None:
         """Go on, unless the way that it was given is used up."""

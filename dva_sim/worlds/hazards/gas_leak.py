@@ -198,8 +198,9 @@ class LeakField(SolvedField):
         self._leak, self._indoors = leak, self.room != NOWHERE
         self._nodes: tuple[SitePoints, NDArray[np.int64]] | None = None
 
+    @override
     def at(self, x: float, y: float, time: float) -> Conditions:
-        """See `HazardField`; carbon monoxide kills long before it could explode."""
+        # Carbon monoxide kills long before it could explode.
         return self._air_with(self.share(x, y, time))
 
     def _air_with(self, share: float) -> Conditions:

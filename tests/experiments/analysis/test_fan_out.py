@@ -43,7 +43,7 @@ class Kept(Results):
     """Results whose tables are at hand."""
 
     def table(self, name: str) -> Any:
-        """See `Results`."""
+        """Table of events or runs, as from `Results`."""
         events = {
             "part": ["hall"] * 5,
             "robot.count": [1, 1, 1, 1, 2],

@@ -12,6 +12,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from typing_extensions import override
+
 from dva_sim.agents.habits import WaitingHabits
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies.base import PathView, PointView, Strategy
@@ -155,8 +157,8 @@ class MoveAndWait(Strategy):
 
     period = 0.0
 
+    @override
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
-        """See `Strategy`."""
         seen = view.seen
         left = route.remaining(seen.x, seen.y)  # kept track of in moves
         wanted = self.moves.next(view.now, view.delay, self._pace(seen.speed, seen.turn_rate))
@@ -166,8 +168,9 @@ class MoveAndWait(Strategy):
             wanted = self.moves.begin(view.now, parts, peak) if parts else (0.0, 0.0)
         return Intent(*wanted)
 
+    @override
     def point(self, view: PointView) -> Velocity:
-        """See `Strategy`; leads a target that moves by the time until the move is seen."""
+        # A moving target is led by the time until the move is seen.
         seen = view.seen
         wanted = self.moves.next(view.now, view.delay, self._flow(seen.vx, seen.vy))
         if wanted is not None:
@@ -179,8 +182,8 @@ class MoveAndWait(Strategy):
             return 0.0, 0.0
         return self._straight(view.now, dx, dy)
 
+    @override
     def follow(self, view: PathView) -> Velocity:
-        """See `Strategy`."""
         seen, path = view.seen, view.path
         left = path.remaining(seen.x, seen.y)
         wanted = self.moves.next(view.now, view.delay, self._flow(seen.vx, seen.vy))

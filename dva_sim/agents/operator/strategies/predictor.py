@@ -16,6 +16,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar, final
 
+from typing_extensions import override
+
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies.base import PathView, PointView, Strategy
 from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity
@@ -53,23 +55,23 @@ class Predictor(Strategy):
         self._asked: deque[tuple[float, float, float]] = deque()
         self._remembers = person.habits.delay.remembers_s
 
+    @override
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
-        """See `Strategy`."""
         seen = self._moved_on(view.seen, view.now, view.delay)
         predicted = View(view.now, seen, self._left(view.delay))
         intent = self._inner.drive(route, predicted, stop_before)
         self._asked.append((view.now, *intent))
         return intent
 
+    @override
     def point(self, view: PointView) -> Velocity:
-        """See `Strategy`."""
         seen = self._cursor(view.seen, view.now, view.delay)
         wanted = self._inner.point(PointView(view.now, seen, self._left(view.delay)))
         self._asked.append((view.now, *wanted))
         return wanted
 
+    @override
     def follow(self, view: PathView) -> Velocity:
-        """See `Strategy`."""
         seen = self._cursor(view.seen, view.now, view.delay)
         predicted = PathView(view.now, seen, self._left(view.delay), view.path)
         wanted = self._inner.follow(predicted)

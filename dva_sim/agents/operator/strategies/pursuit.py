@@ -23,6 +23,8 @@ from __future__ import annotations
 
 import math
 
+from typing_extensions import override
+
 from dva_sim.agents.operator.strategies.base import Strategy
 from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import (
@@ -56,8 +58,8 @@ class TwoPoint(Pursuit):
         super().__init__(person, reach)
         self._begin()
 
+    @override
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
-        """See `Strategy`."""
         intent = super().drive(route, view, stop_before)
         if self._turning:
             self._begin()
