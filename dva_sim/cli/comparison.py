@@ -83,7 +83,7 @@ def tell(
         if side.failures:
             failed = f"{len(side.failures)} runs of {name} failed and take no part"
             console.print(failed, style="yellow", soft_wrap=True)
-    told = (*_questions(comparison), *_cells(comparison), _luck(comparison))
+    told = (*_questions(comparison), *_cells(comparison), _random_numbers(comparison))
     print_lines(map(escape, told), console)
     wanted: Sequence[str | None] = measures or [None]
     for measure in wanted:
@@ -141,7 +141,7 @@ def _cells(comparison: Comparison) -> list[str]:
     return lines
 
 
-def _luck(comparison: Comparison) -> str:
+def _random_numbers(comparison: Comparison) -> str:
     pairs, runs = comparison.paired
     if not pairs:
         return "No run of both has the same random seed: persons are compared with other persons"

@@ -117,7 +117,7 @@ class Dispatcher:
             return Advised(question.device, question.task, max(0.0, question.expected - now))
         view = self.situations.look(now)
         if view is not None and event in view.events:
-            rng = copy.deepcopy(self._rng)  # who only asks changes nobody's luck
+            rng = copy.deepcopy(self._rng)  # a query must not consume random numbers
             for piece in self._advice(view.situation, rng):
                 if isinstance(piece, Assignment) and view.events[piece.task] is event:
                     way = float(view.situation.eta[piece.task, piece.responder])

@@ -397,13 +397,13 @@ class OfficeBlock(Config):
 
 def office_block(block: OfficeBlock) -> tuple[Feature, ...]:
     """The features of a house, in metres; its south-western corner is the origin."""
-    luck = Streams(block.seed)
-    layout = lay_out(block.width_m, block.depth_m, luck.fresh("office-block/layout"))
+    streams = Streams(block.seed)
+    layout = lay_out(block.width_m, block.depth_m, streams.fresh("office-block/layout"))
     rooms = assign(layout, block.robot_bases)
     return (
         *_ways(layout),
         *_exits(layout, rooms),
-        *_rooms(rooms, luck.fresh("office-block/doors")),
+        *_rooms(rooms, streams.fresh("office-block/doors")),
         *_people_and_robots(block, layout, rooms),
         *_equipment(layout),
     )

@@ -26,28 +26,28 @@ STALLS_EVERY_MS, STALLS_FOR_MS = 15_000.0, 400.0  # on average, both exponential
 SEED = 2013
 
 
-def opportunities(mean_rate: float, luck: np.random.Generator) -> np.ndarray:
+def opportunities(mean_rate: float, rng: np.random.Generator) -> np.ndarray:
     """Milliseconds at which a packet may cross, ascending, `(n,)`."""
     share = np.exp(-1.0 / FOR_MS)
-    steps = luck.normal(0.0, WANDERS * np.sqrt(1.0 - share**2), LASTS_MS)
-    logarithm, at = np.empty(LASTS_MS), luck.normal(0.0, WANDERS)
+    steps = rng.normal(0.0, WANDERS * np.sqrt(1.0 - share**2), LASTS_MS)
+    logarithm, at = np.empty(LASTS_MS), rng.normal(0.0, WANDERS)
     for n, step in enumerate(steps):
         logarithm[n] = at = share * at + step
     rate = mean_rate * np.exp(logarithm - WANDERS**2 / 2)
-    start = luck.exponential(STALLS_EVERY_MS)
+    start = rng.exponential(STALLS_EVERY_MS)
     while start < LASTS_MS:
-        lasts = luck.exponential(STALLS_FOR_MS)
+        lasts = rng.exponential(STALLS_FOR_MS)
         rate[int(start) : int(start + lasts)] = 0.0
-        start += lasts + luck.exponential(STALLS_EVERY_MS)
-    return np.repeat(np.arange(1, LASTS_MS + 1), luck.poisson(rate))
+        start += lasts + rng.exponential(STALLS_EVERY_MS)
+    return np.repeat(np.arange(1, LASTS_MS + 1), rng.poisson(rate))
 
 
 def main() -> None:
     """Write one file for each direction."""
-    for luck, (direction, rate) in zip(
+    for rng, (direction, rate) in zip(
         np.random.default_rng(SEED).spawn(len(MEAN_RATE)), MEAN_RATE.items(), strict=True
     ):
-        lines = "\n".join(map(str, opportunities(rate, luck)))
+        lines = "\n".join(map(str, opportunities(rate, rng)))
         (HERE / f"cellular.{direction}").write_text(lines + "\n", encoding="ascii")
 
 

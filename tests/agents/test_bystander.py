@@ -60,7 +60,7 @@ class Building(People):
             planner=self.planner,
             places=places or [place],
             refuges=self.refuges,
-            luck=np.random.default_rng(len(self.bystanders)),
+            rng=np.random.default_rng(len(self.bystanders)),
             air=air,
             sees=sees,
             leaves=lambda: self.world.remove(walking.body),

@@ -97,7 +97,7 @@ def test_what_is_no_speed_is_none(speed):
 
 def joystick(seed: int, guarded: bool) -> tuple[int, float, float]:
     """Two minutes of wild driving: contacts, their impulse [N s], and the way [m]."""
-    fleet, luck = Fleet(), np.random.default_rng(seed)
+    fleet, rng = Fleet(), np.random.default_rng(seed)
     robot = fleet.robot(1, (20.0, 12.0, 0.0), EMPTY)
     fleet.parked(2, 16.0, 11.6)
     fleet.person(24.0, 12.5)
@@ -105,7 +105,7 @@ def joystick(seed: int, guarded: bool) -> tuple[int, float, float]:
     for step in range(1200):
         fleet.world.advance_to(step * 0.1)
         if step % 20 == 0:
-            wish = float(luck.uniform(0.1, TOP)), float(luck.uniform(-0.5, 0.5))
+            wish = float(rng.uniform(0.1, TOP)), float(rng.uniform(-0.5, 0.5))
         speed = wish[0]
         if guarded:
             around = robot.around

@@ -97,7 +97,7 @@ def test_the_noise_of_a_sample_hangs_neither_on_how_often_it_is_read_nor_on_othe
         assert both["temperature"].read(time) == alone.read(time)
 
 
-def test_two_sensors_of_one_robot_have_luck_of_their_own():
+def test_two_sensors_of_one_robot_have_random_numbers_of_their_own():
     names = ("smoke", "water")
     configs = [SensorConfig(name=name, noise=1.0, low=-9.0) for name in names]
     ports = make_ports(configs, {n: (lambda now: (0.0,)) for n in names}, Streams(7).fresh)
@@ -154,9 +154,9 @@ def test_two_sensors_of_one_name_are_one_too_many():
 
 
 def test_a_fault_is_either_scheduled_or_drawn():
-    luck = Streams(1).fresh("x")
-    assert FaultConfig(kind="lost", at_s=0.0).time(luck) == 0.0
-    assert FaultConfig(kind="lost", mean_time_s=10.0).time(luck) > 0.0
+    stream = Streams(1).fresh("x")
+    assert FaultConfig(kind="lost", at_s=0.0).time(stream) == 0.0
+    assert FaultConfig(kind="lost", mean_time_s=10.0).time(stream) > 0.0
 
 
 class Burning:

@@ -33,7 +33,7 @@ def ask_in_trouble(
     world: World, seed: int, plan: Plan, window: int, attempts: int = 3, count: int = 12
 ) -> None:
     """Two ask at moments of their own; the service comes and goes; then all is looked at."""
-    meddler, luck = Meddler(world.clock, seed, plan), Random(seed)
+    meddler, rng = Meddler(world.clock, seed, plan), Random(seed)
     Meddled(world.network, meddler).serve(ROBOT, echo)
     taps = [Tap(world.network), Tap(world.network)]
     askers = [
@@ -44,7 +44,7 @@ def ask_in_trouble(
     for number, asker in enumerate(askers):
         for question in numbered(count, f"asker {number} of seed {seed}, question"):
             asker.ends[question] = []
-            world.clock.call_at(start + luck.uniform(0, 2 * BRIEF), asker.ask, question)
+            world.clock.call_at(start + rng.uniform(0, 2 * BRIEF), asker.ask, question)
     world.run_until(lambda: all(asker.all_over() for asker in askers))
     world.run_for(2 * plan.hold + BRIEF)
     for tap, asker in zip(taps, askers, strict=True):

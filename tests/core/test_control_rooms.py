@@ -431,7 +431,7 @@ def test_a_proposal_tells_why_nobody_can_go():
     assert reasons[OTHER_GUARD].startswith("not heard of for")
 
 
-def test_who_only_asks_changes_nobodys_luck():
+def test_who_only_asks_consumes_no_random_numbers():
     def sent(asks: int) -> list[Send]:
         from dva_sim.core.dispatch import RandomChoice
 

@@ -77,7 +77,7 @@ def test_sessions_only_grow(office):
     assert sessions == sorted(set(sessions))
 
 
-def test_a_session_grows_above_and_is_luck_below(office):
+def test_a_session_grows_above_and_is_random_below(office):
     first = granted(office).session
     office.desk.sessions.permissions.release(OPERATOR)
     office.desk.sessions.permissions.draw = lambda: 2**32 - 1

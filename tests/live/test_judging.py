@@ -74,12 +74,12 @@ def said_by_parts(run: Run) -> dict[int, list[Line]]:
 
 def judged(run: Run, lines: dict[int, list[Line]], seed: int = 1) -> dict[str, str]:
     """Verdicts by rule, for parts that report some lines at a time, in random order."""
-    judge, luck = LiveJudge(terms_of(run.scenario)), random.Random(seed)
+    judge, rng = LiveJudge(terms_of(run.scenario)), random.Random(seed)
     for part in lines:
         judge.joins(part)
     left = {part: list(said) for part, said in lines.items()}
     while left:
-        part = min(left, key=lambda one: left[one][0][1] + luck.uniform(0.0, 4.0))
+        part = min(left, key=lambda one: left[one][0][1] + rng.uniform(0.0, 4.0))
         some, left[part] = left[part][:20], left[part][20:]
         judge.hear(part, [json.dumps(line).encode() for line in some])
         if not left[part]:

@@ -240,12 +240,12 @@ def test_of_a_file_cut_short_all_that_is_there_is_read(folder, tmp_path, share):
 @pytest.mark.system
 def test_a_damaged_file_ends_in_one_line(folder, opened, tmp_path):
     """Whatever byte is wrong, nothing is read that was not written."""
-    whole, luck = (folder / "drive.mcap").read_bytes(), random.Random(1)
+    whole, rng = (folder / "drive.mcap").read_bytes(), random.Random(1)
     right = opened["drive"].playback.recorder.timeline
     told = []
     for _ in range(12):
         damaged = bytearray(whole)
-        damaged[luck.randrange(len(whole))] ^= 1 << luck.randrange(8)
+        damaged[rng.randrange(len(whole))] ^= 1 << rng.randrange(8)
         (tmp_path / "bad.mcap").write_bytes(damaged)
         try:
             read = read_recording(tmp_path / "bad.mcap").playback.recorder.timeline

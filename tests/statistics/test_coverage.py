@@ -174,9 +174,9 @@ def pairs_and_what_is_known(persons, n, rng):
     Who has more of the trait loses less on long ways; on these chance weighs more.
     """
     trait, way = rng.normal(size=(2, persons, n))
-    luck = (1 + 0.3 * abs(way)) * (rng.lognormal(0, 0.5, (persons, n)) - np.exp(0.125))
+    chance = (1 + 0.3 * abs(way)) * (rng.lognormal(0, 0.5, (persons, n)) - np.exp(0.125))
     known = np.stack([trait, way, trait * way])
-    return 8 - 4 * trait + 4.5 * way - 2.7 * trait * way + 8 * luck, known
+    return 8 - 4 * trait + 4.5 * way - 2.7 * trait * way + 8 * chance, known
 
 
 @pytest.mark.soak

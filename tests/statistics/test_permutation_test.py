@@ -8,7 +8,7 @@ from scipy import stats
 from dva_sim.statistics import permutation_test
 
 
-def test_three_persons_who_agree_either_way_are_two_of_eight_by_luck():
+def test_three_persons_who_agree_either_way_are_two_of_eight_by_chance():
     assert permutation_test([3, 5, 9], [1, 1, 1], [0, 1, 2]) == pytest.approx(2 / 8)
     assert permutation_test([1, 1, 1], [3, 5, 9], [0, 1, 2]) == pytest.approx(2 / 8)
 

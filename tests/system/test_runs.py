@@ -47,7 +47,7 @@ def test_another_seed_gives_another_run():
     assert rows(run(seed=1)) != rows(run(seed=2))
 
 
-def test_adding_a_guard_changes_nobody_elses_luck():
+def test_adding_a_guard_changes_nobody_elses_random_numbers():
     """The fire is nearer to the robot; the guard's presence must not move the robot a hair."""
     alone = run(events=NEAR, link__loss=0.05, link__delay_s=0.05)
     guarded = run(events=NEAR, link__loss=0.05, link__delay_s=0.05, guard__count=1)

@@ -69,7 +69,7 @@ class Anywhere(Good):
         super().__init__((0.0, 0.0), start, **settings)
 
 
-luck = np.random.default_rng(1)
+rng = np.random.default_rng(1)
 
 
 def but(**changed: Any) -> type[Hazard]:
@@ -143,13 +143,13 @@ EARLY = DetectorAlarm(lambda age, dt: False, at_latest=-20.0)
         (but(radius=lambda self, time: 1.0), "radius before it begins"),
         (but(severity=lambda self, time: float(time > self.start)), "severity from nothing"),
         (severe(lambda time: min(1.0, time / 1e4)), "when it begins later: severity"),
-        (severe(lambda time: luck.uniform()), "in another order, or at random: severity"),
+        (severe(lambda time: rng.uniform()), "in another order, or at random: severity"),
         (of(answer=Conditions(math.nan)), "temperature that is none: nan"),
         (of(answer=Conditions(-30.0)), "temperature that is none: -30"),
         (of(is_near=is_on), "the air ten kilometres away"),
         (of(is_near=is_close), "the air before it begins"),
         (but(made=Counting), "in another order: asked in a random order"),
-        (of(air=lambda self, time: Conditions(21.0 + luck.uniform())), "random numbers, or shares"),
+        (of(air=lambda self, time: Conditions(21.0 + rng.uniform())), "random numbers, or shares"),
         (of(air=lambda self, now: Conditions(21.0 + min(now, 2e3))), "begins later: the air"),
         (of(air=lambda self, _: Conditions(30.0 + (self.until < math.inf))), "before its source"),
         (of(answer=Conditions(extinction=1.0)), "not hazy where light is lost"),

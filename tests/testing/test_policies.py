@@ -58,7 +58,7 @@ def to_first_task(self, situation, rng):
     return [Assignment(0, who) for who in range(len(situation.responders))] if here else []
 
 
-def by_own_luck(self, situation, rng):
+def by_own_numbers(self, situation, rng):
     able = np.argwhere(np.isfinite(situation.eta)).tolist()
     return [Assignment(*random.choice(able))] if able else []
 
@@ -103,7 +103,7 @@ def moves_all(self, situation, rng):
         (policy(all_to_first), "uses a responder twice: responder 0 in situation "),
         (policy(to_first_task), "uses a task twice: task 0 in situation "),
         (policy(to_first_task), "sends somebody who would never arrive: responder "),
-        (policy(by_own_luck), "advises differently with the same history and random seed: in"),
+        (policy(by_own_numbers), "advises differently with the same history and random seed: in"),
         (policy(writes_into_eta), "raises: ValueError: assignment destination is read-only (test_"),
         (policy(changes_behind_the_back), "changes the situation: in situation 1 "),
         (policy(to_first_task, preempts=True), "gives a task that somebody is under way to: task"),

@@ -42,17 +42,17 @@ class ScriptedDispatcher:
     Args:
         room: Control room that it sees and acts by.
         profile: Working habits.
-        luck: Random stream by name; each delay and each whim has its own.
+        streams: Random stream by name; each delay and each whim has its own.
     """
 
     def __init__(
         self,
         room: ControlRoomAgent,
         profile: DispatcherProfile,
-        luck: Callable[[str], np.random.Generator],
+        streams: Callable[[str], np.random.Generator],
     ) -> None:
         self.room, self.profile = room, profile
-        self._luck = luck
+        self._streams = streams
         self._known: dict[int, Turned] = {}
         self._waiting: deque[int] = deque()
         self._busy: int | None = None
@@ -93,7 +93,7 @@ class ScriptedDispatcher:
         if self._known[number].acknowledged:
             self._read(number)
             return
-        delay = self.profile.acknowledge_s.draw(self._luck(f"acknowledge/{number}"))
+        delay = self.profile.acknowledge_s.draw(self._streams(f"acknowledge/{number}"))
         self.room.device.clock.call_after(delay, self._acknowledge, number)
 
     def _acknowledge(self, number: int) -> None:
@@ -106,7 +106,7 @@ class ScriptedDispatcher:
     def _read(self, number: int) -> None:
         turned = self._known[number]
         turned.looks += 1
-        delay = self.profile.decide_s.draw(self._luck(f"decide/{number}/{turned.looks}"))
+        delay = self.profile.decide_s.draw(self._streams(f"decide/{number}/{turned.looks}"))
         self.room.device.clock.call_after(delay, self._ask, number)
 
     def _ask(self, number: int) -> None:
@@ -165,7 +165,7 @@ class ScriptedDispatcher:
     def _rule(self, status: m.EventStatus, proposal: m.Proposal) -> Overrule | None:
         for place, rule in enumerate(self.profile.overrules):
             if self._holds(rule, status, proposal):
-                whim = self._luck(f"overrule/{status.event_id}/{place}").random()
+                whim = self._streams(f"overrule/{status.event_id}/{place}").random()
                 if whim < rule.share:
                     return rule
         return None

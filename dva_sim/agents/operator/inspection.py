@@ -60,7 +60,7 @@ class Evidence:
             none, in standard deviations [1/sqrt(s)].
         look: Time for which an event in plain view is looked at until the person is sure [s]; it
             sets the criterion.
-        luck: Standard normal numbers, one for each look.
+        normals: Standard normal numbers, one for each look.
         habits: Habits of the person.
 
     Attributes:
@@ -69,9 +69,9 @@ class Evidence:
     """
 
     def __init__(
-        self, sensitivity: float, look: float, luck: Iterator[float], habits: LookingHabits
+        self, sensitivity: float, look: float, normals: Iterator[float], habits: LookingHabits
     ) -> None:
-        self._sensitivity, self._luck, self._habits = sensitivity, luck, habits
+        self._sensitivity, self._normals, self._habits = sensitivity, normals, habits
         self.criterion = 0.5 * sensitivity * look
         self.level = 0.0
 
@@ -95,7 +95,7 @@ class Evidence:
         """
         weight = math.sqrt(contrast)
         drift = weight * contrast**self._habits.discount * self._sensitivity * (clear - 0.5)
-        noise = weight * math.sqrt(duration) * next(self._luck)
+        noise = weight * math.sqrt(duration) * next(self._normals)
         self.level = max(0.0, self.level + drift * duration + noise)
 
 
@@ -113,7 +113,7 @@ class Looking:
         kind: Kind of the event.
         place: Reported position [m].
         planner: The person knows the building.
-        luck: Standard normal numbers, one for each look.
+        normals: Standard normal numbers, one for each look.
         arrived: Called once, when the event or its place is before the robot.
     """
 
@@ -124,12 +124,12 @@ class Looking:
         *,
         planner: Planner,
         person: Person,
-        luck: Iterator[float],
+        normals: Iterator[float],
         arrived: Callable[[], object],
     ) -> None:
         self._kind, self._place, self._planner, self._person = kind, place, planner, person
         self._habits = habits = person.habits.looking
-        self._evidence = Evidence(person.sensitivity, person.confirm_look, luck, habits)
+        self._evidence = Evidence(person.sensitivity, person.confirm_look, normals, habits)
         self._tell_arrived, self._arrived = arrived, False
         self._last: float | None = None
         self._searched = self._blind = 0.0

@@ -69,7 +69,7 @@ class Work:
             self._goal,
             planner=seat.planner,
             person=seat.person,
-            luck=seat.noise(order.event_id),
+            normals=seat.noise(order.event_id),
             arrived=self._arrive,
         )
 

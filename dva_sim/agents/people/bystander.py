@@ -71,7 +71,7 @@ class BystanderAgent(OnFoot):
         planner: It knows the building.
         places: Working places; it begins at the first [m].
         refuges: Safe places [m].
-        luck: Random generator of its walks in normal times.
+        rng: Random generator of its walks in normal times.
         air: Conditions at a place [m] and time [s].
         sees: Predicate: True if flames are visible from a place [m] at a time [s].
         leaves: Called when it is out: its body goes.
@@ -93,7 +93,7 @@ class BystanderAgent(OnFoot):
         planner: Planner,
         places: Sequence[Point],
         refuges: Sequence[Point],
-        luck: np.random.Generator,
+        rng: np.random.Generator,
         air: AirAt = clean_air,
         sees: Callable[[float, float, float], bool] = nothing_seen,
         leaves: Callable[[], object] = do_nothing,
@@ -109,7 +109,7 @@ class BystanderAgent(OnFoot):
         )
         self.name, self._clock, self._occupant = name, clock, occupant
         self._way_out = WayOut(clock, planner, walking, self.exposure, lambda: refuges)
-        self._places, self._luck = places, luck
+        self._places, self._rng = places, rng
         self._sees, self._leaves, self._tell = sees, leaves, tell
         self.activity = WORKING
         self.leaves_at = self.out_at = math.inf
@@ -125,12 +125,12 @@ class BystanderAgent(OnFoot):
     def _stay(self) -> None:
         if self.activity in (WORKING, WALKING):
             self.activity = WORKING
-            self._clock.call_after(self._occupant.stay.draw(self._luck), self._change_place)
+            self._clock.call_after(self._occupant.stay.draw(self._rng), self._change_place)
 
     def _change_place(self) -> None:
         if self.activity != WORKING:
             return
-        place = self._places[int(self._luck.integers(len(self._places)))]
+        place = self._places[int(self._rng.integers(len(self._places)))]
         self.activity = WALKING
         if not self.walking.go(place, self._stay, self._stay):
             self._stay()

@@ -206,10 +206,10 @@ class FaultConfig(Config):
             raise ValueError("a fault needs either at_s or mean_time_s")
         return self
 
-    def time(self, luck: np.random.Generator) -> float:
+    def time(self, streams: np.random.Generator) -> float:
         """Return when it happens [s]."""
         if self.mean_time_s is not None:
-            return float(luck.exponential(self.mean_time_s))
+            return float(streams.exponential(self.mean_time_s))
         return self.at_s or 0.0
 
 
@@ -264,15 +264,15 @@ class RobotSensor:
     Args:
         config: Properties of the sensor.
         source: True value at a time [s].
-        luck: Random streams of its own, by purpose.
+        streams: Random streams of its own, by purpose.
     """
 
-    def __init__(self, config: SensorConfig, source: Source, luck: StreamsByName) -> None:
+    def __init__(self, config: SensorConfig, source: Source, streams: StreamsByName) -> None:
         self.kind, self._rate = config.as_kind(), config.rate_hz
-        self._source, self._luck = source, luck
+        self._source, self._streams = source, streams
         times = {fault.kind: math.inf for fault in config.faults}
         for number, fault in enumerate(config.faults):
-            when = fault.time(luck(f"fault {number}"))
+            when = fault.time(streams(f"fault {number}"))
             times[fault.kind] = min(times[fault.kind], when)
         self._lost_at, self._stuck_at = times.get("lost", math.inf), times.get("stuck", math.inf)
         self._sample, self._shown = -1, Values()
@@ -311,7 +311,7 @@ class RobotSensor:
         """Standard normal numbers of one sample, shape `(count,)`."""
         block, place = divmod(sample, BLOCK)
         if self._noise[0] != block or self._noise[1].shape[1] != count:
-            self._noise = block, self._luck(f"noise {block}").normal(size=(BLOCK, count))
+            self._noise = block, self._streams(f"noise {block}").normal(size=(BLOCK, count))
         return np.asarray(self._noise[1][place])
 
     def _as_shown(self, values: Floats) -> Values:
@@ -364,14 +364,14 @@ def sources_of(
 
 
 def make_ports(
-    configs: Iterable[SensorConfig], sources: Mapping[str, Source], luck: StreamsByName
+    configs: Iterable[SensorConfig], sources: Mapping[str, Source], streams: StreamsByName
 ) -> dict[str, SensorPort]:
     """The sensors of a robot, ready to be subscribed to.
 
     Args:
         configs: Sensors to make.
         sources: Sources of true values, by name.
-        luck: Random stream from its beginning, by name; the same name gives the same stream.
+        streams: Random stream from its beginning, by name; the same name gives the same stream.
 
     Raises:
         ConfigError: two sensors of one name.
@@ -381,11 +381,11 @@ def make_ports(
         name = config.name
         if name in ports:
             raise ConfigError(f"sensor {name!r} appears twice")
-        sensor = RobotSensor(config, sources[name], _own(luck, name))
+        sensor = RobotSensor(config, sources[name], _own(streams, name))
         lags = sensor.kind.lag > 0.0
         ports[name] = SensorPort(sensor.kind.unit, sensor.read, config.rate_hz, lags)
     return ports
 
 
-def _own(luck: StreamsByName, name: str) -> StreamsByName:
-    return lambda what: luck(f"{name}/{what}")
+def _own(streams: StreamsByName, name: str) -> StreamsByName:
+    return lambda what: streams(f"{name}/{what}")

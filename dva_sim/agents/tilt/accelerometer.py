@@ -162,12 +162,12 @@ class Accelerometer:
         def blocks() -> Iterator[list[list[float]]]:
             drift = np.zeros(3)
             while True:
-                luck = rng.normal(size=(block, 6))
-                steps = luck[:, 3:] * self._drift
+                normals = rng.normal(size=(block, 6))
+                steps = normals[:, 3:] * self._drift
                 steps[0] += drift  # added up one after the other, so that a block changes no number
                 walk = np.cumsum(steps, axis=0)
                 drift = walk[-1]
-                yield (walk + luck[:, :3] * noise).tolist()
+                yield (walk + normals[:, :3] * noise).tolist()
 
         return chain.from_iterable(blocks())
 

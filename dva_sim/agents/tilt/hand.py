@@ -60,8 +60,8 @@ class Hand:
         self._lag, self._noise, self._tremor = lag, motor_noise, tremor
         self._max_tilt, self._max_speed = max_tilt, max_speed
         self._damping = math.pi * tremor_width
-        self._luck = _luck(rng, block)
-        self._shake_pitch, self._shake_roll, self._off_pitch, self._off_roll = next(self._luck)
+        self._draws = _draws(rng, block)
+        self._shake_pitch, self._shake_roll, self._off_pitch, self._off_roll = next(self._draws)
         self._pitch = self._roll = 0.0
         self._tuned: dict[float, tuple[float, float, float, complex, float]] = {}
 
@@ -72,7 +72,7 @@ class Hand:
     def step(self, pitch: float, roll: float, dt: float) -> tuple[float, float]:
         """Return the phone's pose after `dt` [s] of aiming at `pitch` and `roll` [rad]."""
         keep, new, most, swing, drive = self._tuned.get(dt) or self._tune(dt)
-        one, other, off_pitch, off_roll = next(self._luck)
+        one, other, off_pitch, off_roll = next(self._draws)
         noise = self._noise
         if noise:
             self._off_pitch = off = self._off_pitch * keep + off_pitch * new
@@ -103,7 +103,7 @@ class Hand:
         return tuned
 
 
-def _luck(rng: np.random.Generator, block: int) -> Iterator[tuple[complex, complex, float, float]]:
+def _draws(rng: np.random.Generator, block: int) -> Iterator[tuple[complex, complex, float, float]]:
     """Yield the random drive of the tremor in pitch and roll, and the aiming errors, endlessly.
 
     All are standard normal, and the same ones whatever the block.

@@ -46,7 +46,7 @@ class MatchedResults:
 
     def __init__(self, first: Results, second: Results) -> None:
         self.sides = (first, second)
-        self._luck: dict[GateGroup, frozenset[Run]] = {}
+        self._same_seeds: dict[GateGroup, frozenset[Run]] = {}
         self._frames: dict[tuple[int, str, str], Frame] = {}
         if not self.matched.pairs:
             raise ConfigError(
@@ -134,10 +134,10 @@ class MatchedResults:
 
     def shared(self, group: GateGroup) -> frozenset[Run]:
         """The runs of some cells that both folders have."""
-        if group not in self._luck:
+        if group not in self._same_seeds:
             first, second = (self.own_rows(side, "runs", "seed", group).runs for side in (0, 1))
-            self._luck[group] = frozenset(first) & frozenset(second)
-        return self._luck[group]
+            self._same_seeds[group] = frozenset(first) & frozenset(second)
+        return self._same_seeds[group]
 
     def own_rows(self, side: int, table: str, column: str, group: GateGroup) -> Rows:
         """All rows of some cells in one folder, with or without a counterpart."""

@@ -60,7 +60,7 @@ def manifest_of(plan: StudyPlan) -> dict[str, Any]:
             "study": study.seed,
             "population": study.seed,
             "rule": "a run's seed depends on the study's seed, the part, the person and the "
-            "trial, never on the cell: all cells share their luck, and repeats share it too",
+            "trial, never on the cell: all cells share their random numbers, and so do repeats",
         },
         "versions": _simulating(),
     }

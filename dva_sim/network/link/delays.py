@@ -35,9 +35,9 @@ Wobble = Callable[[float], float]
 """How much later than usual a packet arrives that is sent at a time [s]; less than 0 is sooner."""
 
 
-def by_quantile(quantile: Quantile, luck: UniformNumbers) -> Wobble:
+def by_quantile(quantile: Quantile, uniforms: UniformNumbers) -> Wobble:
     """Draw from any law: the quantile of the deviation [s] at a random probability."""
-    return lambda now: quantile(luck.draw(now))
+    return lambda now: quantile(uniforms.draw(now))
 
 
 class ConstantDelay(Config):

@@ -209,9 +209,9 @@ def _make_fates(
     """All chances that may take a packet of one direction."""
     fates: list[Fate] = [replay.takes] if replay else []
     if way.loss:
-        luck = make(streams, f"{name}/loss")
-        bursts = way.bursts and way.bursts.play(way.loss, streams, f"{name}/bursts", luck)
-        fates.append(bursts or chance(way.loss, luck))
+        uniforms = make(streams, f"{name}/loss")
+        bursts = way.bursts and way.bursts.play(way.loss, streams, f"{name}/bursts", uniforms)
+        fates.append(bursts or chance(way.loss, uniforms))
     return tuple(fates)
 
 
@@ -235,8 +235,8 @@ def _make_replay(
     if way.delay_log is None:
         return None
     log = read_delay_log(way.delay_log)
-    luck = streams.fresh(f"{name.removesuffix(f'/{direction}')}/delay-log")
-    offset, coins = luck.random() * period_of(log), luck.random(len(log.times))
+    rng = streams.fresh(f"{name.removesuffix(f'/{direction}')}/delay-log")
+    offset, coins = rng.random() * period_of(log), rng.random(len(log.times))
     share = way.delay_log_share
     here = coins < share if direction == "up" else coins >= 1.0 - share
     return Replay(log, share, here, offset)
@@ -363,7 +363,7 @@ class RadioLink(Link):
         super().__init__(config, serialiser, streams, name, direction)
         way = config.toward(direction)
         self._reception = reception
-        self._luck = Weather(streams, f"{name}/radio")
+        self._uniforms = Weather(streams, f"{name}/radio")
         self._air, self._air_room = ConstantRate(way.rate_bps), way.queue_bytes
         self._newest = 0.0
 
@@ -389,7 +389,7 @@ class RadioLink(Link):
         if arrival is None:
             return None
         if here is not None:
-            if here.loss and self._luck.draw(now) < here.loss:
+            if here.loss and self._uniforms.draw(now) < here.loss:
                 self.lost += 1
                 return None
             arrival = max(arrival, self._air.depart(now, size) + self._lag()) + here.extra_delay_s

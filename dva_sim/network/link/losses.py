@@ -60,35 +60,35 @@ class Bursts(Config):
                 f"at least {least:g}"
             )
 
-    def play(self, loss: float, streams: Streams, name: str, luck: UniformNumbers) -> Fate:
+    def play(self, loss: float, streams: Streams, name: str, uniforms: UniformNumbers) -> Fate:
         """Return a fate that loses a share `loss` of all packets, from the named random stream.
 
         Args:
             loss: In the long run.
             streams: Random streams of the run.
             name: Name of the bursts' random stream.
-            luck: Random numbers that decide packet by packet within a burst.
+            uniforms: Random numbers that decide packet by packet within a burst.
         """
         share = loss / self.loss  # of time, or of packets, that is in a burst
         if self.mean_s is not None:
             spells = Spells(streams, name, self.mean_s * (1.0 - share) / share, self.mean_s)
-            return timed_bursts(spells, self.loss, luck)
+            return timed_bursts(spells, self.loss, uniforms)
         assert self.mean_packets is not None
-        return counted_bursts(streams.fresh(name), share, self.mean_packets, self.loss, luck)
+        return counted_bursts(streams.fresh(name), share, self.mean_packets, self.loss, uniforms)
 
 
-def chance(loss: float, luck: UniformNumbers) -> Fate:
+def chance(loss: float, uniforms: UniformNumbers) -> Fate:
     """Independent losses with a fixed probability; one random number per packet."""
-    return lambda now, left_at: luck.draw(now) < loss
+    return lambda now, left_at: uniforms.draw(now) < loss
 
 
-def timed_bursts(spells: Spells, loss: float, luck: UniformNumbers) -> Fate:
+def timed_bursts(spells: Spells, loss: float, uniforms: UniformNumbers) -> Fate:
     """Losses of packets sent in bad times, with the probability then."""
-    return lambda now, left_at: spells.is_on(now) and luck.draw(now) < loss
+    return lambda now, left_at: spells.is_on(now) and uniforms.draw(now) < loss
 
 
 def counted_bursts(
-    rng: np.random.Generator, share: float, length: float, loss: float, luck: UniformNumbers
+    rng: np.random.Generator, share: float, length: float, loss: float, uniforms: UniformNumbers
 ) -> Fate:
     """Runs of packets, whenever they come.
 
@@ -97,7 +97,7 @@ def counted_bursts(
         share: Share of all packets that are in a burst.
         length: Mean length of a burst, in packets.
         loss: Probability in a burst.
-        luck: Random number of each packet.
+        uniforms: Random number of each packet.
     """
     ends, begins = 1.0 / length, share / (1.0 - share) / length
     steps = _uniform(rng)
@@ -107,7 +107,7 @@ def counted_bursts(
         nonlocal is_on
         if next(steps) < (ends if is_on else begins):
             is_on = not is_on
-        return is_on and luck.draw(now) < loss
+        return is_on and uniforms.draw(now) < loss
 
     return takes
 

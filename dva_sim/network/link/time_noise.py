@@ -58,8 +58,8 @@ class Weather:
         block = self._blocks.get(number)
         if block is None:
             self._blocks.pop(number - 2, None)  # time only goes forward
-            luck = self._streams.fresh(f"{self._name}/{number}")
-            block = self._blocks[number] = luck.random(_BLOCK)
+            rng = self._streams.fresh(f"{self._name}/{number}")
+            block = self._blocks[number] = rng.random(_BLOCK)
         first = float(block[inside])
         return _scrambled(first, self._count) if self._count else first
 

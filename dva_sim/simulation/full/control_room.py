@@ -211,9 +211,9 @@ def add_dispatcher(stage: Stage) -> ScriptedDispatcher | None:
     if profile is None:
         return None
     device = stage.device("control-room", 1)
-    luck = stage.streams.fresh
+    fresh = stage.streams.fresh
     room = ControlRoomAgent(device)
-    person = ScriptedDispatcher(room, profile, lambda what: luck(f"{device.label}/{what}"))
+    person = ScriptedDispatcher(room, profile, lambda what: fresh(f"{device.label}/{what}"))
     room.start()
     return person
 

@@ -88,8 +88,8 @@ def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> RunH
     detector, detected = None, start
     if not event.reported:
         detector, detected = first_detection(hazard, site)
-    luck = streams[f"event-{number}/hearsay"]
-    hearsay = tuple(_hearsay(detected, (x, y), site, luck) for _ in range(event.reports - 1))
+    rng = streams[f"event-{number}/hearsay"]
+    hearsay = tuple(_hearsay(detected, (x, y), site, rng) for _ in range(event.reports - 1))
     return RunHazard(
         kind=hazard.reported_as,
         room=room,
@@ -118,12 +118,12 @@ def beginning_of(
 
 
 def _hearsay(
-    first: float, place: tuple[float, float], site: Site, luck: np.random.Generator
+    first: float, place: tuple[float, float], site: Site, rng: np.random.Generator
 ) -> Hearsay:
     """Somewhere free near the true place, in the same room."""
-    time = first + float(luck.uniform(*HEARSAY_LATE))
+    time = first + float(rng.uniform(*HEARSAY_LATE))
     for _ in range(TRIES):
-        far, angle = HEARSAY_WITHIN * luck.uniform(), luck.uniform(0.0, 2.0 * math.pi)
+        far, angle = HEARSAY_WITHIN * rng.uniform(), rng.uniform(0.0, 2.0 * math.pi)
         x, y = place[0] + far * math.cos(angle), place[1] + far * math.sin(angle)
         if site.is_free(x, y, REACHABLE) and site.room_at(x, y) == site.room_at(*place):
             return Hearsay(time, (float(x), float(y)))

@@ -211,8 +211,8 @@ class TeamBuilder:
             ConfigError: the site has no room for it.
         """
         stage, name = self._stage, f"bystander-{number}"
-        luck = stage.streams[f"{name}/who"]
-        occupant = Occupant.draw(bystander_profile(stage.scenario), luck)
+        rng = stage.streams[f"{name}/who"]
+        occupant = Occupant.draw(bystander_profile(stage.scenario), rng)
         places = self._places(name)
         habits = occupant.habits
         body = self._world.add_person(name, Pose(*places[0], 0.0), radius=habits.walking.radius_m)
@@ -224,7 +224,7 @@ class TeamBuilder:
             planner=stage.planner,
             places=places,
             refuges=self._refuges,
-            luck=stage.streams[f"{name}/walks"],
+            rng=stage.streams[f"{name}/walks"],
             air=self._air,
             sees=self._sees_flames,
             leaves=lambda: self._world.remove(body),

@@ -55,8 +55,8 @@ def response_bounds(recording: TimedRecording) -> Floats:
 
 def _incident(shift: Shift, stream: int, index: int) -> Incident:
     """An incident again, as far as its way matters."""
-    luck, kind = shift.demand.luck[stream], shift.scenario.demand[stream].kind
-    place = luck.place(index)
+    draws, kind = shift.demand.draws[stream], shift.scenario.demand[stream].kind
+    place = draws.place(index)
     return Incident(
         stream=stream,
         index=index,

@@ -106,7 +106,7 @@ class Demand:
         self._streams = streams
         self._happens, self._noticed = happens, noticed
         self._names = scenario.stream_names
-        self.luck = [
+        self.draws = [
             EventDraws(stream, name, streams, terrain)
             for stream, name in zip(scenario.demand, self._names, strict=True)
         ]
@@ -190,21 +190,21 @@ class Demand:
         if self._left <= 0:
             return
         self._left -= 1
-        now, luck, config = self._clock.now, self.luck[stream], self._scenario.demand[stream]
-        place = luck.place(index)
+        now, draws, config = self._clock.now, self.draws[stream], self._scenario.demand[stream]
+        place = draws.place(index)
         incident = Incident(
             stream=stream,
             index=index,
             number=next(self._numbers),
             kind=config.kind,
             place=place,
-            true=luck.true(index),
-            severity=luck.severity(index),
+            true=draws.true(index),
+            severity=draws.severity(index),
             confidence=config.confidence,
             occurred=now,
         )
         self._happens(incident)
-        after = luck.noticed_after(incident)
+        after = draws.noticed_after(incident)
         if after <= 0.0:
             self._noticed(incident)
         elif after < math.inf:

@@ -45,7 +45,7 @@ def check_names(scenario: TimedScenario, error: Fail) -> TimedScenario:
             problem = f"preferences has no list for zone {zone!r}"
             raise error(problem, ("dispatch", "preferences"))
     _check_places(scenario, zones, error)
-    if dispatch.policy != "oracle":  # which is made from the run's own luck
+    if dispatch.policy != "oracle":  # which is made from the run's own random numbers
         check_policy(dispatch.policy, dispatch.options, error)
     return scenario
 

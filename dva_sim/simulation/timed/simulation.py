@@ -130,7 +130,7 @@ class Shift:
         self._served: set[int] = set()
         self._newest = 0
         self._moving: dict[Unit, None] = {}
-        self._luck: dict[tuple[str, int, str, int], Draws[float]] = {}
+        self._draws: dict[tuple[str, int, str, int], Draws[float]] = {}
         control_room.register(self)
         self.mail.carry()
         for start in sorted({group.from_s for group in scenario.responders}):
@@ -217,14 +217,14 @@ class Shift:
 
     def _noticed(self, incident: Incident) -> None:
         """Handle the first report; draw later reports and the withdrawal by event."""
-        luck = self.demand.luck[incident.stream]
+        draws = self.demand.draws[incident.stream]
         incident.noticed = self.clock.now
         self._report(incident, "caller")
-        repeat = luck.repeat_after(incident.index)
+        repeat = draws.repeat_after(incident.index)
         if repeat is not None:
             self.clock.call_after(repeat, self._report_again, incident)
         if self.scenario.demand[incident.stream].patience is not None:
-            patience = luck.patience[incident.index]
+            patience = draws.patience[incident.index]
             self.clock.call_after(patience, self._take_back, incident)
 
     def _report(self, incident: Incident, kind: str) -> None:
@@ -391,11 +391,11 @@ class Shift:
     def _drawn(self, purpose: str, law: Law, incident: Occurrence, whose: str = "") -> float:
         """Draws by the event's index; two laws for one purpose share their random numbers."""
         key = purpose, incident.stream, whose, id(law)
-        draws = self._luck.get(key)
+        draws = self._draws.get(key)
         if draws is None:
             stream = self.scenario.stream_names[incident.stream]
             name = f"demand/{stream}/{purpose}/{whose}"
-            draws = self._luck[key] = times(self.streams, name, law)
+            draws = self._draws[key] = times(self.streams, name, law)
         return draws[incident.index]
 
     def needs_people(self, incident: Incident) -> bool:

@@ -307,11 +307,11 @@ def _ways_of(site: Site) -> _Ways:
 @lru_cache(maxsize=8)
 def _spots_of(site: Site, count: int) -> tuple[tuple[Point, ...], ...]:
     """Return the same places in every run: they belong to the site."""
-    luck = Streams(0)
+    streams = Streams(0)
     return tuple(
         tuple(site.sample_free(rng, CLEARANCE, room.name) for _ in range(count))
         for room in site.rooms
-        for rng in [luck.fresh(f"spots/{room.name}")]
+        for rng in [streams.fresh(f"spots/{room.name}")]
     )
 
 

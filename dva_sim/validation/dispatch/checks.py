@@ -180,10 +180,10 @@ def _runs(case: Case, quick: bool) -> int:
 
 def _jobs(case: Case, seed: int, runs: int) -> list[StudyJob]:
     measures = json.dumps(list(case.exact))
-    luck = [derive_seed("validation", case.name, seed, trial) for trial in range(runs)]
+    seeds = [derive_seed("validation", case.name, seed, trial) for trial in range(runs)]
     return [
         job_of(case.name, own, case.scenario, batches=case.batches, measures=measures)
-        for own in luck
+        for own in seeds
     ]
 
 
@@ -215,9 +215,9 @@ def _columns(jobs: Sequence[StudyJob], rows: Mapping[Key, list[Row]]) -> Columns
 def _compare(case: Case, columns: Columns) -> list[Check]:
     """All that a case is judged by: results, what was put in, and what must hold in any case."""
     known = [values for name, values in columns.items() if name.startswith("control ")]
-    luck = np.column_stack(known) if known else None
+    controls = np.column_stack(known) if known else None
     found = [
-        ("result", measure, exact, estimate(columns[f"top {n}"], columns[f"bottom {n}"], luck))
+        ("result", measure, exact, estimate(columns[f"top {n}"], columns[f"bottom {n}"], controls))
         for n, (measure, exact) in enumerate(case.exact.items())
     ]
     for name in (name.removeprefix("in ") for name in columns if name.startswith("in ")):

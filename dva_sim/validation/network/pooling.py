@@ -205,14 +205,14 @@ def null_scores(cells: Sequence[ComparedCell], rng: np.random.Generator) -> Floa
     A condition's measures are taken from the same runs, so that they go together as they do;
     the model's own mean is one of other runs, and what cannot be told apart is an offset.
     """
-    luck: dict[Condition, tuple[NDArray[np.int64], NDArray[np.int64], Floats]] = {}
+    draws: dict[Condition, tuple[NDArray[np.int64], NDArray[np.int64], Floats]] = {}
     columns = []
     for cell in cells:
         runs, taken = len(cell.predicted), len(cell.group.runs)
-        own = luck.get(cell.group.condition)
+        own = draws.get(cell.group.condition)
         if own is None:
             picks = rng.integers(0, 1 << 30, size=(2, DRAWS, max(runs, taken)))
-            own = luck[cell.group.condition] = picks[0], picks[1], rng.normal(size=DRAWS)
+            own = draws[cell.group.condition] = picks[0], picks[1], rng.normal(size=DRAWS)
         sockets = cell.predicted[own[0][:, : len(cell.measured)] % runs].mean(axis=1)
         model = cell.predicted[own[1][:, :runs] % runs].mean(axis=1)
         columns.append((model - sockets + own[2] * resolution(cell)) / standard_error(cell))

@@ -60,7 +60,7 @@ def _group(condition: Condition, runs: Sequence[SocketRun]) -> ConditionGroup:
     kind = "pooled" if pooled else "single"
     reason = why_not_judged(condition)
     if not independent:
-        reason = reason or "shares its luck with other conditions"
+        reason = reason or "shares its random numbers with other conditions"
     return ConditionGroup(condition, kind, tuple(independent or runs), reason)
 
 

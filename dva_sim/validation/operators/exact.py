@@ -127,4 +127,4 @@ EXACT: dict[str, Callable[[int], Values]] = {
     "S16d": walkers,
     "S16e": lambda seed: plumes(),
 }
-"""How each exact check is simulated, given the seed of all luck."""
+"""How each exact check is simulated, given the random seed."""

@@ -91,7 +91,7 @@ def test_the_same_seed_makes_the_same_decisions():
     assert again.facts == played("ask_first").facts
 
 
-def test_its_delays_are_no_luck_of_anybody_else():
+def test_its_delays_change_nobody_elses_random_numbers():
     """The other people draw the same numbers with or without a dispatcher."""
     alone = simulate(build({**TEAM, "events": [ALARM], "horizon_s": 60.0}, {}), seed=3)
     room = played("automatic")

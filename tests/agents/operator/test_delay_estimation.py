@@ -58,12 +58,12 @@ def test_a_delay_that_changes_is_learnt_anew_within_half_a_minute():
     assert all(value == pytest.approx(2.0, abs=0.11) for value in values[900:])
 
 
-def learns_a_jump_after(frames_per_second: float, luck: int) -> float:
+def learns_a_jump_after(frames_per_second: float, seed: int) -> float:
     """Time until a delay that rose from 1 to 3 s is estimated within 0.35 s [s].
 
     New speeds and turn rates are asked for every two seconds on average.
     """
-    rng = np.random.default_rng(luck)
+    rng = np.random.default_rng(seed)
     changes = np.cumsum(rng.exponential(2.0, 400))
     asked = rng.uniform((0.0, -0.5), (0.5, 0.5), (401, 2)).tolist()
     guess, next_look = DelayEstimate(0.0, 0.6), 0.0
@@ -84,7 +84,7 @@ def test_how_fast_a_delay_is_learnt_hardly_depends_on_how_many_frames_there_are(
     frames_per_second, most
 ):
     """Two looks at the least are needed, whatever they count."""
-    took = [learns_a_jump_after(frames_per_second, luck) for luck in range(9)]
+    took = [learns_a_jump_after(frames_per_second, seed) for seed in range(9)]
     assert 2.0 < float(np.median(took)) < most
 
 

@@ -35,8 +35,8 @@ def looker(
     **traits: float,
 ) -> Looking:
     """The median person, with some traits otherwise, who looks for an event at the place."""
-    person, luck = replace(PERSON, **traits), normals(seed)
-    return Looking(kind, PLACE, planner=OpenGround(), person=person, luck=luck, arrived=arrived)
+    person, noise = replace(PERSON, **traits), normals(seed)
+    return Looking(kind, PLACE, planner=OpenGround(), person=person, normals=noise, arrived=arrived)
 
 
 def picture(*hazards: SeenHazard, away: float = 1.2, visibility: float = CLEAR) -> Observation:

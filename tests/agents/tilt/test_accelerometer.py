@@ -82,7 +82,7 @@ def test_samples_come_at_the_rate_and_jitter_around_it_without_overtaking():
     assert times[-1] == pytest.approx(1000.0, abs=0.02)
 
 
-def test_the_size_of_a_block_of_luck_changes_no_number():
+def test_the_size_of_a_block_of_random_numbers_changes_no_number():
     part = AccelerometerPart(noise_mg=3.0, drift_mg_per_sqrt_min=1.0, offset_mg_per_k=0.5)
     rows = []
     for block in (1, 7, 256):

@@ -59,7 +59,7 @@ def test_it_tilts_no_farther_and_no_faster_than_it_can():
     assert np.diff(way).max() == pytest.approx(2.0 / RATE)
 
 
-def test_the_size_of_a_block_of_luck_changes_no_number():
+def test_the_size_of_a_block_of_random_numbers_changes_no_number():
     ways = [
         pitches(Hand(0.15, np.random.default_rng(6), motor_noise=0.05, block=block), 0.3, 5.0)
         for block in (1, 7, 256)

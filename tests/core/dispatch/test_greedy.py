@@ -34,7 +34,7 @@ def test_without_lists_the_order_of_registration_is_the_list():
     assert pairs(Preference(), situation("gg", [[INF, 20], [50, 10]])) == [(0, 1), (1, 0)]
 
 
-def test_a_random_choice_is_among_all_who_can_and_follows_the_luck_given():
+def test_a_random_choice_is_among_all_who_can_and_follows_the_generator_given():
     seen = situation("gggg", [[10, INF, 30, 40]])
     chosen = [RandomChoice().advise(seen, np.random.default_rng(i))[0].responder for i in range(50)]
     assert set(chosen) == {0, 2, 3}

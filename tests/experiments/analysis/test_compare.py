@@ -48,7 +48,7 @@ def test_the_same_study_meets_itself_cell_by_cell_but_for_references(results):
     assert all(row.is_identical for row in comparison.differences())
 
 
-def test_a_difference_is_that_of_the_runs_with_the_same_luck(made, results):
+def test_a_difference_is_that_of_the_runs_with_the_same_random_numbers(made, results):
     rows = Comparison(results, made(episode=later)).differences("drive_time_s")
     drive = [row for row in rows if row.part == "drive"]
     assert len(drive) == 4
@@ -162,7 +162,7 @@ def test_a_difference_of_one_person_has_no_interval(made):
     assert not row.is_told_from_zero
 
 
-def test_where_luck_is_shared_in_part_only_those_runs_are_looked_at(made, results):
+def test_where_random_numbers_are_shared_in_part_only_those_runs_are_looked_at(made, results):
     fewer = made("persons=2", episode=later)
     comparison = Comparison(results, fewer)
     assert comparison.paired == (24, 36)

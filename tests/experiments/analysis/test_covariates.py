@@ -133,6 +133,6 @@ def test_a_study_stops_at_the_interval_that_it_shows():
 
 def _measured(person: int, is_slow: bool) -> dict[str, float]:
     rng = np.random.default_rng(person)
-    trait, way, luck = rng.normal(), 9 * rng.normal(), rng.normal(size=2)
-    late = 8 - 4 * trait + 0.5 * way + luck[0] if is_slow else 0.0
-    return {"response_mean_s": 50 + luck[1] + late, "caution_off": trait, "way_off_m": way}
+    trait, way, chance = rng.normal(), 9 * rng.normal(), rng.normal(size=2)
+    late = 8 - 4 * trait + 0.5 * way + chance[0] if is_slow else 0.0
+    return {"response_mean_s": 50 + chance[1] + late, "caution_off": trait, "way_off_m": way}

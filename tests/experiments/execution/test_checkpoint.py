@@ -27,8 +27,8 @@ def test_a_run_kept_twice_is_kept_once_and_as_it_was_first(tmp_path):
 
 def test_floats_come_back_to_the_last_bit(tmp_path):
     job = cell_grid.jobs(study_in(tmp_path))[0]
-    luck = random.Random(1)
-    values = [luck.uniform(-1, 1) * 10.0 ** luck.randint(-300, 300) for _ in range(200)]
+    rng = random.Random(1)
+    values = [rng.uniform(-1, 1) * 10.0 ** rng.randint(-300, 300) for _ in range(200)]
     values += [math.inf, -0.0, 5e-324]
     with Checkpoint(tmp_path, "me") as journal:
         journal.add([scheduling.perform(job, lambda _: {"runs": [{"x": v} for v in values]})])

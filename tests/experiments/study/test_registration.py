@@ -48,7 +48,7 @@ def test_a_registered_study_run_unchanged_is_confirmatory(tmp_path):
     assert status.registration["plan"]["persons"] == 3
 
 
-def test_its_persons_and_luck_are_those_of_the_registration_alone(tmp_path):
+def test_its_persons_and_random_numbers_are_those_of_the_registration_alone(tmp_path):
     before = {job.seed for job in cell_grid.jobs(study_in(tmp_path, text=CLAIMED))}
     path = registered(tmp_path)
     study = load_study(path)
@@ -119,7 +119,7 @@ def test_the_registration_of_another_study_is_told(tmp_path):
     assert "'study'" in status.why[0]
 
 
-def test_settings_make_it_exploratory_with_the_luck_of_the_study(tmp_path):
+def test_settings_make_it_exploratory_with_the_random_numbers_of_the_study(tmp_path):
     study = load_study(registered(tmp_path), ["robot.processing_s=0.2"])
     assert study.status.kind == "exploratory"
     assert study.status.why[0] == "--set robot.processing_s=0.2"

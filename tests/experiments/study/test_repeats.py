@@ -50,7 +50,7 @@ def test_the_contrast_is_repeated_with_every_set_at_the_last_stop(tmp_path):
     assert len(jobs) == 4 * 2 * 2 * 2
 
 
-def test_a_repeat_has_the_persons_and_the_luck_of_the_study_and_its_own_traits(tmp_path):
+def test_a_repeat_has_the_persons_and_the_random_numbers_of_the_study_and_its_own_traits(tmp_path):
     study = kit.study_in(tmp_path, text=kit.REPEATED)
     own = {(j.person, j.trial): j for j in cell_grid.jobs(study) if j.part == "drive"}
     sets = parameter_sets(study)

@@ -54,18 +54,18 @@ class Chaos(Policy):
     preempts = auctions = relocates = True
 
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        luck = random.Random(int(rng.integers(2**32)))
+        dice = random.Random(int(rng.integers(2**32)))
         tasks, team = len(situation.tasks), len(situation.responders)
         advice: list[Advice] = []
-        for _ in range(luck.randrange(6)):
-            what = luck.random()
+        for _ in range(dice.randrange(6)):
+            what = dice.random()
             if what < 0.7 and tasks:
-                advice.append(Assignment(luck.randrange(tasks), luck.randrange(team)))
+                advice.append(Assignment(dice.randrange(tasks), dice.randrange(team)))
             elif what < 0.85 and tasks:
-                advice.append(Announcement(luck.randrange(tasks)))
+                advice.append(Announcement(dice.randrange(tasks)))
             else:
-                advice.append(Relocation(luck.randrange(team), luck.randrange(3)))
-        if luck.random() < 0.02:
+                advice.append(Relocation(dice.randrange(team), dice.randrange(3)))
+        if dice.random() < 0.02:
             advice.append(Assignment(tasks, team))
         return advice
 
@@ -80,20 +80,20 @@ class Walk:
     """
 
     def __init__(self, seed: int, folder: Path, policy: str | None = None) -> None:
-        self.luck = random.Random(seed)
+        self.dice = random.Random(seed)
         self.file = folder / f"{seed}.sqlite"
-        self.policy = policy or self.luck.choice(POLICY_NAMES)
+        self.policy = policy or self.dice.choice(POLICY_NAMES)
         self.rules = Rules(
-            escalate_after=self.luck.choice([0.0, 30.0, 120.0, math.inf]),
-            containment=self.luck.random() < 0.6,
-            most_waiting=self.luck.choice([None, None, 0, 2]),
-            merge_distance=self.luck.choice([0.0, 8.0]),
+            escalate_after=self.dice.choice([0.0, 30.0, 120.0, math.inf]),
+            containment=self.dice.random() < 0.6,
+            most_waiting=self.dice.choice([None, None, 0, 2]),
+            merge_distance=self.dice.choice([0.0, 8.0]),
             order_limit=LIMIT,
             operator_span=1 + seed % 3,
-            decide_within=self.luck.choice([5.0, 20.0]),
+            decide_within=self.dice.choice([5.0, 20.0]),
         )
-        self.ask_first = self.luck.random() < 0.5
-        self.access_until = self.luck.choice([math.inf, 300.0])
+        self.ask_first = self.dice.random() < 0.5
+        self.access_until = self.dice.choice([math.inf, 300.0])
         self.now, self.numbers = 0.0, dict.fromkeys(DEVICES, 0)
         self.alive = dict.fromkeys(DEVICES, True)
         self.in_flight: list[Send] = []
@@ -110,8 +110,8 @@ class Walk:
         return store
 
     def _desk(self) -> Dva:
-        sessions = Sessions(Permissions(lambda: self.luck.randrange(2**32)))
-        rng = np.random.default_rng(self.luck.randrange(2**31))
+        sessions = Sessions(Permissions(lambda: self.dice.randrange(2**32)))
+        rng = np.random.default_rng(self.dice.randrange(2**31))
         holds = AccessRule(until=self.access_until)
         desk = Dva(
             self._policy(),
@@ -134,7 +134,7 @@ class Walk:
 
     def step(self) -> None:
         """Something happens, and is written down."""
-        name = self.luck.choices(list(STEPS_OF_A_WALK), list(STEPS_OF_A_WALK.values()))[0]
+        name = self.dice.choices(list(STEPS_OF_A_WALK), list(STEPS_OF_A_WALK.values()))[0]
         self._take(getattr(self, f"_{name}")() or [])
         self.check(name)
 
@@ -145,22 +145,22 @@ class Walk:
     def say(self, source: str, body: m.Body, number: int | None = None) -> list[Send]:
         if number is None:
             number = self.numbers[source] = self.numbers[source] + 1
-        stamp = f"12:00:{self.luck.randrange(60):02d}.{self.luck.randrange(10**6)}"
+        stamp = f"12:00:{self.dice.randrange(60):02d}.{self.dice.randrange(10**6)}"
         message = m.Message(DVA, number, source, stamp, 0, body)
         reply, sends = self.desk.handle(message, self.now)
         assert reply.answers == number
         return sends
 
     def _any(self, *kinds: str) -> str:
-        return self.luck.choice([d for d, kind in DEVICES.items() if not kinds or kind in kinds])
+        return self.dice.choice([d for d, kind in DEVICES.items() if not kinds or kind in kinds])
 
     def _some_event(self) -> int:
         newest = self.desk.book.total
         known = list(self.desk.book.open) or [newest]
-        return self.luck.choice([*known, *known, max(1, newest), newest + 1])
+        return self.dice.choice([*known, *known, max(1, newest), newest + 1])
 
     def _place(self) -> m.Position:
-        return east(self.luck.choice([0, 5, 20, 40, 60, 99]))
+        return east(self.dice.choice([0, 5, 20, 40, 60, 99]))
 
     def _register(self, device: str | None = None) -> list[Send]:
         device = device or self._any()
@@ -168,7 +168,7 @@ class Walk:
         return self.say(device, body)
 
     def _impostor(self) -> list[Send]:
-        body, device = m.Registration("x", self.luck.choice(list(KINDS)), "10.0.0.66"), self._any()
+        body, device = m.Registration("x", self.dice.choice(list(KINDS)), "10.0.0.66"), self._any()
         if device not in self.desk.registry.entries:
             return []  # who is forgotten may be anybody
         return self.say(device, body)
@@ -192,9 +192,9 @@ class Walk:
         self.desk.note(m.Message(DVA, 1, device, "12:00:00", 0, body), self.now)
 
     def _report(self) -> list[Send]:
-        finding = "refuted" if self.luck.random() < 0.25 else "detected"
-        kind = self.luck.choice(["fire", "flood"])
-        severity, sure = self.luck.random(), self.luck.random()
+        finding = "refuted" if self.dice.random() < 0.25 else "detected"
+        kind = self.dice.choice(["fire", "flood"])
+        severity, sure = self.dice.random(), self.dice.random()
         body = m.EventReport(None, kind, self._place(), severity, sure, finding)
         return self.say(self._any("Sensor", "Guard"), body)
 
@@ -208,9 +208,9 @@ class Walk:
         """Word of something sent comes back, in any order; of a few things twice."""
         if not self.in_flight:
             return []
-        place = self.luck.randrange(min(len(self.in_flight), 6))
+        place = self.dice.randrange(min(len(self.in_flight), 6))
         send = self.in_flight[place]
-        if self.luck.random() > keep:
+        if self.dice.random() > keep:
             del self.in_flight[place]
         return what(send, self.now)
 
@@ -218,37 +218,37 @@ class Walk:
         """Mostly of who has the order, and mostly about its event."""
         working = self.desk.orders.engaged
         device = self._any()
-        if working and self.luck.random() < 0.8:
-            device = self.luck.choice(list(working))
+        if working and self.dice.random() < 0.8:
+            device = self.dice.choice(list(working))
         number = self._some_event()
-        if device in working and self.luck.random() < 0.8:
+        if device in working and self.dice.random() < 0.8:
             number = working.all(device)[0].number
         states = ["accepted", "departed", "arrived", "done", "failed", "declined"]
-        return self.say(device, m.OrderProgress(number, self.luck.choice(states)))
+        return self.say(device, m.OrderProgress(number, self.dice.choice(states)))
 
     def _found(self) -> list[Send]:
         number = self._some_event()
         event, device = self.desk.book.get(number), self._any()
-        if event is not None and event.sent and self.luck.random() < 0.8:
-            device = self.luck.choice(sorted(event.sent))
-        finding = self.luck.choice(["confirmed", "confirmed", "refuted", "contained", "detected"])
+        if event is not None and event.sent and self.dice.random() < 0.8:
+            device = self.dice.choice(sorted(event.sent))
+        finding = self.dice.choice(["confirmed", "confirmed", "refuted", "contained", "detected"])
         return self.say(device, m.EventReport(number, "fire", self._place(), 0.5, 0.9, finding))
 
     def _bid(self) -> list[Send]:
         running = self.desk.dispatcher.auctions.running
-        number = self.luck.choice(list(running)) if running else self._some_event()
-        return self.say(self._any("Guard", "Robot"), m.TaskBid(number, self.luck.random() * 100))
+        number = self.dice.choice(list(running)) if running else self._some_event()
+        return self.say(self._any("Guard", "Robot"), m.TaskBid(number, self.dice.random() * 100))
 
     def _decide(self) -> list[Send]:
         """Somebody at a control room decides: mostly what can be, and about what is there."""
         number, device = self._some_event(), self._any("Guard", "Robot")
         event = self.desk.book.get(number)
-        seen = None if event is None or self.luck.random() < 0.4 else event.handling.decisions
-        if event is not None and event.holder and self.luck.random() < 0.3:
+        seen = None if event is None or self.dice.random() < 0.4 else event.handling.decisions
+        if event is not None and event.holder and self.dice.random() < 0.3:
             device = event.responder or device
-        driver = self._any("TeleOp", "ControlRoom") if self.luck.random() < 0.3 else None
-        task = self.luck.choice([None, "confirm", "contain", "stand_by"])
-        body = self.luck.choice(
+        driver = self._any("TeleOp", "ControlRoom") if self.dice.random() < 0.3 else None
+        task = self.dice.choice([None, "confirm", "contain", "stand_by"])
+        body = self.dice.choice(
             [
                 m.Assign(number, device, driver, task, None, seen),
                 m.Assign(number, device, driver, task, None, seen),
@@ -257,15 +257,15 @@ class Walk:
                 m.AddNote(number, "a note"),
                 m.GetProposal(number),
                 m.GetEventList(),
-                m.SetDispatch(self.luck.choice(["automatic", "ask_first"])),
+                m.SetDispatch(self.dice.choice(["automatic", "ask_first"])),
                 m.Revoke(self._any("Robot")),
                 *([m.FalseAlarm(number, "toast"), m.Escalate(number)] * (number % 4 == 0)),
             ]
         )
-        return self.say(self.luck.choice(ROOMS), body)
+        return self.say(self.dice.choice(ROOMS), body)
 
     def _permission(self) -> list[Send]:
-        level = self.luck.choice(["teleoperation", "missions", "both", "sensors"])
+        level = self.dice.choice(["teleoperation", "missions", "both", "sensors"])
         body = m.PermissionRequest(self._any("Robot", "Guard"), level, ("heat_flux",))
         return self.say(self._any(), body)
 
@@ -273,13 +273,13 @@ class Walk:
         held = self.desk.sessions.permissions.all()
         if not held:
             return []
-        grant = self.luck.choice(held)
+        grant = self.dice.choice(held)
         return self.say(
             grant.holder, m.PermissionRevocation(grant.robot, grant.holder, grant.session)
         )
 
     def _time(self) -> list[Send]:
-        return self.pass_time(self.luck.choice([0.125, 1.0, 1.0, 2.0, 5.0, 9.0, 12.0, 40.0, 130.0]))
+        return self.pass_time(self.dice.choice([0.125, 1.0, 1.0, 2.0, 5.0, 9.0, 12.0, 40.0, 130.0]))
 
     def _deadline(self) -> list[Send]:
         due = self.desk.next_deadline()
@@ -310,7 +310,7 @@ class Walk:
         assert after == before, {k: (before[k], after[k]) for k in after if after[k] != before[k]}
         for device in DEVICES:
             self._status(device)
-        self.in_flight = [s for s in self.in_flight if self.luck.random() < 0.5]
+        self.in_flight = [s for s in self.in_flight if self.dice.random() < 0.5]
         return self.desk.orders.again()
 
     # --- what must hold ----------------------------------------------------------------

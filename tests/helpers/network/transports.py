@@ -225,7 +225,7 @@ class Meddler:
     """
 
     def __init__(self, clock: Clock, seed: int, plan: Plan) -> None:
-        self._clock, self._luck, self.plan = clock, Random(seed), plan
+        self._clock, self._rng, self.plan = clock, Random(seed), plan
         self.done: Counter[str] = Counter()
 
     def service(self, service: Service) -> Service:
@@ -244,18 +244,18 @@ class Meddler:
         return lambda payload: self.pass_on(handler, payload)
 
     def pass_on(self, take: Callable[[Any], object], what: object) -> None:
-        luck, plan = self._luck, self.plan
-        if luck.random() < plan.lose:
+        rng, plan = self._rng, self.plan
+        if rng.random() < plan.lose:
             self.done["lost"] += 1
             return
-        if luck.random() < plan.double:
+        if rng.random() < plan.double:
             self.done["doubled"] += 1
             self._later(take, what)
         self._later(take, what)
 
     def _later(self, take: Callable[[Any], object], what: object) -> None:
         """Half of them are held back, so that those behind them overtake."""
-        hold = self._luck.choice((0.0, self._luck.uniform(0.0, self.plan.hold)))
+        hold = self._rng.choice((0.0, self._rng.uniform(0.0, self.plan.hold)))
         if hold:
             self.done["held back"] += 1
         self._clock.call_after(hold, take, what)

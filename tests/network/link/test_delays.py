@@ -94,7 +94,7 @@ def test_without_correlation_neighbours_are_independent():
     assert abs(np.corrcoef(found[1:], found[:-1])[0, 1]) < 4 / N**0.5
 
 
-def test_packets_of_one_millisecond_share_slow_weather_and_not_their_own_luck():
+def test_packets_of_one_millisecond_share_slow_changes_and_not_their_own_random_numbers():
     line = link(delay_s=0.1, delay_law=NORMAL | {"correlation_s": 1.0})
     assert len({round(line.carry(0.5, 100) or 0, 6) for _ in range(5)}) == 1
     line = link(delay_s=0.1, delay_law=NORMAL, reorder=True)
@@ -114,7 +114,7 @@ def test_who_sends_seldom_meets_the_weather_of_who_sends_often(law):
     assert seldom == pytest.approx(often[: 7 * 400 : 7], abs=1e-9)
 
 
-def test_a_delay_law_has_another_luck_in_each_direction_and_for_each_seed():
+def test_a_delay_law_has_other_random_numbers_in_each_direction_and_for_each_seed():
     firsts = [
         link(direction, seed, delay_s=0.1, delay_law=GAMMA).carry(0.0, 100)
         for direction, seed in (("up", 1), ("down", 1), ("up", 2), ("up", 1))

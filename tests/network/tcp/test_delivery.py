@@ -11,17 +11,17 @@ from dva_sim.network.tcp import TcpConnection, TcpOptions
 class RoughLink:
     """Loses, delays and lets overtake."""
 
-    def __init__(self, luck, loss, delay, spread):
-        self.luck, self.loss, self.delay, self.spread = luck, loss, delay, spread
+    def __init__(self, rng, loss, delay, spread):
+        self.rng, self.loss, self.delay, self.spread = rng, loss, delay, spread
 
     def carry(self, now, size):
-        lost, late = self.luck.random(2)
+        lost, late = self.rng.random(2)
         return None if lost < self.loss else now + self.delay + late * self.spread
 
 
 def talk(seed, loss, spread, opener=EXACT, seconds=20.0):
     """Both ends write as they like; returns what was written and read, and when."""
-    luck = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     clock = Clock()
     links = [RoughLink(np.random.default_rng([seed, n]), loss, 0.03, spread) for n in (1, 2)]
     connection = TcpConnection(clock, *links, opener, EXACT)
@@ -29,13 +29,13 @@ def talk(seed, loss, spread, opener=EXACT, seconds=20.0):
     written, log = {"opener": 0, "peer": 0}, []
 
     def read(name):
-        count = ends[name].read(int(luck.integers(1, 100_000)))
+        count = ends[name].read(int(rng.integers(1, 100_000)))
         log.append((clock.now, name, count))
 
     def write(name):
         if clock.now > seconds:
             return False
-        written[name] += ends[name].write(int(luck.integers(1, 6000)))
+        written[name] += ends[name].write(int(rng.integers(1, 6000)))
         return True
 
     for name, end in ends.items():

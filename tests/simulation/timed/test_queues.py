@@ -40,7 +40,7 @@ def test_one_server_that_takes_15_s_falls_5_s_further_behind_with_each_event_eve
     assert recording.utilisation(0) == 0.9  # from 10 s to the horizon at 100 s
 
 
-def test_waits_are_those_of_lindley_s_recursion_on_the_same_luck():
+def test_waits_are_those_of_lindley_s_recursion_on_the_same_random_numbers():
     """W(n+1) = max(0, W(n) + S(n) - A(n)), with services and arrivals as they were drawn.
 
     References:
@@ -213,8 +213,8 @@ def test_a_batch_that_waits_for_the_shift_to_begin_is_decided_as_one():
         drain=True,
     )
     law = TypeAdapter(Law).validate_python(travel)
-    luck = [times(Streams(1), f"demand/fire/travel/guard-{g}", law) for g in range(1, 7)]
-    cost = np.array([[luck[g][event] for g in range(6)] for event in range(6)])
+    draws = [times(Streams(1), f"demand/fire/travel/guard-{g}", law) for g in range(1, 7)]
+    cost = np.array([[draws[g][event] for g in range(6)] for event in range(6)])
     columns = recording.columns
     assert columns["assigned"].tolist() == [10.0] * 6
     assert sorted(columns["responder"].tolist()) == list(range(6))

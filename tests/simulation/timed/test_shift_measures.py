@@ -82,7 +82,7 @@ def test_a_run_that_drains_is_followed_to_the_end_of_its_last_event():
     assert row["response_mean_s"] == pytest.approx(5)
 
 
-def test_the_bound_is_the_best_unit_from_its_base_with_the_luck_of_the_event():
+def test_the_bound_is_the_best_unit_from_its_base_with_the_random_numbers_of_the_event():
     # The slow one is 10 m away at 1 m/s, the fast one 30 m at 5 m/s: 10 s against 6 s.
     slow = {"name": "slow", "base": [0, 0], "speed_mps": 1}
     fast = {"name": "fast", "base": [40, 0], "speed_mps": 5}

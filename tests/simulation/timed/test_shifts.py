@@ -156,9 +156,9 @@ def test_from_half_way_nine_ways_in_ten_are_as_long_as_the_planner_finds_within_
     from dva_sim.simulation.timed.travel import Rooms
 
     rooms = Rooms("caparica", 1, "path")
-    start, goal, luck = rooms.spots(3)[0], rooms.spots(12)[0], np.random.default_rng(1)
+    start, goal, rng = rooms.spots(3)[0], rooms.spots(12)[0], np.random.default_rng(1)
     errors = []
-    for gone in luck.uniform(0, rooms.length(start, goal), 12):
+    for gone in rng.uniform(0, rooms.length(start, goal), 12):
         here = rooms.along(start, goal, gone)
         for zone in (5, 9, 14):
             there = rooms.spots(zone)[0]
@@ -316,7 +316,7 @@ def test_lists_of_preference_decide_by_zone():
     assert set(zip(streams, who, strict=True)) == {("there", "guard-2"), ("near", "guard-1")}
 
 
-# --- luck ----------------------------------------------------------------------------------
+# --- random numbers ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("policy", known_policies())
@@ -362,7 +362,7 @@ def test_the_same_seed_gives_the_same_bytes_in_two_processes():
     assert len(here) > 10_000
 
 
-def test_a_further_guard_changes_no_other_guard_s_luck():
+def test_a_further_guard_changes_no_other_guard_s_random_numbers():
     alone, together = (
         play(lone_guard(guard={"base": "random", "speed_sd_mps": 0.3, "name": "guard-1"})),
         play(

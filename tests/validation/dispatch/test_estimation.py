@@ -71,9 +71,9 @@ def test_ratios_with_controls_cover_too():
     inside = 0
     for _ in range(500):
         customers = rng.poisson(50, size=80).astype(float)
-        luck = rng.normal(size=80)
-        waits = customers * (4 + 0.5 * luck) + rng.normal(size=80)
-        found = estimate(waits, customers, np.column_stack([customers - 50, luck]))
+        chance = rng.normal(size=80)
+        waits = customers * (4 + 0.5 * chance) + rng.normal(size=80)
+        found = estimate(waits, customers, np.column_stack([customers - 50, chance]))
         inside += abs(found.value - 4) < 1.96 * found.error
     assert 0.92 < inside / 500 < 0.98
 

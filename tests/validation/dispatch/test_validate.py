@@ -103,5 +103,5 @@ def test_a_case_that_seems_to_differ_is_played_again_and_longer(tmp_path):
 
 @pytest.mark.soak
 @pytest.mark.parametrize("name", IDENTITIES)
-def test_an_identity_holds_with_other_luck(name):
+def test_an_identity_holds_with_other_random_numbers(name):
     assert all(off == 0.0 for _, off in check_identity(name, seed=8))

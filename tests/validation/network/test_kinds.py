@@ -26,17 +26,17 @@ def test_six_seeds_of_their_own_make_a_lossy_condition_a_pooled_one():
     assert [g.kind for g in grouped([run(lossy, seed) for seed in range(5)])] == ["single"]
 
 
-def test_runs_that_share_their_luck_are_set_aside_where_others_do_not():
+def test_runs_that_share_their_random_numbers_are_set_aside_where_others_do_not():
     lossy = Condition("pub", 10, loss=0.05)
     [group] = grouped([run(lossy, 1, "D", independent=False), run(lossy, 7)])
     assert [r.seed for r in group.runs] == [7]
     assert not group.left_out
 
 
-def test_under_loss_shared_luck_alone_says_nothing():
+def test_under_loss_shared_random_numbers_alone_says_nothing():
     lossy = Condition("pub", 10, loss=0.05)
     [group] = grouped([run(lossy, 1, "D", independent=False)])
-    assert "shares its luck" in group.left_out
+    assert "shares its random numbers" in group.left_out
     [group] = grouped([run(Condition("pub", 10), 1, "D", independent=False)])
     assert not group.left_out
 

@@ -57,14 +57,14 @@ def test_the_experiment_is_played_sixty_times(fit):
     assert again == 6 * [fit.SEED + 1 + n for n in range(6)]  # the same persons for each
 
 
-def test_without_luck_the_best_of_all_that_was_tried_is_taken_and_nothing_is_as_good(fit):
+def test_without_noise_the_best_of_all_that_was_tried_is_taken_and_nothing_is_as_good(fit):
     tried = fit.search(noisy(0.0, 0.0))
     best = min((row for row in tried), key=lambda row: row["loss"])
     assert fit.medians_of(tried) == {name: best[name] for name in fit.FREE}
     assert fit.bands_of(tried) == {name: (best[name], best[name]) for name in fit.FREE}
 
 
-def test_a_loss_that_was_small_by_luck_in_the_search_decides_nothing(fit):
+def test_a_loss_that_was_small_by_chance_in_the_search_decides_nothing(fit):
     lucky = {"stage": "near", **BEST, "margin": 0.9, "seed": 1, "loss": -9.0}
     assert fit.medians_of([lucky, *rows({0.9: [3, 3.1], 0.5: [1, 1.2]})])["margin"] == 0.5
 
@@ -75,12 +75,12 @@ def test_who_is_worse_by_less_than_two_standard_errors_widens_the_band(fit):
     assert fit.bands_of(tried)["margin"] == (0.5, 0.6)
 
 
-def test_luck_that_all_share_widens_no_band(fit):
-    calm, shared = (fit.bands_of(fit.search(noisy(0.0, luck))) for luck in (0.0, 3.0))
+def test_noise_that_all_share_widens_no_band(fit):
+    calm, shared = (fit.bands_of(fit.search(noisy(0.0, noise))) for noise in (0.0, 3.0))
     for name in fit.FREE:
         assert shared[name] == pytest.approx(calm[name])
 
 
-def test_luck_of_their_own_widens_bands(fit):
+def test_noise_of_their_own_widens_bands(fit):
     bands = fit.bands_of(fit.search(noisy(0.5, 0.0)))
     assert all(high > low for low, high in bands.values())

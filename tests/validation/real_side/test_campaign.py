@@ -102,7 +102,7 @@ def test_a_campaign_stops_when_nothing_works(tmp_path, monkeypatch):
     assert len(told) == 3
 
 
-def test_two_conditions_with_one_seed_do_not_share_their_luck():
+def test_two_conditions_with_one_seed_do_not_share_their_random_numbers():
     assert job_of(SLOW, 1).seed != job_of(FAST, 1).seed != job_of(FAST, 2).seed
 
 

@@ -159,8 +159,8 @@ def perform(job: StudyJob) -> Tables:
     assert isinstance(scenario, MiddlewareScenario)
     rows = []
     for play in range(plays):
-        luck = np.random.default_rng(derive_seed("beside", job.config, job.seed, play))
-        row = VirtualRun(scenario, job.seed, ProgramTimes.drawn(luck)).play()
+        rng = np.random.default_rng(derive_seed("beside", job.config, job.seed, play))
+        row = VirtualRun(scenario, job.seed, ProgramTimes.drawn(rng)).play()
         rows.append({measure: row[measure] for measure in ALLOWANCES})
     return {"rows": rows}
 
