@@ -267,13 +267,13 @@ class AgentDevice:
 
     def reply_to(self, message: m.Message, data: bytes) -> m.Reply | None:
         """The reply in `data`, if it is one, from the device asked, to this very request."""
-        said = self.read(data, message.destination)
-        if said is None or not isinstance(said.body, m.Reply):
+        answer = self.read(data, message.destination)
+        if answer is None or not isinstance(answer.body, m.Reply):
             return None
-        if said.body.answers not in (message.message_id, 0):  # 0: it could not be read
+        if answer.body.answers not in (message.message_id, 0):  # 0: it could not be read
             self.recorder.counters["refused: a reply to something else"] += 1
             return None
-        return said.body
+        return answer.body
 
     def _meet(self, peer: str, reply: m.Reply) -> None:
         """The DVA introduces a device to those that it may act on."""

@@ -83,9 +83,9 @@ class Child:
         code = self.process.poll()
         if code is None:
             return f"the {self.name} has closed its pipe"
-        said = self._said()
-        told = said[-1].removeprefix("dva-sim: ").removeprefix(ERROR) if said else _code(code)
-        return f"the {self.name} has ended: {told}"
+        output = self._said()
+        text = output[-1].removeprefix("dva-sim: ").removeprefix(ERROR) if output else _code(code)
+        return f"the {self.name} has ended: {text}"
 
     def _said(self) -> list[str]:
         assert self.process.stderr is not None

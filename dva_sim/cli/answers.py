@@ -67,8 +67,8 @@ def _compare(folder: Path, studies: list[str], mark: bool, jobs: int | None) -> 
     now = _sampled([answer.study for answer in kept if answer.sampled], jobs)
     code = ExitCode.OK
     for answer in kept:
-        told, is_stale = _told(answer, now.get(answer.study, {}))
-        print(f"{answer.study}: {told}")
+        lines, is_stale = _told(answer, now.get(answer.study, {}))
+        print(f"{answer.study}: {lines}")
         if is_stale and not answer.stale_since:
             if mark:
                 _mark(answer, folder)

@@ -41,8 +41,8 @@ class CommandWithExamples(TyperCommand):
         text, _, examples = inspect.cleandoc(help or "").partition(_EXAMPLES)
         super().__init__(*args, help=text.strip(), **others)
         self.examples = [
-            (call.strip(), told.strip())
-            for call, _, told in (line.partition("  # ") for line in examples.splitlines())
+            (call.strip(), entry.strip())
+            for call, _, entry in (line.partition("  # ") for line in examples.splitlines())
             if call.strip()
         ]
 
@@ -68,9 +68,9 @@ class CommandWithExamples(TyperCommand):
         if not self.examples:
             return
         with formatter.section("Examples"):
-            for call, told in self.examples:
-                if told:
-                    formatter.write(f"  # {told}\n")
+            for call, entry in self.examples:
+                if entry:
+                    formatter.write(f"  # {entry}\n")
                 formatter.write(f"  {call}\n")
 
 

@@ -83,8 +83,8 @@ def tell(
         if side.failures:
             failed = f"{len(side.failures)} runs of {name} failed and take no part"
             console.print(failed, style="yellow", soft_wrap=True)
-    told = (*_questions(comparison), *_cells(comparison), _random_numbers(comparison))
-    print_lines(map(escape, told), console)
+    lines = (*_questions(comparison), *_cells(comparison), _random_numbers(comparison))
+    print_lines(map(escape, lines), console)
     wanted: Sequence[str | None] = measures or [None]
     for measure in wanted:
         table, column = comparison.find(measure)
@@ -156,10 +156,10 @@ def _differences(name: str, found: Sequence[Difference], console: Console) -> No
     heads = ["part", *map(factor_name, factors), "runs A", "runs B", "median A", "median B"]
     rows = [[row.part, *_names(row.levels, factors), *_numbers(row)] for row in found]
     print_table([*heads, "B - A, mean (95 % interval)"], rows, console, 1 + len(factors))
-    told = sum(row.is_told_from_zero for row in found)
-    if told:
+    clear = sum(row.is_told_from_zero for row in found)
+    if clear:
         console.print(
-            f"{_MARK} leaves out zero, each interval for itself: {told} of {len(found)}; of "
+            f"{_MARK} leaves out zero, each interval for itself: {clear} of {len(found)}; of "
             "those that did not change, one in 20 would by chance",
             style="dim",
             soft_wrap=True,

@@ -85,9 +85,9 @@ def _film_under_way(path: Path) -> Iterator[None]:
 
 def _command(path: Path) -> list[str]:
     """The command that makes the film, which users may give as well."""
-    told = ["episode", SCENARIO, "--seed", str(SEED), "--set", DELAY]
+    reports = ["episode", SCENARIO, "--seed", str(SEED), "--set", DELAY]
     shown = ["--side-by-side", PATTERNS, "--inset", "--video", str(path)]
-    return [sys.executable, "-m", "dva_sim", *told, *shown]
+    return [sys.executable, "-m", "dva_sim", *reports, *shown]
 
 
 def _say_when_done(maker: subprocess.Popen[bytes], part: Path, path: Path) -> None:

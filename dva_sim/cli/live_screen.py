@@ -92,8 +92,8 @@ class Board:
 
     def state_of_events(self) -> str:
         """Summarise the events in a line."""
-        told = [f"event {e['number']} ({e['kind']}) is {e['state']}" for e in self.events]
-        return "; ".join(told) or "no event was reported"
+        lines = [f"event {e['number']} ({e['kind']}) is {e['state']}" for e in self.events]
+        return "; ".join(lines) or "no event was reported"
 
 
 def story_line(line: list[Any]) -> str:
@@ -152,8 +152,8 @@ def _watched(
 ) -> Summary:
     """Run all parts before somebody's eyes."""
     if not console.is_terminal:
-        with closing(InOrder(console, board)) as told:
-            return make(lambda _, report: told.hear(report), door, viewer).run()
+        with closing(InOrder(console, board)) as ordered:
+            return make(lambda _, report: ordered.hear(report), door, viewer).run()
     with Live(console=console, refresh_per_second=4, transient=True) as screen:
 
         def hear(_: str, report: Report) -> None:
@@ -169,8 +169,8 @@ def _watched(
 
 def warn(console: Console, options: LiveOptions) -> None:
     """Say what does not go together, before anything starts."""
-    for told in contradictions(options.read(), live=not options.emulated):
-        _print(console, f"warning: {told}")
+    for entry in contradictions(options.read(), live=not options.emulated):
+        _print(console, f"warning: {entry}")
 
 
 def _say_where(console: Console, board: Board, report: Report) -> None:

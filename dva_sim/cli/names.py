@@ -53,8 +53,8 @@ def plugin_lines() -> Iterator[str]:
     """Yield the plug-ins as lines for people."""
     for number, (several, (word, plugins)) in enumerate(kinds_of_plugins().items()):
         yield f"{chr(10) if number else ''}{several}"
-        for title, told in _facts(word, plugins):
-            yield f"  {title:<13} {told}"
+        for title, entry in _facts(word, plugins):
+            yield f"  {title:<13} {entry}"
 
 
 def _facts(word: str, plugins: Plugins[Any]) -> Iterator[tuple[str, str]]:
@@ -68,8 +68,8 @@ def _facts(word: str, plugins: Plugins[Any]) -> Iterator[tuple[str, str]]:
     yield "class", f"derived from {plugins.public}, with {plugins.needs}"
     yield "try it", f"dva-sim check {word} mine.py:Mine"
     yield "shipped", ", ".join(sorted(plugins.shipped.keys() - plugins.hidden))
-    told = [f"{entry.name} ({_package(entry)})" for entry in plugins.installed()]
-    yield "installed", ", ".join(told) or "none"
+    texts = [f"{entry.name} ({_package(entry)})" for entry in plugins.installed()]
+    yield "installed", ", ".join(texts) or "none"
     yield "files there", ", ".join(_near_path(path) for path in plugins.files()) or "none"
 
 
@@ -185,11 +185,11 @@ def _described(path: Path) -> str:
 
 def _plugins_of(trial: CheckedKind) -> Iterator[NamedThing]:
     """Shipped and installed classes; an installed one is loaded only when it is used."""
-    told = {entry.name: f"of {entry.value}" for entry in entry_points(group=trial.group)}
+    values = {entry.name: f"of {entry.value}" for entry in entry_points(group=trial.group)}
     for name, words in trial.words().items():
         summary = words.partition("\n\n")[0]
-        told[name] = _first(" ".join(summary.split())) or told.get(name, "")
-    for name, description in sorted(told.items()):
+        values[name] = _first(" ".join(summary.split())) or values.get(name, "")
+    for name, description in sorted(values.items()):
         yield NamedThing(name, description)
 
 

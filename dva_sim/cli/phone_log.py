@@ -37,7 +37,7 @@ def _motion(path: Path, unit: Unit | None) -> PhoneMotion:
 
 def lines(found: MotionFigures) -> list[str]:
     """The figures in words."""
-    told = [
+    texts = [
         f"{found.samples} samples in {found.duration_s:.1f} s: {found.rate_hz:.1f} a second, "
         f"jitter {100.0 * found.jitter:.1f} %",
         f"gaps: {found.gaps}, the longest interval {1000.0 * found.longest_gap_s:.0f} ms",
@@ -45,8 +45,8 @@ def lines(found: MotionFigures) -> list[str]:
         f"largest {found.largest_g:.2f} g",
     ]
     if found.late_ms is not None:
-        told.append(f"{found.late_ms:.0f} ms from a sample to when it came")
-    return told
+        texts.append(f"{found.late_ms:.0f} ms from a sample to when it came")
+    return texts
 
 
 def tell_commands(path: Path, rate_hz: float) -> None:

@@ -38,8 +38,8 @@ def in_a_line(error: Any) -> str:
     if extra := re.fullmatch(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)", error.message):
         return f"{path} does not know what to do with {extra[1]!r}; {more}"
     problem = str(error.format_message()).rstrip(".")
-    told = f"{path}: {problem[:1].lower()}{problem[1:]}"
-    return told if told.endswith("?") else f"{told}; {more}"
+    text = f"{path}: {problem[:1].lower()}{problem[1:]}"
+    return text if text.endswith("?") else f"{text}; {more}"
 
 
 _BOUNDS = {
@@ -58,8 +58,8 @@ def _plain(message: str) -> str:
 
 
 def _help(param: Any) -> str:
-    told = str(param.help or "").rstrip(".")
-    return told[:1].lower() + told[1:]
+    text = str(param.help or "").rstrip(".")
+    return text[:1].lower() + text[1:]
 
 
 def _options(error: Any, more: str) -> str:

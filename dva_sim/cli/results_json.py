@@ -73,8 +73,8 @@ def columns(results: Results, tables: Sequence[str]) -> Data:
     Raises:
         ConfigError: no such table.
     """
-    told = {name: _columns(results, name) for name in tables or results.tables}
-    return {"folder": str(results.folder), "tables": told}
+    values = {name: _columns(results, name) for name in tables or results.tables}
+    return {"folder": str(results.folder), "tables": values}
 
 
 def compared(

@@ -91,5 +91,5 @@ def describe(site: Site) -> str:
         "cameras": len(site.cameras),
         "wall segments": len(site.walls),
     }
-    told = ", ".join(f"{number} {what}" for what, number in parts.items() if number)
-    return f"{site.name}: {xmax - xmin:.1f} m x {ymax - ymin:.1f} m, {told}"
+    text = ", ".join(f"{number} {what}" for what, number in parts.items() if number)
+    return f"{site.name}: {xmax - xmin:.1f} m x {ymax - ymin:.1f} m, {text}"

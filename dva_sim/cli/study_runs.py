@@ -52,8 +52,8 @@ def run(request: RunRequest) -> ExitCode:
         with console.status("Writing the report ..."):
             report = write_report(folder, figures=figures)
             distrusted = results.distrusted
-        for part, told in distrusted.items():
-            problem = f"in part {part} {told}: no contrast of it is shown"
+        for part, entry in distrusted.items():
+            problem = f"in part {part} {entry}: no contrast of it is shown"
             print(error_line(problem), file=sys.stderr)
         tell_files(folder, *WRITTEN)
         detail(f"{results.machine.get('cpu_s', 0):.1f} s of CPU time in all runs")
@@ -171,9 +171,9 @@ def _time(found: DryRun) -> str:
     runs = f"{_counted(found.tried, 'run')} tried now" if found.tried else "the runs done already"
     about = "more than" if found.is_least else "about"
     who = _counted(found.workers, "process", "processes")
-    told = f"{about} {duration(found.estimate_s)} to go with {who}, judged by {runs}"
-    told += "; the last was stopped before its end" if found.is_least else ""
-    return f"{told}; {failed}" if failed else told
+    text = f"{about} {duration(found.estimate_s)} to go with {who}, judged by {runs}"
+    text += "; the last was stopped before its end" if found.is_least else ""
+    return f"{text}; {failed}" if failed else text
 
 
 def _counted(number: int, one: str, many: str | None = None) -> str:
@@ -266,8 +266,8 @@ class RunPace:
         if not made or not took:
             return f"{done}/{total} {self._things}"
         rate = made / took
-        told = done < total and (took >= _SURE_AFTER_S or made >= _SURE_SHARE * total)
-        left = f", {duration((total - done) / rate)} left" if told else ""
+        is_sure = done < total and (took >= _SURE_AFTER_S or made >= _SURE_SHARE * total)
+        left = f", {duration((total - done) / rate)} left" if is_sure else ""
         often = f"{rate:.1f} {self._things}/s"
         if rate < 1:
             often = f"{rate * _MINUTE_S:.1f} {self._things}/min"

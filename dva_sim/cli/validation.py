@@ -117,11 +117,11 @@ def _refuse_foreign(what: str, cases: str | None, strategy: str | None, sockets:
     if strategy is not None and what != "operators":
         raise ConfigError(f"--strategy is for `validate operators`: {what} has none")
     if cases is not None and what == "operators":
-        told = "`validate dispatch` and `validate network`: operators have no cases"
-        raise ConfigError(f"--cases is for {told}")
+        text = "`validate dispatch` and `validate network`: operators have no cases"
+        raise ConfigError(f"--cases is for {text}")
     if sockets and what != "network":
-        told = "--ablate, --live, --measure and --beside are for `validate network`"
-        raise ConfigError(told)
+        text = "--ablate, --live, --measure and --beside are for `validate network`"
+        raise ConfigError(text)
 
 
 def conclude(play: Callable[[], ValidationResult], out: Path | None) -> ExitCode:

@@ -362,9 +362,11 @@ class ControlRooms:
         holder = self._orders.label_of(grant.holder)
         sends = self._orders.taken_away(body.device, now)
         sessions.revoke(grant)
-        told = f"{holder} held it"
-        self._note(sender, "revoke", now, device=body.device, cause=body.reason or "", outcome=told)
-        return RoomAnswer(m.OK, told, None, (*sends, *self._dispatcher.decide(now)))
+        words = f"{holder} held it"
+        self._note(
+            sender, "revoke", now, device=body.device, cause=body.reason or "", outcome=words
+        )
+        return RoomAnswer(m.OK, words, None, (*sends, *self._dispatcher.decide(now)))
 
     # --- what is kept of it ------------------------------------------------------------
 

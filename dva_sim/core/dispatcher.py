@@ -338,9 +338,9 @@ class Patrols:
                 self._idle_since.pop(robot, None)
             elif now - self._idle_since.setdefault(robot, now) >= REST:
                 self._idle_since[robot] = now
-                session, told = sessions.hold(robot)
-                if told is not None:
-                    sends.append(told)
+                session, send = sessions.hold(robot)
+                if send is not None:
+                    sends.append(send)
                 elif robot in self._on_round:
                     self._on_round.remove(robot)
                     sends.append(Send(robot, m.ReturnToBase(), session))

@@ -391,10 +391,10 @@ class Dva:
             return self._refuse(message, m.NOT_PERMITTED, text)
         step, sends = self.handovers.wish(body, asker, holder, now)
         text = f"held by {holder.label} for {holder.held_for:.0f} s" + (step and f"; {step}")
-        told = holder if body.takeover is not None else None  # 1.3 does not know it
+        content = holder if body.takeover is not None else None  # 1.3 does not know it
         sends = sends + self.dispatcher.decide(now) if body.takeover == "force" else sends
         self.refused += 1
-        return m.Reply(message.message_id, m.BUSY, text, told), sends
+        return m.Reply(message.message_id, m.BUSY, text, content), sends
 
     def _may_force(self, asker: m.Device) -> bool:
         """Return True if a device may take a robot from its holder."""
@@ -430,8 +430,10 @@ class Dva:
         if asker.device.device_type != ROBOT or grant is None:
             text = f"{body.holder or 'nobody'} holds no such robot"
             return self._refuse(message, m.NOT_PERMITTED, text)
-        told = m.Permission(grant.holder, grant.level, grant.session, grant.address, grant.sensors)
-        return self._ok(message, [], told)
+        permission = m.Permission(
+            grant.holder, grant.level, grant.session, grant.address, grant.sensors
+        )
+        return self._ok(message, [], permission)
 
     def check_access(self, now: float) -> None:
         """Permissions in use end with the rule that allowed them."""

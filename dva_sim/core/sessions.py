@@ -56,17 +56,17 @@ class Sessions:
         if grant is None:
             return None
         level, session, sensors = grant.level, grant.session, grant.sensors
-        told = m.PermissionGrant(holder.id_tag, level, session, holder.address, sensors)
+        notice = m.PermissionGrant(holder.id_tag, level, session, holder.address, sensors)
         content = m.Permission(robot.id_tag, level, session, robot.address, sensors)
-        return content, [Send(robot.id_tag, told, session)] if is_news else []
+        return content, [Send(robot.id_tag, notice, session)] if is_news else []
 
     def hold(self, robot: str) -> tuple[int, Send | None]:
         """The DVA takes a robot for itself: the session, and what to tell the robot if news."""
         own = self.permissions.own
         grant, is_news = self.permissions.request(robot, own, "missions")
         assert grant is not None
-        told = Send(robot, m.PermissionGrant(own, grant.level, grant.session), grant.session)
-        return grant.session, told if is_news else None
+        notice = Send(robot, m.PermissionGrant(own, grant.level, grant.session), grant.session)
+        return grant.session, notice if is_news else None
 
     def is_held(self, robot: str) -> bool:
         """Return True if a robot is held by somebody other than the DVA."""
@@ -92,8 +92,8 @@ class Sessions:
         own = self.permissions.own
         grant, _ = self.permissions.request(robot, own, "sensors", sensors)
         assert grant is not None
-        told = m.PermissionGrant(own, grant.level, grant.session, None, sensors)
-        return Send(robot, told, grant.session)
+        notice = m.PermissionGrant(own, grant.level, grant.session, None, sensors)
+        return Send(robot, notice, grant.session)
 
     def observes(self, robot: str) -> int:
         """The session in which the DVA reads sensors of a robot; 0: it does not."""

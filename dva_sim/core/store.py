@@ -422,10 +422,10 @@ def _grant(kept: list[Any]) -> Grant:
 
 
 def _of_entry(entry: DeviceEntry, lasts: bool) -> dict[str, Any]:
-    said, silent = list(entry.registrations), entry.silent and not lasts
-    return {"device": _plain(entry.device), "registrations": said, "silent": silent}
+    registrations, silent = list(entry.registrations), entry.silent and not lasts
+    return {"device": _plain(entry.device), "registrations": registrations, "silent": silent}
 
 
 def _entry(kept: dict[str, Any], now: float) -> DeviceEntry:
-    said = deque(((i, t) for i, t in kept["registrations"]), maxlen=8)
-    return DeviceEntry(Device(*kept["device"]), now, registrations=said)
+    registrations = deque(((i, t) for i, t in kept["registrations"]), maxlen=8)
+    return DeviceEntry(Device(*kept["device"]), now, registrations=registrations)

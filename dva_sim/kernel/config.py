@@ -77,12 +77,12 @@ class Key:
 
 def keys_said_of(model: Any) -> dict[str, Key]:
     """Every dotted key of a model that says how it is called, in the order of the model."""
-    said: dict[str, Key] = {}
+    values: dict[str, Key] = {}
     for path, info in fields_below(model):
         for key in (m for m in info.metadata if isinstance(m, Key)):
-            said |= {path: said.get(path, key)} if key.title else {}
-            said |= {f"{path}.{name}": inner for name, inner in key.inner.items()}
-    return said
+            values |= {path: values.get(path, key)} if key.title else {}
+            values |= {f"{path}.{name}": inner for name, inner in key.inner.items()}
+    return values
 
 
 def meant(path: KeyPath, value: Any, *models: Any) -> str:
@@ -158,8 +158,8 @@ def _dotted(path: KeyPath) -> str:
 def _ask(given: str, keys: list[str]) -> str:
     """The keys that may be meant, with their unit where another one was given."""
     unit, other = keys[0].rpartition("_")[2], given.rpartition("_")[2]
-    told = f" (in {_UNITS[unit]})" if unit in _UNITS and other != unit else ""
-    return f"did you mean {either(map(repr, keys))}?{told}"
+    text = f" (in {_UNITS[unit]})" if unit in _UNITS and other != unit else ""
+    return f"did you mean {either(map(repr, keys))}?{text}"
 
 
 def fields_below(model: Any, above: str = "", depth: int = _DEPTH) -> Iterator[tuple[str, Any]]:
@@ -220,8 +220,8 @@ def first_mistake(
         found: The errors of pydantic, at least one.
     """
     paths = [_path(e, data) for e in found]
-    told = [e for e, path in zip(found, paths, strict=True) if path == paths[0]]
-    return _explain(model, told, paths[0]), paths[0]
+    reports = [e for e, path in zip(found, paths, strict=True) if path == paths[0]]
+    return _explain(model, reports, paths[0]), paths[0]
 
 
 def _path(problem: Any, data: Mapping[str, Any]) -> KeyPath:

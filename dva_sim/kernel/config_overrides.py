@@ -109,8 +109,8 @@ def set_by(pairs: Sequence[str], error: ConfigError) -> ConfigError:
     given = {pair.partition("=")[0].strip(): pair for pair in pairs}
     if error.file is not None or not error.keys:
         return error
-    told = ", ".join(f"--set {_cut(given[key])}" for key in error.keys)
-    return ConfigError(f"{told}: {error.problem.removeprefix(f'{error.keys[0]}: ')}")
+    text = ", ".join(f"--set {_cut(given[key])}" for key in error.keys)
+    return ConfigError(f"{text}: {error.problem.removeprefix(f'{error.keys[0]}: ')}")
 
 
 def _cut(pair: str) -> str:

@@ -62,8 +62,8 @@ class Measure:
 
     def as_json(self) -> dict[str, Any]:
         """Return what a results folder keeps of it, to be read where its class is missing."""
-        told = {"meaning": self.meaning, "title": self.title, "better": self.better}
-        return told | ({} if self.is_number else {"is_number": False})
+        values = {"meaning": self.meaning, "title": self.title, "better": self.better}
+        return values | ({} if self.is_number else {"is_number": False})
 
 
 Columns = Mapping[str, tuple[Measure, ...]]

@@ -55,10 +55,10 @@ def in_words(error: Any) -> tuple[str, Place]:
         error: Exception raised by ruamel, with its marks.
     """
     problem = str(error.problem or "").split("\n")[0]
-    for said in _WORDS:
-        if found := re.search(said.theirs, problem):
-            mark = error.context_mark if said.is_at_begin else None
-            return said.ours.format(*found.groups()), _place(mark or error.problem_mark)
+    for entry in _WORDS:
+        if found := re.search(entry.theirs, problem):
+            mark = error.context_mark if entry.is_at_begin else None
+            return entry.ours.format(*found.groups()), _place(mark or error.problem_mark)
     for sign, word in _SIGNS.items():
         problem = problem.replace(sign, word)
     if not problem or re.match(_THEIRS, problem):

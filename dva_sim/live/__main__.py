@@ -15,8 +15,8 @@ from dva_sim.serving.pipes import PipeEnd
 
 def main(argument: str) -> int:
     """Run the part that the supervisor asks for; its exit code."""
-    told = json.loads(argument)
-    options = told["options"]
+    arguments = json.loads(argument)
+    options = arguments["options"]
     for key in ("changes", "transport"):
         options[key] = tuple(options[key])
     for key in PATHS:
@@ -24,14 +24,14 @@ def main(argument: str) -> int:
     reports = PipeEnd(sys.stdout.fileno())  # a supervisor that does not read must not stop robots
     try:
         run_part(
-            told["part"],
+            arguments["part"],
             LiveOptions(**options),
             lambda report: reports.offer(json.dumps(vars(report)).encode() + b"\n"),
-            told["number"],
-            told["epoch"],
+            arguments["number"],
+            arguments["epoch"],
             supervised=True,
-            outlet=told["outlet"],
-            door=OpenPort.received(*told["door"]) if told["door"] else None,
+            outlet=arguments["outlet"],
+            door=OpenPort.received(*arguments["door"]) if arguments["door"] else None,
         )
     except DvaSimError as error:
         print(error_line(error), file=sys.stderr)

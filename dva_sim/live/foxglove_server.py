@@ -71,8 +71,8 @@ class FoxgloveServer:
                 message_backlog_size=BACKLOG,
             )
         except (OSError, RuntimeError, ValueError) as error:
-            told = f"cannot listen on {LOCALHOST} port {port}: {error}"
-            raise ConfigError(f"{told}; give another --foxglove, or --foxglove 0") from None
+            text = f"cannot listen on {LOCALHOST} port {port}: {error}"
+            raise ConfigError(f"{text}; give another --foxglove, or --foxglove 0") from None
         threading.Thread(target=self._look_at_cameras, daemon=True).start()
 
     @property

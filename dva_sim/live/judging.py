@@ -57,8 +57,8 @@ class Facts:
             return Sent(time, robot, "", 0, CameraFrame(observation_of(seen), captured))
         if line[0] != SEEN:
             return None
-        _, time, word, told = line
-        fact = of_plain(word, time, told)
+        _, time, word, values = line
+        fact = of_plain(word, time, values)
         if isinstance(fact, Arrived):
             fact = fact._replace(source=self._senders.sender(fact.source, fact.payload))
         return fact

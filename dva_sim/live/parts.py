@@ -268,8 +268,8 @@ class WorldPart:
         every robot is idle.
         """
         detected = [i.detected for i in self._field.incidents if i.detected < math.inf]
-        reported = self._stage.clock.now > max(detected, default=0.0) + 2.0
-        return (reported or self._scripted) and all(
+        is_settled = self._stage.clock.now > max(detected, default=0.0) + 2.0
+        return (is_settled or self._scripted) and all(
             r.controller.owner is None for r in self._field.robots.values()
         )
 

@@ -54,10 +54,10 @@ def record(part: Path, target: Path) -> float:
         DvaSimError: there are no such lines, they name a class in a file, or the recording cannot
             be written.
     """
-    told = told_in(part)
-    if OWN_CODE in json.dumps(told.start["scenario"]["events"]):
+    lines = told_in(part)
+    if OWN_CODE in json.dumps(lines.start["scenario"]["events"]):
         raise ConfigError("names a class in a Python file; a recording never runs code", part)
-    return make_recording(told, target)
+    return make_recording(lines, target)
 
 
 def told_in(part: Path) -> ToldRun:
@@ -152,10 +152,10 @@ class ToldRun:
             if self.start["format"] > FORMAT:
                 raise ValueError("made by a later version")
             # What is behind the last end of a line is not whole.
-            told = [json.loads(line) for line in lines[:-1]]
-            for kind, *values in told:
+            reports = [json.loads(line) for line in lines[:-1]]
+            for kind, *values in reports:
                 getattr(self, f"_{kind}")(*values)
-            self.recorder.facts = _facts_in(told) if HELD_TO in self.start else None
+            self.recorder.facts = _facts_in(reports) if HELD_TO in self.start else None
         except OSError as error:
             raise ConfigError(f"cannot be read: {error.strerror}", part) from error
         except (ValueError, LookupError, TypeError, AttributeError) as error:

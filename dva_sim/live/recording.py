@@ -111,8 +111,8 @@ class LiveRecorder(Recorder):
 
     def observe(self, fact: Any) -> None:
         """Keep a fact that the rules are judged by."""
-        word, time, told = as_plain(fact)
-        self.put(SEEN, time, word, told)
+        word, time, values = as_plain(fact)
+        self.put(SEEN, time, word, values)
 
     def is_alive(self) -> None:
         """Note that all facts of this part up to now are written."""
@@ -339,11 +339,11 @@ class Keeper:
         self.inlets.join()
         try:
             if self.path.exists():
-                told = told_in(self.path)
+                lines = told_in(self.path)
             else:  # the folder was removed meanwhile; the open file still has the lines
-                told = ToldRun(self._file, self.path)
+                lines = ToldRun(self._file, self.path)
                 self._target.parent.mkdir(parents=True, exist_ok=True)
-            lasted = make_recording(told, self._target)
+            lasted = make_recording(lines, self._target)
             self.path.unlink(missing_ok=True)
         except (DvaSimError, OSError) as error:
             why, left = self.problem or error, ""

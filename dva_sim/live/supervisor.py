@@ -110,8 +110,8 @@ class Supervisor:
         try:
             why = self._run(scenario)
         except DvaSimError as error:
-            told = [str(error), keeping.finish() or "", broken_rules(keeping.verdicts())]
-            raise type(error)("; ".join(filter(None, told))) from None
+            reports = [str(error), keeping.finish() or "", broken_rules(keeping.verdicts())]
+            raise type(error)("; ".join(filter(None, reports))) from None
         latest = {c.name: c.latest for c in self._children if c.latest}
         lost = keeping.finish()
         return Summary(why, latest, lost, keeping.verdicts(), self._packets)
@@ -153,8 +153,8 @@ class Supervisor:
         assert self._keeping is not None
         outlet = self._keeping.inlet()
         door = self._rosbridge.passed() if self._rosbridge and part == ROSBRIDGE else ()
-        told = self._arguments(part, dva, number, port, outlet, door)
-        words = [sys.executable, "-m", "dva_sim.live", told]
+        arguments = self._arguments(part, dva, number, port, outlet, door)
+        words = [sys.executable, "-m", "dva_sim.live", arguments]
         passed = outlet, *door
         pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
         if self._link is None:
@@ -180,12 +180,12 @@ class Supervisor:
         outlet: int,
         door: tuple[int, ...],
     ) -> str:
-        told = {**vars(self._options), "dva": dva, "port": port}
-        told["shows_run"] = self._foxglove is not None
+        values = {**vars(self._options), "dva": dva, "port": port}
+        values["shows_run"] = self._foxglove is not None
         if self._link is not None:
-            told["host"] = ADDRESSES[_end_of(part)]
+            values["host"] = ADDRESSES[_end_of(part)]
         for key in PATHS:
-            told[key] = None if told[key] is None else str(told[key])
+            values[key] = None if values[key] is None else str(values[key])
         about = {
             "part": part,
             "number": number,
@@ -193,7 +193,7 @@ class Supervisor:
             "outlet": outlet,
             "door": door,
         }
-        return json.dumps(about | {"options": told})
+        return json.dumps(about | {"options": values})
 
     def _address_of_broker(self) -> str:
         """Return where the broker of MQTT, and so every device, will be found."""
@@ -252,8 +252,8 @@ class Supervisor:
             code = child.process.poll()
             if code is not None and code != 0 and not self._interrupted:
                 self._read(0.0)
-                said = child.errors.decode(errors="replace").strip().splitlines()
-                why = said[-1].removeprefix(ERROR) if said else f"exit code {code}"
+                errors = child.errors.decode(errors="replace").strip().splitlines()
+                why = errors[-1].removeprefix(ERROR) if errors else f"exit code {code}"
                 kind = DvaSimError if code == ExitCode.MISTAKE else PartFailed
                 raise kind(f"{child.name} has ended by itself: {why}")
             if code is None and time.monotonic() - child.heard > SPEAK_WITHIN:

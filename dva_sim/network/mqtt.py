@@ -389,8 +389,8 @@ class _Node:
     def say_wants(self, publisher: str) -> None:
         """Let the broker keep, for a publisher, which of its topics this node wants."""
         topics = [quote(each.topic) for each in self.listening.get(publisher, ())]
-        said = _SEPARATOR.join(dict.fromkeys(topics)) + _SEPARATOR if topics else ""
-        self.send(f"wants/{publisher}/{self.name}", said.encode(), keep=True)
+        text = _SEPARATOR.join(dict.fromkeys(topics)) + _SEPARATOR if topics else ""
+        self.send(f"wants/{publisher}/{self.name}", text.encode(), keep=True)
 
     # --- what arrives ------------------------------------------------------------------
 

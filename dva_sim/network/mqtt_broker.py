@@ -54,7 +54,7 @@ class Broker:
         self._refuse_taken_port()
         self._log = TemporaryFile()  # noqa: SIM115 - closed with the broker
         lists = _nameless("rules", rules)
-        told = _nameless(
+        configuration = _nameless(
             "configuration",
             f"listener {port} {address}\nallow_anonymous true\nuser root\nlog_dest stderr\n"
             f"log_type error\nset_tcp_nodelay {str(nodelay).lower()}\n{settings}"
@@ -63,17 +63,17 @@ class Broker:
         me = os.getpid()
         try:
             self._process = subprocess.Popen(
-                [PROGRAM, "-c", f"/proc/self/fd/{told}"],
+                [PROGRAM, "-c", f"/proc/self/fd/{configuration}"],
                 stdin=subprocess.DEVNULL,
                 stderr=self._log,
-                pass_fds=(told, lists),
+                pass_fds=(configuration, lists),
                 start_new_session=True,  # Ctrl-C is for this process, which ends it
                 preexec_fn=lambda: die_with_parent(me),
             )
         except OSError as error:
             raise BrokerError(f"{PROGRAM} cannot be started: {error.strerror}") from None
         finally:
-            os.close(told)
+            os.close(configuration)
             os.close(lists)
 
     def _refuse_taken_port(self) -> None:
@@ -110,9 +110,9 @@ class Broker:
                 return
             time.sleep(_AGAIN)
         self._log.seek(0)
-        said = self._log.read().decode(errors="replace").strip().splitlines()
+        output = self._log.read().decode(errors="replace").strip().splitlines()
         self.close()
-        raise BrokerError(f"{PROGRAM} does not listen at {self}: {(said or ['no reason'])[-1]}")
+        raise BrokerError(f"{PROGRAM} does not listen at {self}: {(output or ['no reason'])[-1]}")
 
     def close(self) -> None:
         """End it."""

@@ -78,9 +78,9 @@ class PublisherSocket:
         """Note subscriptions: XPUB reports the first and the last subscriber of a topic."""
         with suppress(zmq.Again):
             while has_more(self.socket):
-                said = self.socket.recv(NOBLOCK)
-                topic = said[1:].decode(errors="replace")
-                if said[:1] == b"\x01" and len(self._topics) < 10_000:
+                data = self.socket.recv(NOBLOCK)
+                topic = data[1:].decode(errors="replace")
+                if data[:1] == b"\x01" and len(self._topics) < 10_000:
                     self._topics.add(topic)
-                elif said[:1] == b"\x00":
+                elif data[:1] == b"\x00":
                     self._topics.discard(topic)

@@ -298,10 +298,10 @@ class SocketNetwork(RealNetwork):
                 if port or error.errno != zmq.EADDRINUSE:
                     self._discard(router, publisher)
                     ports = f", ports {port} and {port + 1}" if port else ""
-                    told = f"cannot listen on {host}{ports}: {error.strerror}"
+                    text = f"cannot listen on {host}{ports}: {error.strerror}"
                     if error.errno == zmq.EADDRINUSE:
-                        told += "; give another --port, or --port 0 for any that is free"
-                    raise NetworkError(told) from None
+                        text += "; give another --port, or --port 0 for any that is free"
+                    raise NetworkError(text) from None
             else:
                 break
         else:

@@ -191,8 +191,8 @@ def timestamp(seconds_of_day: float, exact: bool = False) -> str:
         exact: To the microsecond; otherwise fractions are dropped.
     """
     whole = int(seconds_of_day // 1)
-    told = _clock_face(whole % 86_400)
-    return f"{told}.{int((seconds_of_day - whole) * 1e6):06}" if exact else told
+    face = _clock_face(whole % 86_400)
+    return f"{face}.{int((seconds_of_day - whole) * 1e6):06}" if exact else face
 
 
 @lru_cache(maxsize=64)

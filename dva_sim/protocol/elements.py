@@ -182,8 +182,8 @@ _WRITERS: Final[dict[type, tuple[str, Write]]] = {
 
 
 def _write_reply(body: m.Reply) -> str:
-    said = body.content
-    content = "" if said is None else _CONTENTS[type(said).__name__].write(said)
+    content_ = body.content
+    content = "" if content_ is None else _CONTENTS[type(content_).__name__].write(content_)
     return (
         f"<reply><Answers>{_ANSWERS(body.answers)}</Answers><Code>{_CODE(body.code)}</Code>"
         f"<Text>{_TEXT(body.text)}</Text>{content}</reply>"
@@ -233,8 +233,8 @@ def _read_reply(element: _Element) -> m.Reply:
 def _read_simple(payload: _Element) -> m.Body:
     if payload.tag == "reply":
         return _read_reply(payload)
-    said = payload if payload.tag in _BODIES else payload[0]
-    body: m.Body = _BODIES[said.tag].read(said)
+    element = payload if payload.tag in _BODIES else payload[0]
+    body: m.Body = _BODIES[element.tag].read(element)
     return body
 
 

@@ -140,8 +140,8 @@ def _by_grammar(data: bytes) -> list[Problem]:
     try:
         etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
-        said = parser.error_log[0].message if len(parser.error_log) else str(error.msg)
-        text = f"is not well-formed XML: {said}"
+        problem = parser.error_log[0].message if len(parser.error_log) else str(error.msg)
+        text = f"is not well-formed XML: {problem}"
         _, stop = _walk(data)
         return [Problem(*error.position, text) if stop is None else at(data, stop, text)]
     return []

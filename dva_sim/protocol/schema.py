@@ -107,5 +107,5 @@ def _parser() -> etree.XMLParser:
 def _one_line(error: etree.XMLSyntaxError) -> str:
     """Return libxml2's message as text that fits into a reply."""
     # lxml spells some messages as the repr of their bytes.
-    said = re.sub(r"""^line \d+: b(["'])(.*)\1$""", r"not well-formed: \2", str(error.msg))
-    return "".join(c if c.isprintable() else " " for c in said)[:200]
+    problem = re.sub(r"""^line \d+: b(["'])(.*)\1$""", r"not well-formed: \2", str(error.msg))
+    return "".join(c if c.isprintable() else " " for c in problem)[:200]

@@ -140,8 +140,8 @@ class AuditLog:
     def _refuse_what_is_broken(self) -> None:
         found = verify(self.path)
         if found.problem is not None:
-            told = f"row {found.problem.number} {found.problem.text}"
-            raise ConfigError(f"is not an audit log that can be appended to: {told}", self.path)
+            text = f"row {found.problem.number} {found.problem.text}"
+            raise ConfigError(f"is not an audit log that can be appended to: {text}", self.path)
         self.number, self.head = found.rows, found.head
 
     def append(self, entries: Sequence[AuditEntry]) -> list[AuditRow]:
@@ -289,10 +289,10 @@ def _wrong(values: Sequence[Any], number: int, head: str) -> str | None:
     """Return what is wrong with row `number`, given the hash `head` of the row before it."""
     if values[0] != number:
         return f"is missing: row {values[0]} follows row {number - 1}"
-    *plain, before, told = values
+    *plain, before, stored = values
     if any(isinstance(value, bytes) for value in values):
         return "holds bytes where there should be text"
-    if hash_of([*plain, before]) != told:
+    if hash_of([*plain, before]) != stored:
         return "was changed: its content does not have its hash"
     if before != head:
         return f"does not follow row {number - 1}: a row was removed, moved or put in"

@@ -405,8 +405,8 @@ def said(playback: Playback) -> Iterator[ChannelMessage]:
     names, traffic = names_of(playback.labels), iter(playback.recorder.traffic or ())
     for fact in playback.recorder.facts or ():
         if not isinstance(fact, Sent):
-            word, time, told = as_plain(fact)
-            yield stamped(time, f"{OBSERVED}{word}", f"dva_sim.{type(fact).__name__}", **told)
+            word, time, values = as_plain(fact)
+            yield stamped(time, f"{OBSERVED}{word}", f"dva_sim.{type(fact).__name__}", **values)
         elif (sent := next(traffic, None)) is not None:
             yield sent_message(sent, names)
     for sent in traffic:
@@ -459,8 +459,8 @@ def frame_shown(
     time: float, topic: str, drive: int, robot: str, *, captured: float
 ) -> ChannelMessage:
     """A frame comes onto an operator's screen."""
-    said = {"drive": drive, "robot": robot, "captured_s": captured}
-    return stamped(time, topic, "dva_sim.Shown", **said)
+    values = {"drive": drive, "robot": robot, "captured_s": captured}
+    return stamped(time, topic, "dva_sim.Shown", **values)
 
 
 def commanded(playback: Playback) -> Iterator[ChannelMessage]:
@@ -515,8 +515,8 @@ def event_message(time: float, event: Event) -> ChannelMessage:
 
 def latency(time: float, robot: str, what: str, *, delay: float) -> ChannelMessage:
     """Return the latency of a command or picture; recordings have `applied` and `shown`."""
-    told = {"robot": robot, "what": what, "delay_s": round(delay, 6)}
-    return stamped(time, LATENCIES, "dva_sim.Latency", **told)
+    values = {"robot": robot, "what": what, "delay_s": round(delay, 6)}
+    return stamped(time, LATENCIES, "dva_sim.Latency", **values)
 
 
 def picture(time: float, name: str, jpeg: bytes) -> ChannelMessage:

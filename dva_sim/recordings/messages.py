@@ -116,14 +116,14 @@ def _read(text: str, known: dict[str, Schema]) -> dict[str, Schema]:
     types: dict[str, Schema] = {}
     for paragraph in text.strip().split("\n\n"):
         head, _, body = paragraph.partition("\n")
-        title, _, told = head.partition(" | ")
+        title, _, version = head.partition(" | ")
         fields: dict[str, Schema] = {}
         for group in body.split(";"):
             names, _, kind = group.partition(":")
             fields |= dict.fromkeys(names.split(), _type(kind.strip(), known))
         types[title] = known[title.rpartition(".")[2]] = {
             "title": title,
-            "description": told,
+            "description": version,
             "type": "object",
             "properties": fields,
             "required": list(fields),

@@ -75,8 +75,8 @@ class MotionApp:
     def line(self) -> str:
         """Return the sample as a line of the file."""
         about = {"at_s": self.at, "period_s": self.period, "reference_mps2": list(self.reference)}
-        told = {**about, "ios": self.ios, "profile": self.profile.model_dump(mode="json")}
-        return APP + json.dumps(told)
+        values = {**about, "ios": self.ios, "profile": self.profile.model_dump(mode="json")}
+        return APP + json.dumps(values)
 
 
 @dataclass
@@ -121,8 +121,8 @@ class MotionWriter:
         """One more."""
         if not self._begun:
             self._begun, self._first = True, sample.told
-        told = sample.told - self._first
-        numbers = told, sample.came, sample.at, *sample.xyz
+        stamp = sample.told - self._first
+        numbers = stamp, sample.came, sample.at, *sample.xyz
         self._write(",".join(map(repr, numbers)) + f",{sample.orientation}")
 
     def close(self) -> None:
@@ -167,11 +167,11 @@ def _take(motion: PhoneMotion, line: str, path: Path, number: int) -> None:
 
 
 def _sample(line: str) -> MotionSample:
-    told, came, at, x, y, z, orientation = line.split(",")
+    stamp, came, at, x, y, z, orientation = line.split(",")
     angle = int(orientation)
     if angle not in ORIENTATIONS:
         raise ValueError(f"orientation_deg {angle}")
-    return MotionSample(float(told), float(came), float(at), (float(x), float(y), float(z)), angle)
+    return MotionSample(float(stamp), float(came), float(at), (float(x), float(y), float(z)), angle)
 
 
 def _app(told: dict[str, Any]) -> MotionApp:

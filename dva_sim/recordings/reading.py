@@ -42,7 +42,7 @@ from dva_sim.simulation.scenario import Scenario
 from dva_sim.worlds.hazards import KINDS, QUANTITIES, Hazard, Raster, Surroundings
 from dva_sim.worlds.site import Site
 
-Said = Sequence[tuple[float, Mapping[str, Any]]]  # messages of a topic, with their times [s]
+Records = Sequence[tuple[float, Mapping[str, Any]]]  # messages of a topic, with their times [s]
 
 
 class RecordedHazard(Hazard):
@@ -76,13 +76,13 @@ class RecordedHazard(Hazard):
         return self.sizes[index - 1] if index else (0.0, 0.0, 0.0)
 
 
-def recorded_hazard(number: int, entry: Mapping[str, Any], said: Said) -> Hazard:
+def recorded_hazard(number: int, entry: Mapping[str, Any], records: Records) -> Hazard:
     """The stand-in for a hazard.
 
     Args:
         number: Number of its incident, from 1.
         entry: Entry of the incident in the file.
-        said: The messages about all hazards.
+        records: The messages about all hazards.
     """
 
     class AsRecorded(RecordedHazard):
@@ -91,7 +91,7 @@ def recorded_hazard(number: int, entry: Mapping[str, Any], said: Said) -> Hazard
         colour: ClassVar[str] = entry["described"]["colour"]
         mark: ClassVar[str] = entry["described"]["mark"]
 
-    own = [(time, state) for time, state in said if state["number"] == number]
+    own = [(time, state) for time, state in records if state["number"] == number]
     keys = "radius_m", "danger_radius_m", "severity"
     position, start = entry["hazard"]["position"], entry["hazard"]["start"]
     return AsRecorded(
@@ -109,7 +109,7 @@ class RecordedSurroundings(Surroundings):
         grids: Recorded values of each quantity.
     """
 
-    def __init__(self, site: Site, hazards: Sequence[Hazard], grids: Mapping[str, Said]) -> None:
+    def __init__(self, site: Site, hazards: Sequence[Hazard], grids: Mapping[str, Records]) -> None:
         super().__init__(site, hazards)
         self._grids = grids
 
@@ -121,11 +121,11 @@ class RecordedSurroundings(Surroundings):
         # Cells are as wide as they were recorded.
         what = "smoke" if what == "layer" else what
         west, south, east, north = self._site.extent
-        said = self._grids.get(what, ())
-        index = bisect_right([when for when, _ in said], time)
+        records = self._grids.get(what, ())
+        index = bisect_right([when for when, _ in records], time)
         if not index:
             return Raster(np.zeros((1, 1)), (west, east, south, north), QUANTITIES[what].unit)
-        content = said[index - 1][1]
+        content = records[index - 1][1]
         cell, place = content["cell_size"]["x"], content["pose"]["position"]
         part = np.frombuffer(base64.b64decode(content["data"]), "<f4")
         part = part.reshape(-1, content["column_count"])
@@ -200,8 +200,8 @@ def _opened(raw: RawRecords) -> Opened:
     scenario = Scenario.model_validate(json.loads(raw.files[SCENARIO]))
     files = {n.removeprefix(SITE): d for n, d in raw.files.items() if n.startswith(SITE)}
     site = writing.unpack(files, scenario, run["seed"])
-    told = raw.said.get(channels.HAZARDS, [])
-    incidents = [_incident(n, entry, told) for n, entry in enumerate(run["incidents"], 1)]
+    records = raw.said.get(channels.HAZARDS, [])
+    incidents = [_incident(n, entry, records) for n, entry in enumerate(run["incidents"], 1)]
     contained = {int(number): time for number, time in run["contained_s"].items()}
     playback = Playback(
         scenario=scenario,
@@ -220,8 +220,8 @@ def _opened(raw: RawRecords) -> Opened:
     )
     tables = _tables(raw.files[TABLES]) if TABLES in raw.files else None
     traces = {
-        topic.removeprefix(channels.DECISIONS): [entry["line"] for _, entry in said]
-        for topic, said in raw.said.items()
+        topic.removeprefix(channels.DECISIONS): [entry["line"] for _, entry in item]
+        for topic, item in raw.said.items()
         if topic.startswith(channels.DECISIONS)
     }
     audit = [json.loads(entry["row"]) for _, entry in raw.said.get(channels.AUDIT, ())]
@@ -261,10 +261,10 @@ def _tables(data: bytes) -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def _incident(number: int, entry: Mapping[str, Any], told: Said) -> RunHazard:
+def _incident(number: int, entry: Mapping[str, Any], records: Records) -> RunHazard:
     detected = inf if entry["detected_s"] is None else entry["detected_s"]
     if "described" in entry:
-        hazard = recorded_hazard(number, entry, told)
+        hazard = recorded_hazard(number, entry, records)
     else:
         settings = dict(entry["hazard"])
         place = tuple(settings.pop("position"))
@@ -304,8 +304,8 @@ def _surroundings(
     hazards = [incidents[number].hazard for number in real]
     if any(isinstance(hazard, RecordedHazard) for hazard in hazards):
         grids = {
-            topic.removeprefix(channels.GRIDS): said
-            for topic, said in raw.said.items()
+            topic.removeprefix(channels.GRIDS): entry
+            for topic, entry in raw.said.items()
             if topic.startswith(channels.GRIDS)
         }
         return RecordedSurroundings(site, hazards, grids)
@@ -368,13 +368,13 @@ def _left_out(before: TrackPoint, until: float, period: float) -> Iterator[Track
 
 def _traffic(raw: RawRecords, run: Mapping[str, Any]) -> Iterator[Sent]:
     ids = {name: device for device, name in channels.names_of(run["labels"]).items()}
-    for topic, said in raw.said.items():
+    for topic, entry in raw.said.items():
         if topic in raw.ends:
             ends = raw.ends[topic]["source"], raw.ends[topic]["destination"]
-            yield from (Sent(time, *ends, len(data), data) for time, data in said)
+            yield from (Sent(time, *ends, len(data), data) for time, data in entry)
         elif topic.endswith(f"/{channels.CAMERA}"):
             source = ids[topic.split("/")[1]]
-            for time, frame in said:
+            for time, frame in entry:
                 yield Sent(time, source, ids[frame["to"]], frame["size_bytes"], frame)
 
 
@@ -390,9 +390,9 @@ def _drives(raw: RawRecords, run: Mapping[str, Any]) -> list[DriveLog]:
             command = time, made["speed_m_s"], made["turn_rate_rad_s"]
             drives[made["drive"]].commands.append(command)
     for drive in drives:
-        for time, told in raw.said.get(f"/{run['labels'][drive.robot]}/{channels.APPLIED}", ()):
+        for time, item in raw.said.get(f"/{run['labels'][drive.robot]}/{channels.APPLIED}", ()):
             if drive.ordered <= time and (drive.ended is None or time <= drive.ended):
-                drive.applied.append(_applied(time, told))
+                drive.applied.append(_applied(time, item))
     return drives
 
 
@@ -419,7 +419,7 @@ class Lapse:
     Attributes:
         tracks: A row for each sampled moment of everybody: `agent`, `t_s`, `x_m`, `y_m`,
             `heading_rad`, `mode`; in order of time for each agent.
-        told: A row for each line of the story: `t_s`, `who`, `what`, `kind`.
+        story: A row for each line of the story: `t_s`, `who`, `what`, `kind`.
         incidents: The hazards, with those that were reported and not there.
         contained: Time at which incidents were contained [s], by their index in `incidents`.
         duration: Length of the run, or of the file [s].
@@ -427,7 +427,7 @@ class Lapse:
 
     site: Site
     tracks: Columns
-    told: Columns
+    story: Columns
     incidents: tuple[RunHazard, ...]
     contained: dict[int, float]
     duration: float
@@ -442,11 +442,11 @@ def read_lapse(path: Path) -> Lapse:
     playback = read_recording(path).playback
     recorder = playback.recorder
     rows = [(name, *point) for name, track in recorder.tracks.items() for point in track]
-    told = [(m.time, m.who, m.what, m.kind) for m in recorder.timeline]
+    story = [(m.time, m.who, m.what, m.kind) for m in recorder.timeline]
     return Lapse(
         playback.site,
         _columns(rows, "agent", "t_s", "x_m", "y_m", "heading_rad", "mode"),
-        _columns(told, "t_s", "who", "what", "kind"),
+        _columns(story, "t_s", "who", "what", "kind"),
         tuple(playback.incidents),
         playback.contained,
         playback.duration,

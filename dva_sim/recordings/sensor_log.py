@@ -69,11 +69,11 @@ def read_sensor_log(path: Path, unit: Unit | None = None) -> list[MotionSample]:
     metre = _metre_of([numbers[1:] for _, numbers in found], columns, unit, path)
     samples = list[MotionSample]()
     for number, (time, x, y, z) in found:
-        told = (time - times[0]) * second
-        if samples and told < samples[-1].told:
+        times_s = (time - times[0]) * second
+        if samples and times_s < samples[-1].told:
             raise ConfigError("time goes backwards here", path, number, 1)
         xyz = (x * metre, y * metre, z * metre)
-        samples.append(MotionSample(told, math.nan, math.nan, xyz, 0))
+        samples.append(MotionSample(times_s, math.nan, math.nan, xyz, 0))
     return samples
 
 
@@ -132,8 +132,8 @@ def _second_of(times: Sequence[float], columns: _Columns, path: Path) -> float:
     usual = median(steps) if steps else 0.0
     fitting = [s for s in (1.0, 1e-3, 1e-6, 1e-9) if _STEPS[0] <= usual * s < _STEPS[1]]
     if not fitting:
-        told = f"its times are {usual:g} apart, in no unit a phone's: name it, as in time (ms)"
-        raise ConfigError(told, path, 1, 1)
+        text = f"its times are {usual:g} apart, in no unit a phone's: name it, as in time (ms)"
+        raise ConfigError(text, path, 1, 1)
     return fitting[0]
 
 
@@ -152,6 +152,6 @@ def _metre_of(
         near = (u for u, one in units.items() if abs(usual / one - 1) < _AROUND_GRAVITY)
         unit = next(near, None)
         if unit is None:
-            told = f"acceleration is {usual:.3g} in the median, gravity neither in g nor in m/s^2"
-            raise ConfigError(f"{told}: give --unit", path)
+            text = f"acceleration is {usual:.3g} in the median, gravity neither in g nor in m/s^2"
+            raise ConfigError(f"{text}: give --unit", path)
     return GRAVITY if unit == "g" else 1.0

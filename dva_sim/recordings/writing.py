@@ -286,12 +286,12 @@ def _add_messages(
         ends = {"source": source, "destination": destination}
         return int(writer.register_channel(topic, XML, number, ends))
 
-    said = chain(every_message(playback), decided)
-    every = [_packed(message) for message in said]
+    answer_text = chain(every_message(playback), decided)
+    every = [_packed(message) for message in answer_text]
     plan = next((data for name, data in files.items() if name.endswith(".geojson")), None)
     if plan is not None:
-        told = ChannelMessage(0.0, "/plan", "foxglove.GeoJSON", {"geojson": plan.decode()})
-        every.insert(0, _packed(told))
+        plan_message = ChannelMessage(0.0, "/plan", "foxglove.GeoJSON", {"geojson": plan.decode()})
+        every.insert(0, _packed(plan_message))
     for time, topic, schema, data in sorted(every, key=lambda entry: entry[0]):
         channel = channel_of(topic, schema)
         counts[topic] += 1

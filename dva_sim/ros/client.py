@@ -176,9 +176,9 @@ class RosbridgeClient:
         answered = self._calls.pop(str(operation.get("id")), None)
         values = operation.get("values")
         if answered is not None:
-            told = values if isinstance(values, dict) else {"message": values}
-            done = operation.get("result") is not False and told.get("success") is True
-            answered(done, str(told.get("message", ""))[:120])
+            answer = values if isinstance(values, dict) else {"message": values}
+            done = operation.get("result") is not False and answer.get("success") is True
+            answered(done, str(answer.get("message", ""))[:120])
 
     def _topic_of(self, data: bytes) -> str:
         """Return the topic of a message that may be too large to be read."""

@@ -13,7 +13,7 @@ from typing import Final
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import FRAME, CameraFrame
-from dva_sim.agents.operator.handheld import Console, Said
+from dva_sim.agents.operator.handheld import Console, OnResult
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.operator.steps import ask_emergency, give_back, start
 from dva_sim.agents.robot.sensors import sensor_topic
@@ -129,24 +129,24 @@ class RosDriver:
         """Its device."""
         return self._person.device
 
-    def take(self, robot: str, said: Said) -> None:
+    def take(self, robot: str, on_result: OnResult) -> None:
         """Ask the DVA for a robot, and the robot to be driven."""
         self._wanted.add(robot)
-        self._take(robot, said, TAKE_TRIES)
+        self._take(robot, on_result, TAKE_TRIES)
 
-    def _take(self, robot: str, said: Said, tries: int) -> None:
+    def _take(self, robot: str, on_result: OnResult, tries: int) -> None:
         def taken(done: bool, text: str) -> None:
             held = self._person.robots.get(robot)
             if not done or held is None:
-                said(False, text)
+                on_result(False, text)
             elif held.is_driven:
-                said(True, text)
+                on_result(True, text)
             else:
                 held.start(begun)
 
         def begun(done: bool, text: str) -> None:
             if done:
-                said(True, text)
+                on_result(True, text)
             else:  # what has ended the start has the last word on who holds the robot
                 self.device.clock.call_after(0.0, not_begun, text)
 
@@ -154,25 +154,25 @@ class RosDriver:
             held = self._person.robots.get(robot)
             if held is not None:
                 held.give_back()
-                said(False, text)
+                on_result(False, text)
             elif tries > 1 and robot in self._wanted:
                 # The permission ran out while connections were made over a long link.
-                self._take(robot, said, tries - 1)
+                self._take(robot, on_result, tries - 1)
             else:
-                said(False, f"{text}; call take_control again")
+                on_result(False, f"{text}; call take_control again")
 
         self._person.attended, self._person.console = True, self._console()
         self._person.take([robot], taken)
 
-    def release(self, robot: str, said: Said) -> None:
+    def release(self, robot: str, on_result: OnResult) -> None:
         """Stop a robot, and give it back."""
         self._wanted.discard(robot)
         held = self._person.robots.get(robot)
         if held is None:
-            said(False, "it is not yours")
+            on_result(False, "it is not yours")
             return
         held.give_back()
-        said(True, "given back")
+        on_result(True, "given back")
 
     @property
     def is_driving(self) -> bool:
@@ -330,6 +330,6 @@ class RosGateway:
         driver.release_all()
         self._free.append(driver)
 
-    def emergency(self, name: str, said: Said) -> None:
+    def emergency(self, name: str, on_result: OnResult) -> None:
         """Stop a robot, regardless of its driver."""
-        ask_emergency(self.device, self.robots[name].id_tag, 0, said)
+        ask_emergency(self.device, self.robots[name].id_tag, 0, on_result)

@@ -33,10 +33,10 @@ def listen(host: str, port: int, option: str = "--port") -> socket.socket:
             sock.bind(address)
             on_failure.pop_all()
     except OSError as error:
-        told = f"cannot listen on {host} port {port}: {error.strerror}"
+        text = f"cannot listen on {host} port {port}: {error.strerror}"
         if error.errno == errno.EADDRINUSE:
-            told += f"; give another {option}, or {option} 0 for any that is free"
-        raise ConfigError(told) from error
+            text += f"; give another {option}, or {option} 0 for any that is free"
+        raise ConfigError(text) from error
     # Connections inherit these.
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BYTES)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)

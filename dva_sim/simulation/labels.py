@@ -54,27 +54,27 @@ _SHORT_LEVELS = (
 @cache
 def _keys() -> dict[str, Key]:
     """Return the names in the scenarios' fields; a key has one name in all models."""
-    said: dict[str, Key] = {}
+    values: dict[str, Key] = {}
     for model in reversed(MODELS.values()):
-        said |= keys_said_of(model.scenario)
-    return said
+        values |= keys_said_of(model.scenario)
+    return values
 
 
 @cache
 def _measures() -> dict[str, Measure]:
     """Every column by name; where models have one each, that of the first that says a title."""
-    said: dict[str, Measure] = {}
+    values: dict[str, Measure] = {}
     tables = [table for model in MODELS.values() for table in model.columns.values()]
     for column in itertools.chain(*tables):
-        if column.name not in said or (column.title and not said[column.name].title):
-            said[column.name] = column
-    return said
+        if column.name not in values or (column.title and not values[column.name].title):
+            values[column.name] = column
+    return values
 
 
 def stated_conditions(models: Iterable[str]) -> dict[str, str]:
     """Keys that a table of conditions may state, with their words there, of some models."""
     there = (keys_said_of(MODELS[name].scenario) for name in models if name in MODELS)
-    return {path: key.condition for said in there for path, key in said.items() if key.condition}
+    return {path: key.condition for entry in there for path, key in entry.items() if key.condition}
 
 
 _TOLD: dict[str, Measure] = {}
@@ -89,8 +89,8 @@ def take_up(columns: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> None:
     for table in columns.values():
         _TOLD.update(
             {
-                name: Measure(name, said.get("meaning", ""), said.get("title", ""))
-                for name, said in table.items()
+                name: Measure(name, entry.get("meaning", ""), entry.get("title", ""))
+                for name, entry in table.items()
             }
         )
 
@@ -104,15 +104,15 @@ def measure_called(name: str, model: str = "") -> Measure:
 
 def factor_name(factor: str) -> str:
     """`link.delay_s` is the one-way delay."""
-    said = _keys().get(factor)
+    key = _keys().get(factor)
     habit = factor.partition(".habits.")[2]
-    return said.title if said else _OF_STUDIES.get(factor, without_unit(habit or factor))
+    return key.title if key else _OF_STUDIES.get(factor, without_unit(habit or factor))
 
 
 def absent_at_zero(factor: str) -> str:
     """Return what is absent at a level of zero: `delay` of `link.delay_s`; mostly nothing."""
-    said = _keys().get(factor)
-    return said.absent if said else ""
+    key = _keys().get(factor)
+    return key.absent if key else ""
 
 
 def with_unit(factor: str) -> str:

@@ -145,10 +145,10 @@ def _confirms_more(original: Original, bug: Bug) -> Original:
 
     def wrong(self: Any, message: m.Message, asker: Any, body: m.GetGrant) -> Any:
         reply, sends = original(self, message, asker, body)
-        told = reply.content
-        if isinstance(told, m.Permission) and told.level == "teleoperation":
-            bug.act(f"{told.device} may drive, and is said to be allowed more")
-            reply = replace(reply, content=replace(told, level="both"))
+        content = reply.content
+        if isinstance(content, m.Permission) and content.level == "teleoperation":
+            bug.act(f"{content.device} may drive, and is said to be allowed more")
+            reply = replace(reply, content=replace(content, level="both"))
         return reply, sends
 
     return wrong

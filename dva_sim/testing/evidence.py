@@ -48,15 +48,15 @@ def check_recording(path: Path) -> tuple[list[Problem], list[str], str, list[Ver
     except ConfigError as error:
         return [Problem(1, 1, error.problem)], [], "", []
     traffic = [(s, s.payload) for s in opened.playback.recorder.traffic or ()]
-    said = [(sent, data) for sent, data in traffic if isinstance(data, bytes)]
+    messages = [(sent, data) for sent, data in traffic if isinstance(data, bytes)]
     problems = list[Problem]()
-    for number, (sent, data) in enumerate(said, 1):
+    for number, (sent, data) in enumerate(messages, 1):
         where = f"message {number}, at {sent.time:.1f} s, from {sent.source}"
         problems += [Problem(1, 1, f"{where}: {found.text}") for found in check_message(data)]
     if opened.left_out:
         lacking = listed((f"{topic} {n}" for topic, n in sorted(opened.left_out.items())), 4)
         problems.append(Problem(1, 1, f"was filtered: messages are missing, by topic: {lacking}"))
-    note = f"{len(said)} messages"
+    note = f"{len(messages)} messages"
     for who, lines in opened.traces.items():
         replayed = _replayed([line.encode() for line in lines], path)
         problems += [Problem(1, 1, f"{who}, line {p.line}: {p.text}") for p in replayed.problems]
@@ -72,8 +72,8 @@ def check_recording(path: Path) -> tuple[list[Problem], list[str], str, list[Ver
     try:
         return problems, doubts, note, judged_recording(opened)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        told = f"facts that no run of dva-sim has written: {' '.join(repr(error).split())[:200]}"
-        return [*problems, Problem(1, 1, told)], doubts, note, []
+        text = f"facts that no run of dva-sim has written: {' '.join(repr(error).split())[:200]}"
+        return [*problems, Problem(1, 1, text)], doubts, note, []
 
 
 def judged_recording(opened: Opened) -> list[Verdict]:

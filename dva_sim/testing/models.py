@@ -132,8 +132,8 @@ class _Trial:
         try:
             self._run(scenario, SEEDS[0])
         except Exception as error:
-            told = f"{type(error).__name__}: {error}, with {change}"
-            yield "fails in a run that its rehearsal let through", told
+            text = f"{type(error).__name__}: {error}, with {change}"
+            yield "fails in a run that its rehearsal let through", text
 
 
 def _of_number(value: Any, bounds: tuple[float, float], where: str) -> Iterator[Case]:

@@ -155,10 +155,10 @@ def _in_metres(geometry: dict[str, Any], frame: GeoFrame, crs: str, fail: Fail) 
         raise fail("has no usable coordinates")
     for longitude, latitude in positions:
         if abs(longitude) > 180 or abs(latitude) > 90:
-            told = (
+            text = (
                 f"position {longitude:g}, {latitude:g} is not a longitude and latitude in degrees"
             )
-            raise fail(told + _of_system(crs))
+            raise fail(text + _of_system(crs))
         if frame.distance(latitude, longitude) > FARTHEST:
             raise fail(_far(longitude, latitude, frame) + _of_system(crs))
     return shapely.transform(drawn, lambda points: _to_xy(points, frame))
@@ -175,10 +175,10 @@ def _far(longitude: float, latitude: float, frame: GeoFrame) -> str:
     """A position that lies far from the origin, and what may be the cause."""
     away = frame.distance(latitude, longitude) / 1e3
     origin = f"{frame.latitude:g}, {frame.longitude:g}"
-    told = f"position {longitude:g}, {latitude:g} lies {away:,.0f} km from the site's origin"
+    text = f"position {longitude:g}, {latitude:g} lies {away:,.0f} km from the site's origin"
     if abs(longitude) <= 90 and frame.distance(longitude, latitude) <= FARTHEST:
-        return f"{told}: longitude comes first, then latitude"
-    return f"{told} (latitude, longitude {origin}); at most {FARTHEST / 1e3:g} km"
+        return f"{text}: longitude comes first, then latitude"
+    return f"{text} (latitude, longitude {origin}); at most {FARTHEST / 1e3:g} km"
 
 
 def _to_xy(points: Points, frame: GeoFrame) -> Points:

@@ -149,8 +149,8 @@ class Site(FloorPlan):
             if room.name == name:
                 return room
         known = [room.name for room in self.rooms]
-        told = hint(name, known, "rooms") if known else "a bare map names no rooms"
-        raise ConfigError(f"site {self.name!r} has no room {name!r}; {told}")
+        text = hint(name, known, "rooms") if known else "a bare map names no rooms"
+        raise ConfigError(f"site {self.name!r} has no room {name!r}; {text}")
 
     def is_free(self, x: float, y: float, clearance: float) -> bool:
         """Return True if a disc of radius `clearance` [m] fits at a point [m], to within a cell."""
@@ -466,8 +466,8 @@ def _load_site(path: Path, options: str) -> Site:
     for feature in features:
         radius = {"robot_base": FOOTPRINT, "guard_post": STANDING}.get(feature.kind, 0.0)
         if radius and not site.is_free(feature.shape.x, feature.shape.y, radius):
-            told = f"{feature.kind} needs {radius:g} m of free floor around it: it is in a wall"
-            raise feature.fail(told)
+            text = f"{feature.kind} needs {radius:g} m of free floor around it: it is in a wall"
+            raise feature.fail(text)
     return site
 
 

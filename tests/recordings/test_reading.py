@@ -212,7 +212,7 @@ def test_a_figure_gets_its_columns(folder):
     assert list(columns) == ["agent", "t_s", "x_m", "y_m", "heading_rad", "mode"]
     assert {"robot-1", "guard-1", "bystander-1"} <= set(columns["agent"])
     assert len({len(column) for column in columns.values()}) == 1
-    assert "fire breaks out" in lapse.told["what"]
+    assert "fire breaks out" in lapse.story["what"]
     assert lapse.incidents[0].kind == "fire"
     assert lapse.site.name == evacuation().site.name
 

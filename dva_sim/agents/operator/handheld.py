@@ -10,7 +10,7 @@ from dva_sim.agents.operator.attention import OperatorSetup
 from dva_sim.agents.operator.strategies import Reach
 from dva_sim.agents.tilt import PhoneProfile
 
-Said = Callable[[bool, str], object]
+OnResult = Callable[[bool, str], object]
 """Told whether something was done, and what there is to say of it."""
 
 
@@ -43,14 +43,14 @@ class Gathered:
 
     Args:
         count: Number of expected answers.
-        said: Callback once all have come.
+        on_result: Callback once all have come.
 
     Attributes:
         failed: Called before, if one was not good.
     """
 
-    def __init__(self, count: int, said: Said) -> None:
-        self._left, self._said = count, said
+    def __init__(self, count: int, on_result: OnResult) -> None:
+        self._left, self._on_result = count, on_result
         self._good: list[str] = []
         self._bad: list[str] = []
         self.failed: Callable[[], object] = lambda: None
@@ -62,4 +62,4 @@ class Gathered:
         if self._left == 0:
             if self._bad:
                 self.failed()
-            self._said(not self._bad, "; ".join(dict.fromkeys(self._bad or self._good)))
+            self._on_result(not self._bad, "; ".join(dict.fromkeys(self._bad or self._good)))

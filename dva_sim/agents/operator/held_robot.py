@@ -15,7 +15,7 @@ from dva_sim.agents.device import STATUS, AgentDevice
 from dva_sim.agents.observation import CameraFrame
 from dva_sim.agents.operator import steps
 from dva_sim.agents.operator.command_sender import CommandSender
-from dva_sim.agents.operator.handheld import Console, Input, Said
+from dva_sim.agents.operator.handheld import Console, Input, OnResult
 from dva_sim.agents.tilt import GivenTilt, TiltSources
 from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL
 from dva_sim.agents.tilt.velocity import GivenVelocity
@@ -73,7 +73,7 @@ class HeldRobot:
         self.session, self.event = 0, 0
         self._address, self._has_answered = "", False
         self._granted_at = -math.inf
-        self._starting: Said | None = None
+        self._starting: OnResult | None = None
         self.log: DriveLog | None = None
         self.frame: CameraFrame | None = None
         self.arrived = 0.0
@@ -104,7 +104,7 @@ class HeldRobot:
 
     # --- permission ----------------------------------------------------------------------
 
-    def ask(self, said: Said, level: str = "teleoperation") -> None:
+    def ask(self, on_result: OnResult, level: str = "teleoperation") -> None:
         """Ask the DVA for the robot, to do with it what the level says."""
         self.level = level
 
@@ -112,20 +112,20 @@ class HeldRobot:
             if self.phase == "gone":
                 if isinstance(reply.content, m.Permission):
                     steps.give_back(self.device, self.robot, reply.content.session)
-                said(False, "given back meanwhile")
+                on_result(False, "given back meanwhile")
             elif isinstance(reply.content, m.Permission):
                 self.session, self.phase = reply.content.session, "held"
                 self._granted_at = self.device.clock.now
                 self._address = reply.content.address or ""
                 self._watch()
-                said(True, f"{self.label} is yours")
+                on_result(True, f"{self.label} is yours")
             else:
                 self._be_gone()
-                said(False, f"{self.label}: {_why(reply)}")
+                on_result(False, f"{self.label}: {_why(reply)}")
 
         def unreachable() -> None:
             self._be_gone()
-            said(False, f"{self.label}: the DVA does not answer")
+            on_result(False, f"{self.label}: the DVA does not answer")
             wanted = partial(self._wanted, self.robot)
             steps.give_back_unanswered(self.device, self.robot, level, wanted)
 
@@ -257,13 +257,15 @@ class HeldRobot:
 
     # --- drives --------------------------------------------------------------------------
 
-    def start(self, said: Said) -> None:
+    def start(self, on_result: OnResult) -> None:
         """Ask the robot to be driven."""
         if self.phase != "held":
-            said(False, f"{self.label}: {_NOT_NOW.get(self.phase, self.phase)}")
+            on_result(False, f"{self.label}: {_NOT_NOW.get(self.phase, self.phase)}")
             return
         if self.level not in DRIVES:
-            said(False, f"{self.label}: the permission is for {self.level}, not for teleoperation")
+            on_result(
+                False, f"{self.label}: the permission is for {self.level}, not for teleoperation"
+            )
             return
         now = self.device.clock.now
         self.phase = "starting"
@@ -271,15 +273,15 @@ class HeldRobot:
         log.taken_up = now
         self.device.recorder.drive_ordered(log)
 
-        self._starting = said
+        self._starting = on_result
 
         def refused(why: str, outcome: str = "gave up") -> None:
             self._starting = None
             self.end(outcome)
-            said(False, f"{self.label}: {why}")
+            on_result(False, f"{self.label}: {why}")
 
         def lost() -> None:
-            if self._starting is said:  # else it has ended, and that is told
+            if self._starting is on_result:  # else it has ended, and that is told
                 self._unreachable()
                 silence = f"{self._silence()} after {self.device.attempts} attempts"
                 refused(silence, "lost link")
@@ -294,7 +296,7 @@ class HeldRobot:
             self._alert("")
             self._starting = None
             self._begin(log)
-            said(True, f"{self.label} is driven")
+            on_result(True, f"{self.label} is driven")
 
         steps.start(
             self.device,
@@ -365,11 +367,11 @@ class HeldRobot:
             newest = self._inputs.popleft()
         return newest
 
-    def stop(self, outcome: str = "stopped", said: Said | None = None) -> None:
+    def stop(self, outcome: str = "stopped", on_result: OnResult | None = None) -> None:
         """Stop the robot in good order; no drive that has ended goes on by itself."""
         if not self.is_driven:
-            if said is not None:
-                said(True, f"{self.label} is not driven")
+            if on_result is not None:
+                on_result(True, f"{self.label} is not driven")
             return
         self.end(outcome)
         self.phase = "stopping"
@@ -377,16 +379,16 @@ class HeldRobot:
         def stopped(reply: m.Reply | None = None) -> None:
             if self.phase == "stopping":
                 self.phase = "held"
-            if said is not None:
+            if on_result is not None:
                 done = reply is not None and reply.code == m.OK
-                said(done, f"{self.label} {'is told to stop' if done else 'does not answer'}")
+                on_result(done, f"{self.label} {'is told to stop' if done else 'does not answer'}")
 
         self.device.ask(self.robot, m.StopTeleOp(), stopped, stopped, self.session)
 
-    def emergency(self, said: Said) -> None:
+    def emergency(self, on_result: OnResult) -> None:
         """Stop at once, by the way that waits for nothing."""
         self.end("emergency")
-        steps.ask_emergency(self.device, self.robot, self.session, said)
+        steps.ask_emergency(self.device, self.robot, self.session, on_result)
 
     def _listen(self, log: DriveLog) -> bool:
         """No picture and no status for too long: the link is lost, whatever the pattern."""
@@ -408,9 +410,9 @@ class HeldRobot:
 
     def end(self, outcome: str) -> None:
         """A drive is over, however it ended, or its start."""
-        said, self._starting = self._starting, None
-        if said is not None:
-            said(False, f"{self.label} was not started: {outcome}")
+        on_started, self._starting = self._starting, None
+        if on_started is not None:
+            on_started(False, f"{self.label} was not started: {outcome}")
         if self._sender is not None:
             self._sender.stop()
             self._sender = None

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import CameraFrame
-from dva_sim.agents.operator.handheld import Console, Gathered, Said
+from dva_sim.agents.operator.handheld import Console, Gathered, OnResult
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.operator import RECALLED
 from dva_sim.agents.operator.steps import ask_emergency
@@ -77,16 +77,18 @@ class PersonAgent:
         """Somebody takes the seat."""
         self.attended, self.alert = True, ""
 
-    def take(self, robots: Sequence[str], said: Said, level: str = "teleoperation") -> None:
+    def take(
+        self, robots: Sequence[str], on_result: OnResult, level: str = "teleoperation"
+    ) -> None:
         """Ask for robots, with one level of permission: all of them, or none is kept."""
         wanted = [robot for robot in robots if robot not in self.robots]
         if len(self.robots) + len(wanted) > MOST_ROBOTS:
-            said(False, f"one person drives {MOST_ROBOTS} robots at most")
+            on_result(False, f"one person drives {MOST_ROBOTS} robots at most")
             return
         if not wanted:
-            said(True, "they are yours already")
+            on_result(True, "they are yours already")
             return
-        answers = Gathered(len(wanted), said)
+        answers = Gathered(len(wanted), on_result)
         taken = []
         for robot in wanted:
             held = self._hold(robot)
@@ -112,28 +114,28 @@ class PersonAgent:
             self.device, robot, console, tilt, self._alert, let_go=self._let_go, wanted=wanted
         )
 
-    def release(self, said: Said) -> None:
+    def release(self, on_result: OnResult) -> None:
         """Stop what is driven, give everything back, and leave the seat."""
         for held in list(self.robots.values()):
             held.give_back()
         if self.order is not None:
             self._put_down("failed" if self._arrived else "declined")
         self.attended = False
-        said(True, "released")
+        on_result(True, "released")
 
-    def start(self, said: Said) -> None:
+    def start(self, on_result: OnResult) -> None:
         """Begin to drive all robots in hand."""
-        self._each(lambda held, each: held.start(each), said)
+        self._each(lambda held, each: held.start(each), on_result)
 
-    def stop(self, said: Said, why: str = "") -> None:
+    def stop(self, on_result: OnResult, why: str = "") -> None:
         """Stop all robots in hand."""
         if why and any(held.is_driven for held in self.robots.values()):
             self._alert(why)
-        self._each(lambda held, each: held.stop("stopped", each), said)
+        self._each(lambda held, each: held.stop("stopped", each), on_result)
 
-    def emergency(self, robots: Sequence[str], said: Said) -> None:
+    def emergency(self, robots: Sequence[str], on_result: OnResult) -> None:
         """Stop robots at once, regardless of their drivers."""
-        answers = Gathered(len(robots), said)
+        answers = Gathered(len(robots), on_result)
         for robot in robots:
             held = self.robots.get(robot)
             if held is None:
@@ -154,16 +156,16 @@ class PersonAgent:
         for held in self.robots.values():
             held.want(number, speed, turn)
 
-    def report(self, finding: str, said: Said) -> None:
+    def report(self, finding: str, on_result: OnResult) -> None:
         """Say what was found where the order has led: `confirmed` or `refuted`."""
         order = self.order
         if order is None:
-            said(False, "You have no order.")
+            on_result(False, "You have no order.")
             return
 
         def answered(reply: m.Reply) -> None:
             if reply.code != m.OK:
-                said(False, reply.text)
+                on_result(False, reply.text)
                 return
             held = self.robots.get(order.device or "")
             if held is not None and held.log is not None and held.log.event == order.event_id:
@@ -171,26 +173,26 @@ class PersonAgent:
             self.device.tell(f"{finding} event {order.event_id}", "event")
             if self.order is order:
                 self._put_down("done")
-            said(True, f"event {order.event_id} is {finding}")
+            on_result(True, f"event {order.event_id} is {finding}")
 
-        unreachable = lambda: said(False, "the DVA does not answer")  # noqa: E731
+        unreachable = lambda: on_result(False, "the DVA does not answer")  # noqa: E731
         body = m.EventReport(order.event_id, order.kind, order.position, 0.5, 0.95, finding)
         self.device.ask(self.device.dva, body, answered, unreachable)
 
-    def decline(self, said: Said) -> None:
+    def decline(self, on_result: OnResult) -> None:
         """Give the order back."""
         if self.order is None:
-            said(False, "You have no order.")
+            on_result(False, "You have no order.")
             return
         number = self.order.event_id
         self._put_down("declined")
-        said(True, f"event {number} is declined")
+        on_result(True, f"event {number} is declined")
 
-    def _each(self, act: Callable[[HeldRobot, Said], object], said: Said) -> None:
+    def _each(self, act: Callable[[HeldRobot, OnResult], object], on_result: OnResult) -> None:
         if not self.robots:
-            said(False, "no robot is in hand")
+            on_result(False, "no robot is in hand")
             return
-        answers = Gathered(len(self.robots), said)
+        answers = Gathered(len(self.robots), on_result)
         for held in list(self.robots.values()):
             act(held, answers)
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from dva_sim.agents.device import AgentDevice, do_nothing
-from dva_sim.agents.operator.handheld import Said
+from dva_sim.agents.operator.handheld import OnResult
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
@@ -164,13 +164,13 @@ def give_back_unanswered(
     again()
 
 
-def ask_emergency(device: AgentDevice, robot: str, session: int, said: Said) -> None:
+def ask_emergency(device: AgentDevice, robot: str, session: int, on_result: OnResult) -> None:
     """Send a robot an emergency, which it obeys from any sender."""
     label = device.label_of(robot)
     device.ask(
         robot,
         m.Emergency(),
-        lambda reply: said(reply.code == m.OK, f"{label} has stopped"),
-        lambda: said(False, f"{label} does not answer"),
+        lambda reply: on_result(reply.code == m.OK, f"{label} has stopped"),
+        lambda: on_result(False, f"{label} does not answer"),
         session,
     )

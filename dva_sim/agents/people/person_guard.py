@@ -35,7 +35,7 @@ SEVERITIES: Final = {"low": 0.15, "medium": 0.4, "high": 0.6, "critical": 0.9}
 """Design: the share that a word of a report stands for."""
 KINDS: Final = ("fire", "gas_leak", "flood")
 
-Said = Callable[[bool, str], object]
+OnResult = Callable[[bool, str], object]
 
 
 class PersonGuard(OnFoot):
@@ -123,20 +123,20 @@ class PersonGuard(OnFoot):
             self._give_back("failed" if self.answered else "declined", "leaves")
         self.attended = self._needs_help = False
 
-    def answer(self, accepts: bool, reason: str, said: Said) -> None:
+    def answer(self, accepts: bool, reason: str, on_result: OnResult) -> None:
         """Accept the order, or decline it."""
         order = self.order
         if order is None:
-            said(False, "You have no order.")
+            on_result(False, "You have no order.")
         elif accepts:
             self.answered = True
             self.device.progress(order.event_id, "accepted")
-            said(True, f"event {order.event_id} is yours")
+            on_result(True, f"event {order.event_id} is yours")
         else:
             self._give_back("failed" if self.answered else "declined", reason or "no reason given")
-            said(True, f"event {order.event_id} is given back")
+            on_result(True, f"event {order.event_id} is given back")
 
-    def say(self, what: str, said: Said) -> None:
+    def say(self, what: str, on_result: OnResult) -> None:
         """Say how it goes, one of `SAYINGS`."""
         order = self.order
         if what == "help":
@@ -144,22 +144,22 @@ class PersonGuard(OnFoot):
             now = "need help" if self._needs_help else "need no help any more"
             self.device.tell(now.replace("need", "needs", 1), "safety")
             self._publish_status()
-            said(True, f"the DVA is told that you {now}")
+            on_result(True, f"the DVA is told that you {now}")
         elif order is None:
-            said(False, "You have no order.")
+            on_result(False, "You have no order.")
         elif what in FINDINGS:
-            self._find(order, what, said)
+            self._find(order, what, on_result)
         else:
             self._needs_help = False
             self._reach(order, what)
-            said(True, f"{what} is told")
+            on_result(True, f"{what} is told")
 
-    def stand_at(self, x: float, y: float, said: Said) -> None:
+    def stand_at(self, x: float, y: float, on_result: OnResult) -> None:
         """Say where one is [m]."""
         try:
             self._put(x, y)
         except ConfigError as error:
-            said(False, error.problem)
+            on_result(False, error.problem)
             return
         self._publish_status()
         errand = self._protocol.errand
@@ -168,27 +168,27 @@ class PersonGuard(OnFoot):
         far = math.dist(self._order_at, (x, y)) > SET_OUT
         if self.order is not None and self.answered and far:
             self._reach(self.order, "departed")
-        said(True, "")
+        on_result(True, "")
 
-    def report(self, kind: str, x: float, y: float, severity: str, said: Said) -> None:
+    def report(self, kind: str, x: float, y: float, severity: str, on_result: OnResult) -> None:
         """Report an event at a place [m]."""
         position = m.Position(*self.device.frame.to_latlon(x, y))
         body = m.EventReport(None, kind, position, SEVERITIES[severity], 0.9, "detected")
-        self._ask(body, f"{kind.replace('_', ' ')} is reported", said)
+        self._ask(body, f"{kind.replace('_', ' ')} is reported", on_result)
         self.device.tell(f"reports {kind.replace('_', ' ')}", "event")
 
-    def _find(self, order: m.Order, finding: str, said: Said) -> None:
+    def _find(self, order: m.Order, finding: str, on_result: OnResult) -> None:
         place = self._xy(order.position)
         off = math.dist(self.walking.place, place)
         most = self._walker.habits.work.keeps_off_m
         if finding == CONTAINED and off > most:
-            said(False, f"it is {off:.0f} m away: go within {most:g} m to contain it")
+            on_result(False, f"it is {off:.0f} m away: go within {most:g} m to contain it")
             return
         self._reach(order, "arrived")
         if finding == CONTAINED:
             self._contain(order.kind, *place)
         body = m.EventReport(order.event_id, order.kind, order.position, 0.5, 0.99, finding)
-        self._tell(body, f"event {order.event_id} is {finding}", said)
+        self._tell(body, f"event {order.event_id} is {finding}", on_result)
         self.device.tell(f"{finding} event {order.event_id}", "event")
         if finding == CONFIRMED and order.task == "contain":
             return  # it is still there to be contained
@@ -207,24 +207,26 @@ class PersonGuard(OnFoot):
             self._stage = "arrived"
             self.device.progress(order.event_id, "arrived")
 
-    def _tell(self, body: m.EventReport, done: str, said: Said) -> None:
+    def _tell(self, body: m.EventReport, done: str, on_result: OnResult) -> None:
         """Report a finding; one that the DVA cannot keep yet is reported again by itself."""
 
         def answered(reply: m.Reply) -> None:
             later = "; the DVA cannot keep that yet, and is told again"
             is_heard = reply.code in (m.OK, m.BUSY)
             text = done + (later if reply.code == m.BUSY else "")
-            said(is_heard, text if is_heard else reply.text or m.CODE_NAMES[reply.code])
+            on_result(is_heard, text if is_heard else reply.text or m.CODE_NAMES[reply.code])
 
-        unreachable = lambda: said(False, "the DVA does not answer")  # noqa: E731
+        unreachable = lambda: on_result(False, "the DVA does not answer")  # noqa: E731
         self.device.report_finding(body, answered, unreachable)
 
-    def _ask(self, body: m.Body, done: str, said: Said) -> None:
+    def _ask(self, body: m.Body, done: str, on_result: OnResult) -> None:
         def answered(reply: m.Reply) -> None:
             ok = reply.code == m.OK
-            said(ok, done if ok else reply.text or m.CODE_NAMES.get(reply.code, str(reply.code)))
+            on_result(
+                ok, done if ok else reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
+            )
 
-        unreachable = lambda: said(False, "the DVA does not answer")  # noqa: E731
+        unreachable = lambda: on_result(False, "the DVA does not answer")  # noqa: E731
         self.device.ask(self.device.dva, body, answered, unreachable)
 
     # --- what the DVA says -------------------------------------------------------------------

@@ -335,14 +335,20 @@ class RobotController:
 
         That nobody holds it ends no drive: a DVA that has lost its memory may say so.
         """
-        asked, told = self.inquiry.answered(body), body.content
+        asked, permission = self.inquiry.answered(body), body.content
         if asked is None:
             return Decision(m.OK, waits=True)
-        if body.code != m.OK or not isinstance(told, m.Permission):
+        if body.code != m.OK or not isinstance(permission, m.Permission):
             if asked.level is not None and asked.holder is not None:
                 self.observers.pop(asked.holder, None)
             return Decision(m.OK)
-        grant = m.PermissionGrant(told.device, told.level, told.session, told.address, told.sensors)
+        grant = m.PermissionGrant(
+            permission.device,
+            permission.level,
+            permission.session,
+            permission.address,
+            permission.sensors,
+        )
         if grant.level != "sensors":
             return self._is_held(grant)
         if self._full(grant.holder) is None:

@@ -56,9 +56,9 @@ class DecisionLog:
         waited: bool = False,
     ) -> None:
         """A message was decided on; arguments as of `RobotController.handle`."""
-        told = {"arrived": arrived, "now": now, "moving": moving}
-        told |= {"waited": True} if waited else {}
-        self._write({"message": encode(message).decode(), **told, **_as_data(decision)})
+        values = {"arrived": arrived, "now": now, "moving": moving}
+        values |= {"waited": True} if waited else {}
+        self._write({"message": encode(message).decode(), **values, **_as_data(decision)})
 
     def happened(self, what: str, now: float) -> None:
         """Time, the world or a hand at the robot changed what it does: one of the words above."""

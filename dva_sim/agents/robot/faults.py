@@ -51,8 +51,8 @@ class RobotFaults:
             self._usual = inbox.service
         self.processing_s = seconds
         inbox.service = self._usual if seconds is None else lambda: seconds
-        told = "as usual" if seconds is None else f"{seconds:g} s"
-        self._tell(f"fault: processing of a message takes {told}")
+        text = "as usual" if seconds is None else f"{seconds:g} s"
+        self._tell(f"fault: processing of a message takes {text}")
 
     def usually(self, service: Callable[[], float]) -> None:
         """From now on a message usually takes another time: what counts while nothing is wrong."""

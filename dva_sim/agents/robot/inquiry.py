@@ -111,8 +111,8 @@ class Inquiry:
             if self._by_name:
                 self._holder = True
                 return None
-        told = reply.content
-        overtaken = isinstance(told, m.Permission) and self._was_over(told.session)
+        permission = reply.content
+        overtaken = isinstance(permission, m.Permission) and self._was_over(permission.session)
         if overtaken or reply.code == m.NOT_REGISTERED:
             self._again(asked)
             return None

@@ -302,8 +302,8 @@ class RobotAgent:
             return message
         if self._standing_of(message) is not queue.STRANGER:
             return message
-        told = self.inbox.hears_the_dva or self.controller.inquiry.is_open
-        if (told or not self._is_driven()) and isinstance(body, HOLDERS_ONLY):
+        is_informed = self.inbox.hears_the_dva or self.controller.inquiry.is_open
+        if (is_informed or not self._is_driven()) and isinstance(body, HOLDERS_ONLY):
             return message
         letter = Letter(request.data, self.device.clock.now, request, message)
         answer = partial(self._reply, letter, waited=True)

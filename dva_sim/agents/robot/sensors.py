@@ -253,8 +253,8 @@ class SensorConfig(Config):
     def as_kind(self) -> SensorKind:
         """The kind of sensor with what is said here."""
         usual = KINDS[self.name]
-        said = (self.noise, self.resolution, self.low, self.high, self.lag_s)
-        pairs = zip(said, usual[1:], strict=True)
+        settings = (self.noise, self.resolution, self.low, self.high, self.lag_s)
+        pairs = zip(settings, usual[1:], strict=True)
         return SensorKind(usual.unit, *(other if own is None else own for own, other in pairs))
 
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import Final, Unpack
 
-from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.console.wire.seats import Answered, DoneLine
 from dva_sim.kernel.errors import DvaSimError
@@ -32,7 +32,7 @@ class Answers:
     def once(
         self,
         number: str,
-        do: Callable[[Said], object],
+        do: Callable[[OnResult], object],
         tell: Callable[[DoneLine], object],
         *,
         repeats: bool = False,
@@ -67,9 +67,9 @@ class Answers:
         answering(do, said)
 
 
-def answering(do: Callable[[Said], object], said: Said) -> None:
+def answering(do: Callable[[OnResult], object], on_result: OnResult) -> None:
     """Do something of which somebody waits to hear; if it is refused, that is the answer."""
     try:
-        do(said)
+        do(on_result)
     except (Refused, BadMessage, DvaSimError) as error:
-        said(False, str(error))
+        on_result(False, str(error))

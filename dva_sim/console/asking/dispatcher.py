@@ -11,12 +11,12 @@ from functools import partial
 from typing import Any, Protocol, TypeVar
 
 from dva_sim.console.asking.answers import Answers, answering
-from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.wire.actions import ACTIONS, OF_THE_WEB, ActionPlace, Asked, Queueing
 from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.console.wire.seats import DoneLine
 
-Doer = Callable[[str, Asked, Said], object]
+Doer = Callable[[str, Asked, OnResult], object]
 Taker = Callable[[str, Asked], object]
 _HEAD = frozenset({"do", "id", "client", "role"})
 _Marked = TypeVar("_Marked", bound=Callable[..., object])
@@ -25,7 +25,7 @@ _Marked = TypeVar("_Marked", bound=Callable[..., object])
 class AuditedActions(Protocol):
     """The interface of an audit log."""
 
-    def answered(self, what: str, client: str, line: Asked, said: Said) -> Said:
+    def answered(self, what: str, client: str, line: Asked, on_result: OnResult) -> OnResult:
         """Return a callback that passes an answer on once its row is in the log."""
 
 
@@ -100,7 +100,7 @@ class ActionDispatcher:
                 return
             take(client, asked)
 
-    def do(self, client: str, line: Asked, said: Said) -> None:
+    def do(self, client: str, line: Asked, on_result: OnResult) -> None:
         """Do an action, and note it in the audit log.
 
         Raises:
@@ -113,8 +113,8 @@ class ActionDispatcher:
             raise Refused(self._elsewhere.format(what=what))
         asked, audited = _checked(line), self._audited()
         if audited is not None:
-            said = audited.answered(what, client, asked, said)
-        answering(partial(do, client, asked), said)
+            on_result = audited.answered(what, client, asked, on_result)
+        answering(partial(do, client, asked), on_result)
 
 
 _KNOWN: Mapping[str, Any] = {**ACTIONS, **OF_THE_WEB}

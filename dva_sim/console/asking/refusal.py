@@ -10,16 +10,16 @@ UNKNOWN: Final = "unknown"  # outcome of what may have been done or not: nobody 
 NO_ANSWER: Final = "the DVA does not answer"
 
 
-class Said(Protocol):
+class OnResult(Protocol):
     """Callback for the answer to an action."""
 
     def __call__(self, ok: bool, text: str, /, **more: Unpack[Answered]) -> object:
         """Told whether it was done, what there is to say of it, and what was asked for."""
 
 
-def unanswered(said: Said, text: str = NO_ANSWER) -> None:
+def unanswered(on_result: OnResult, text: str = NO_ANSWER) -> None:
     """Tell that nobody has answered, so that one cannot know whether it was done."""
-    said(False, text, outcome=UNKNOWN)
+    on_result(False, text, outcome=UNKNOWN)
 
 
 class Refused(Exception):

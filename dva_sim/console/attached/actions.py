@@ -7,7 +7,7 @@ from typing import Final
 
 from dva_sim.console.asking.answers import BYE
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
-from dva_sim.console.asking.refusal import Refused, Said, unanswered
+from dva_sim.console.asking.refusal import OnResult, Refused, unanswered
 from dva_sim.console.attached.decisions import AttachedDecisions
 from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.events.alarm_actions import AlarmActions
@@ -58,14 +58,14 @@ class AttachedActions:
         self._pages.tell({**answer, "t": self._system.now_ms})
 
     @does("release")
-    def _release(self, client: str, line: Asked, said: Said) -> None:
+    def _release(self, client: str, line: Asked, on_result: OnResult) -> None:
         """Nothing is in hand; but a page may be gone for good."""
         if str(line["id"]).startswith(BYE):
             self._pages.people.leave(client)
-        said(True, "released")
+        on_result(True, "released")
 
     @does("emergency")
-    def _emergency(self, _: str, line: OfSome, said: Said) -> None:
+    def _emergency(self, _: str, line: OfSome, on_result: OnResult) -> None:
         """Stop robots, each over its own connection; those that do not reply are named."""
         system, wanted = self._system, line.get("robots", "all")
         robots = system.robots()
@@ -80,35 +80,37 @@ class AttachedActions:
             if not ok:
                 deaf.append(system.label_of(robot))
             if not left and deaf:
-                unanswered(said, f"no answer of {', '.join(deaf)}")
+                unanswered(on_result, f"no answer of {', '.join(deaf)}")
             elif not left:
-                said(True, "robots stop")
+                on_result(True, "robots stop")
 
         for robot in robots:
             ok, failed = partial(ended, robot, True), partial(ended, robot, False)
             system.device.ask(robot, m.Emergency(), lambda _, ok=ok: ok(), failed)  # type: ignore[misc]
 
     @does("revoke")
-    def _revoke(self, _: str, line: OfDevice, said: Said) -> None:
+    def _revoke(self, _: str, line: OfDevice, on_result: OnResult) -> None:
         robot = line["device"]
         if robot not in self._system.robots():
             raise Refused(f"the DVA has listed no robot {robot}")
 
         def answered(reply: m.Reply) -> None:
             done = f"the permission for {self._system.label_of(robot)} is revoked"
-            said(reply.code == m.OK, reply.text or done)
+            on_result(reply.code == m.OK, reply.text or done)
 
-        self._system.agent.ask(m.Revoke(robot), answered, partial(unanswered, said))
+        self._system.agent.ask(m.Revoke(robot), answered, partial(unanswered, on_result))
 
     @does("fake_add")
-    def _add_fake(self, _: str, line: FakeAsked, said: Said) -> None:
+    def _add_fake(self, _: str, line: FakeAsked, on_result: OnResult) -> None:
         if self._system.options.keys is not None:
             raise Refused(
                 "with keys nobody can pretend to be a device: it would need one of its own"
             )
-        self._system.fakes.add(line, said)
+        self._system.fakes.add(line, on_result)
 
     @does("fake_remove")
-    def _remove_fake(self, _: str, line: OfDevice, said: Said) -> None:
+    def _remove_fake(self, _: str, line: OfDevice, on_result: OnResult) -> None:
         label = self._system.fakes.remove(line["device"])
-        said(True, f"{label} speaks no more: the DVA takes it from its list within some seconds")
+        on_result(
+            True, f"{label} speaks no more: the DVA takes it from its list within some seconds"
+        )

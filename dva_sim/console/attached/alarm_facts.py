@@ -24,11 +24,11 @@ class ToldFacts:
 
     def lost(self, robots: Sequence[RobotRow]) -> Iterator[tuple[str, str]]:
         """Robots of which nothing is heard since they were driven."""
-        for told in self._system.told.devices.values():
-            status = told.status
+        for entry in self._system.told.devices.values():
+            status = entry.status
             driven = isinstance(status, m.RobotStatus) and status.mode == Mode.TELEOPERATION.value
-            if driven and told.heard is not None and self._is_long_ago(told.heard):
-                yield told.device.label, "nothing is heard of it"
+            if driven and entry.heard is not None and self._is_long_ago(entry.heard):
+                yield entry.device.label, "nothing is heard of it"
 
     def broken(self) -> tuple[()]:
         """None is known: the rules are judged where robots and DVA are."""
@@ -39,10 +39,10 @@ class ToldFacts:
         events = self._system.agent.events.values()
         engaged = {status.responder for status in events if status.closed_for is None}
         return any(
-            told.device.device_type in (ROBOT, GUARD)
-            and not self._is_long_ago(told.listed)
+            entry.device.device_type in (ROBOT, GUARD)
+            and not self._is_long_ago(entry.listed)
             and id_tag not in engaged
-            for id_tag, told in self._system.told.devices.items()
+            for id_tag, entry in self._system.told.devices.items()
         )
 
     def _is_long_ago(self, when: float) -> bool:

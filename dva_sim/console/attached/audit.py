@@ -14,7 +14,7 @@ from typing import Final, Unpack
 
 from typing_extensions import override
 
-from dva_sim.console.asking.refusal import Said
+from dva_sim.console.asking.refusal import OnResult
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited
@@ -65,16 +65,16 @@ class AttachedAudit(Audited):
         self._asked: dict[str, AskedDecision] = {}  # by the id of the action
 
     @override
-    def answered(self, what: str, client: str, line: Asked, said: Said) -> Said:
+    def answered(self, what: str, client: str, line: Asked, on_result: OnResult) -> OnResult:
         # A decision waits a moment for the DVA's record of it.
-        told = super().answered(what, client, line, said)
+        report = super().answered(what, client, line, on_result)
         if ACTIONS[what].audit is not Audit.DVA and what != "revoke":
-            return told
+            return report
         number = str(line["id"])
         asked = self._asked[number] = AskedDecision(_action(what), line.get("event"))
 
         def wait(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
-            asked.finish = partial(told, ok, text, **more)
+            asked.finish = partial(report, ok, text, **more)
             if not ok or asked.record is not None:
                 asked.finish()
             else:
@@ -122,7 +122,7 @@ class AttachedAudit(Audited):
         self, asked: AskedDecision, client: str, line: Asked, outcome: str, text: str
     ) -> None:
         """All that is known of a decision is what was asked for, and what was answered."""
-        told = {key: line[key] for key in ("task", "mode", "kind", "severity") if key in line}
+        values = {key: line[key] for key in ("task", "mode", "kind", "severity") if key in line}
         waited = self._system.age_of(asked.event)
         self.keeper.put(
             self.keeper.entry(
@@ -135,7 +135,7 @@ class AttachedAudit(Audited):
                 cause=str(line.get("reason") or ""),
                 outcome=outcome,
                 text=": ".join(word for word in (line.get("text"), text) if word),
-                details=told if waited is None else told | {"waited_s": round(waited, 3)},
+                details=values if waited is None else values | {"waited_s": round(waited, 3)},
             )
         )
 

@@ -32,8 +32,8 @@ SILENT_AFTER: Final = 10.0  # without a place on the list: the DVA's own time-ou
 def things_of(devices: Iterable[ToldDevice], numbers: dict[str, int]) -> list[ThingShown]:
     """Everybody, with numbers that stay as they are."""
     things: list[ThingShown] = []
-    for told in devices:
-        device = told.device
+    for entry in devices:
+        device = entry.device
         kind = KINDS.get(device.device_type, "operator")
         number = numbers.setdefault(device.id_tag, len(numbers))
         body = BODIES.get(kind, {})
@@ -89,8 +89,8 @@ def positions(
 ) -> list[list[int]]:
     """Return the positions of everybody who has reported one."""
     rows = []
-    for id_tag, told in devices.items():
-        status = told.status
+    for id_tag, entry in devices.items():
+        status = entry.status
         if status is None:
             continue
         x, y = frame.to_xy(status.position.latitude, status.position.longitude)
@@ -102,34 +102,36 @@ def positions(
     return rows
 
 
-def robot_row(told: ToldDevice, number: int, now: float) -> RobotRow:
+def robot_row(device_state: ToldDevice, number: int, now: float) -> RobotRow:
     """A robot, as it says itself."""
-    status, holder = told.status, told.holder
+    status, holder = device_state.status, device_state.holder
     known = status if isinstance(status, m.RobotStatus) else None
-    said, since = holder if holder is not None else (None, now)
-    held = said is not None and said.holder is not None
+    holding, since = holder if holder is not None else (None, now)
+    held = holding is not None and holding.holder is not None
     return {
         **row_of_stranger(number, known.mode if known is not None else "unknown"),
-        "holder": said.holder if said is not None else None,
-        "holder_label": said.label if said is not None else None,
-        "session_age_s": round(said.held_for + now - since, 1) if said and held else None,
-        "camera": told.camera,
-        "sensors": readings_of(told, now),
+        "holder": holding.holder if holding is not None else None,
+        "holder_label": holding.label if holding is not None else None,
+        "session_age_s": round(holding.held_for + now - since, 1) if holding and held else None,
+        "camera": device_state.camera,
+        "sensors": readings_of(device_state, now),
     }
 
 
-def sensors_of(told: ToldDevice) -> list[str]:
+def sensors_of(device_state: ToldDevice) -> list[str]:
     """Describe what a device can measure."""
-    return [f"{sensor.name} [{sensor.unit}]" for sensor in told.sensors]
+    return [f"{sensor.name} [{sensor.unit}]" for sensor in device_state.sensors]
 
 
-def readings_of(told: ToldDevice, now: float) -> list[str]:
+def readings_of(device_state: ToldDevice, now: float) -> list[str]:
     """Describe the values of its sensors; a value that is no longer reported is unknown."""
-    return [f"{sensor.name} {_reading(sensor, told, now)}" for sensor in told.sensors]
+    return [
+        f"{sensor.name} {_reading(sensor, device_state, now)}" for sensor in device_state.sensors
+    ]
 
 
-def _reading(sensor: m.Sensor, told: ToldDevice, now: float) -> str:
-    value, heard = told.values.get(sensor.name, (None, 0.0))
+def _reading(sensor: m.Sensor, device_state: ToldDevice, now: float) -> str:
+    value, heard = device_state.values.get(sensor.name, (None, 0.0))
     if value is None or now - heard > SILENT_AFTER:
         return "unknown"
     if len(value.values) > 1:
@@ -138,13 +140,13 @@ def _reading(sensor: m.Sensor, told: ToldDevice, now: float) -> str:
     return f"{value.values[0]:.3g}{unit}"
 
 
-def device_row(told: ToldDevice, now: float, is_fake: bool, may_revoke: bool) -> DeviceRow:
+def device_row(device_state: ToldDevice, now: float, is_fake: bool, may_revoke: bool) -> DeviceRow:
     """A device, as the DVA lists it and as it is heard here."""
-    device, status, said = told.device, told.status, told.holder
-    silent = now - told.listed > SILENT_AFTER
-    heard = None if told.heard is None else now - told.heard
+    device, status, holding = device_state.device, device_state.status, device_state.holder
+    silent = now - device_state.listed > SILENT_AFTER
+    heard = None if device_state.heard is None else now - device_state.heard
     doing = status.mode if isinstance(status, m.RobotStatus) else None
-    holder = said[0] if said is not None else None
+    holder = holding[0] if holding is not None else None
     return {
         "id": device.id_tag,
         "label": device.label,
@@ -153,7 +155,7 @@ def device_row(told: ToldDevice, now: float, is_fake: bool, may_revoke: bool) ->
         "doing": status.activity if isinstance(status, m.PersonStatus) else doing,
         "heard_s": None if heard is None else round(heard, 1),
         "silent": silent,
-        "beats_hz": round(told.rate.of(told.beats, now), 2),
+        "beats_hz": round(device_state.rate.of(device_state.beats, now), 2),
         "link": None if is_fake or heard is None else link_of(heard, silent),
         "fake": is_fake,
         "round_trip_s": None,
@@ -166,8 +168,8 @@ def device_row(told: ToldDevice, now: float, is_fake: bool, may_revoke: bool) ->
         "holder_label": (holder.label if holder is not None else None) or "",
         "holder_known": holder is not None or device.device_type != ROBOT,
         "revocable": may_revoke,
-        "camera": told.camera,
-        "sensors": sensors_of(told),
+        "camera": device_state.camera,
+        "sensors": sensors_of(device_state),
     }
 
 

@@ -134,17 +134,17 @@ class AttachedPages:
     def _robots(self) -> list[RobotRow]:
         now, numbers = self.clock.now, self.system.numbers
         return [
-            lines.robot_row(told, numbers[id_tag], now)
-            for id_tag, told in self.system.told.devices.items()
-            if told.device.device_type == ROBOT and id_tag in numbers
+            lines.robot_row(entry, numbers[id_tag], now)
+            for id_tag, entry in self.system.told.devices.items()
+            if entry.device.device_type == ROBOT and id_tag in numbers
         ]
 
     def _people(self) -> list[DoingShown]:
         numbers = self.system.numbers
         return [
-            {"i": numbers[id_tag], "doing": told.status.activity}
-            for id_tag, told in self.system.told.devices.items()
-            if isinstance(told.status, m.PersonStatus) and id_tag in numbers
+            {"i": numbers[id_tag], "doing": entry.status.activity}
+            for id_tag, entry in self.system.told.devices.items()
+            if isinstance(entry.status, m.PersonStatus) and id_tag in numbers
         ]
 
     def _server(self) -> ServerShown:
@@ -172,7 +172,7 @@ class AttachedPages:
 
     def _events(self) -> list[SiteEventShown]:
         system, agent = self.system, self.system.agent
-        labels = {i: told.device.label for i, told in system.told.devices.items()}
+        labels = {i: entry.device.label for i, entry in system.told.devices.items()}
         return [
             {
                 **lines.event_row(
@@ -187,7 +187,7 @@ class AttachedPages:
         if self.looked:
             now, may = self.clock.now, self.system.role == "supervise"
             rows = [
-                lines.device_row(told, now, self.system.is_fake(id_tag), may)
-                for id_tag, told in self.system.told.devices.items()
+                lines.device_row(entry, now, self.system.is_fake(id_tag), may)
+                for id_tag, entry in self.system.told.devices.items()
             ]
             self.tell({"k": "devices", "t": self.system.now_ms, "devices": rows})

@@ -24,11 +24,11 @@ class SensorWatch:
 
     Args:
         device: Device that subscribes.
-        told: State of the robot, which takes the values.
+        device_state: State of the robot, which takes the values.
     """
 
-    def __init__(self, device: AgentDevice, told: ToldDevice) -> None:
-        self._device, self._told, self._robot = device, told, told.device.id_tag
+    def __init__(self, device: AgentDevice, device_state: ToldDevice) -> None:
+        self._device, self._told, self._robot = device, device_state, device_state.device.id_tag
         self._session: int | None = None
         self._over = False
         self._subscriptions: dict[str, Subscription] = {}

@@ -122,8 +122,8 @@ class AttachedSystem:
         """Note somebody's decision, in words."""
         about = f" about event {record.event_id}" if record.event_id is not None else ""
         refused = f", refused: {record.text}" if record.code != m.OK else ""
-        said = f"{record.action.replace('_', ' ')}{about}{refused}"
-        self.recorder.tell(self.clock.now, record.label, said, "order")
+        text = f"{record.action.replace('_', ' ')}{about}{refused}"
+        self.recorder.tell(self.clock.now, record.label, text, "order")
         self.on_record(record)
 
     # --- what is known ---------------------------------------------------------------------
@@ -153,7 +153,9 @@ class AttachedSystem:
     def robots(self) -> list[str]:
         """Ids of the robots that the DVA lists."""
         known = self.told.devices.items()
-        return [i for i, told in known if told.device.device_type == ROBOT and not self.is_fake(i)]
+        return [
+            i for i, entry in known if entry.device.device_type == ROBOT and not self.is_fake(i)
+        ]
 
     def is_fake(self, id_tag: str) -> bool:
         """Return True if a device was added by hand, here."""
@@ -165,8 +167,8 @@ class AttachedSystem:
 
     def label_of(self, id_tag: str) -> str:
         """Return the label of a device."""
-        told = self.told.devices.get(id_tag)
-        return id_tag if told is None else told.device.label
+        state = self.told.devices.get(id_tag)
+        return id_tag if state is None else state.device.label
 
     def named(self, given: str) -> str:
         """The name of a device by its id, or of things by their numbers, as in `0, 1`."""

@@ -67,26 +67,26 @@ class ToldSystem:
 
     def list(self, devices: tuple[m.Device, ...]) -> None:
         """The DVA says who is there."""
-        before = {(i, told.device) for i, told in self.devices.items()}
+        before = {(i, entry.device) for i, entry in self.devices.items()}
         for device in devices:
             if device.id_tag != self._device.id_tag:
                 others = [
-                    told.device.label for i, told in self.devices.items() if i != device.id_tag
+                    entry.device.label for i, entry in self.devices.items() if i != device.id_tag
                 ]
                 label = distinct(device.label, device.id_tag, others)
                 self._meet(replace(device, label=label))
-        late = [i for i, told in self.devices.items() if self._now - told.listed > FORGET_AFTER]
+        late = [i for i, entry in self.devices.items() if self._now - entry.listed > FORGET_AFTER]
         for id_tag in late:
             self._leave(self.devices.pop(id_tag))
             self._device.forget(id_tag)
-        if {(i, told.device) for i, told in self.devices.items()} != before:
+        if {(i, entry.device) for i, entry in self.devices.items()} != before:
             self._on_news()
 
     def sensors(self, found: m.SensorList) -> None:
         """The DVA says what the devices can show."""
         for one in found.devices:
-            if (told := self.devices.get(one.device)) is not None:
-                told.camera, told.sensors = one.camera_url, one.sensors
+            if (state := self.devices.get(one.device)) is not None:
+                state.camera, state.sensors = one.camera_url, one.sensors
 
     def _meet(self, device: m.Device) -> None:
         """Subscribe to a device, again if its address has changed."""
@@ -96,31 +96,31 @@ class ToldSystem:
             return
         if known is not None:
             self._leave(known)
-        told = self.devices[device.id_tag] = known or ToldDevice(device, self._now)
-        told.device, told.listed = device, self._now
+        state = self.devices[device.id_tag] = known or ToldDevice(device, self._now)
+        state.device, state.listed = device, self._now
         network, me, node = self._device.network, self._device.id_tag, device.id_tag
         network.introduce(node, device.address)
         for topic in TOPICS.get(device.device_type, (HEARTBEAT,)):
-            heard = self._hearing(told)
-            told.subscriptions.append(network.subscribe(me, node, topic, heard))
+            heard = self._hearing(state)
+            state.subscriptions.append(network.subscribe(me, node, topic, heard))
 
-    def _hearing(self, told: ToldDevice) -> Callable[[bytes], object]:
+    def _hearing(self, device_state: ToldDevice) -> Callable[[bytes], object]:
         def heard(data: bytes) -> None:
-            message = self._device.read(data, told.device.id_tag)
+            message = self._device.read(data, device_state.device.id_tag)
             if message is None:
                 return
-            told.heard, body = self._now, message.body
+            device_state.heard, body = self._now, message.body
             if isinstance(body, m.RobotStatus | m.PersonStatus):
-                told.status = body
+                device_state.status = body
             elif isinstance(body, m.RobotHolder):
-                told.holder = body, self._now
+                device_state.holder = body, self._now
             elif isinstance(body, m.Heartbeat):
-                told.beats += 1
+                device_state.beats += 1
 
         return heard
 
     @staticmethod
-    def _leave(told: ToldDevice) -> None:
-        for subscription in told.subscriptions:
+    def _leave(device_state: ToldDevice) -> None:
+        for subscription in device_state.subscriptions:
             subscription.close()
-        told.subscriptions.clear()
+        device_state.subscriptions.clear()

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final, Unpack
 
-from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.wire.actions import ACTIONS, Action, Asked, Audit
 from dva_sim.console.wire.seats import Answered
@@ -39,7 +39,7 @@ class Audited:
         self.keeper = keeper
         self._author, self._label = author, label
 
-    def answered(self, what: str, client: str, line: Asked, said: Said) -> Said:
+    def answered(self, what: str, client: str, line: Asked, on_result: OnResult) -> OnResult:
         """Return a callback that passes an answer on once its row is in the log.
 
         Raises:
@@ -47,7 +47,7 @@ class Audited:
         """
         action = ACTIONS[what]
         if isinstance(action.audit, str):
-            return said
+            return on_result
         if self.keeper.problem and not action.stops:
             raise Refused(f"{self.keeper.problem}; nothing can be done until this is fixed")
 
@@ -56,14 +56,14 @@ class Audited:
                 outcome = more.get("outcome", DONE if ok else REFUSED)
                 self._note(what, client, line, outcome, text)
             if action.stops:
-                said(ok, text, **more)
+                on_result(ok, text, **more)
                 return
 
             def safe(problem: str) -> None:
                 if problem:
-                    said(False, f"{text}; but {problem}", **more)
+                    on_result(False, f"{text}; but {problem}", **more)
                 else:
-                    said(ok, text, **more)
+                    on_result(ok, text, **more)
 
             self.keeper.when_safe(safe)
 
@@ -97,20 +97,22 @@ class Audited:
 
     def _entry(self, fact: Fact) -> AuditEntry:
         ok = fact.code == m.OK
-        told: Asked = {
+        arguments: Asked = {
             "task": fact.task,
             "mode": fact.mode,
             "operator": fact.operator and self._label(fact.operator),
             "arrival_s": fact.arrival_in,
             "waited_s": fact.waited,
         }
-        details: Asked = {key: _short(value) for key, value in told.items() if value is not None}
+        details: Asked = {
+            key: _short(value) for key, value in arguments.items() if value is not None
+        }
         if fact.action == "assign":
             details["advised"] = fact.advised and self._label(fact.advised)
             details["advised_s"] = _short(fact.advised_in)
         if not ok:
             details["code"] = fact.code
-        said = (fact.text, fact.outcome)
+        answer_text = (fact.text, fact.outcome)
         return self.keeper.entry(
             fact.action.replace("_", " "),
             fact.label,
@@ -120,7 +122,7 @@ class Audited:
             subject=(fact.device and self._label(fact.device)) or "",
             cause=fact.cause,
             outcome=DONE if ok else REFUSED,
-            text=": ".join(text for text in said if text),
+            text=": ".join(text for text in answer_text if text),
             details=details,
         )
 

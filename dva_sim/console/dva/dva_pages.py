@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.asking.dispatcher import does
-from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.dva.device_rows import DeviceRows
 from dva_sim.console.dva.dva_port import DvaPort
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
@@ -55,18 +55,18 @@ class DvaPages:
         return {"k": "devices", "t": now_ms, "devices": rows}
 
     @does("server_start")
-    def _start(self, _: str, line: PortAsked, said: Said) -> None:
+    def _start(self, _: str, line: PortAsked, on_result: OnResult) -> None:
         self.port.start(line["port"])
         self._moved(self.port.address)
-        said(True, f"the server listens on {self.port.address}")
+        on_result(True, f"the server listens on {self.port.address}")
 
     @does("server_stop")
-    def _stop(self, _: str, __: Asked, said: Said) -> None:
+    def _stop(self, _: str, __: Asked, on_result: OnResult) -> None:
         self.port.stop()
-        said(True, "the server is stopped")
+        on_result(True, "the server is stopped")
 
     @does("revoke")
-    def _revoke(self, _: str, line: OfDevice, said: Said) -> None:
+    def _revoke(self, _: str, line: OfDevice, on_result: OnResult) -> None:
         robot = line["device"]
         grant = self._run.dva.desk.sessions.permissions.grants.get(robot)
         if grant is None:
@@ -74,17 +74,17 @@ class DvaPages:
         self._run.dva.revoke(grant.robot, None, holder_told=True)
         labels = self._run.stage.labels
         holder = labels.get(grant.holder, grant.holder)
-        said(
+        on_result(
             True, f"{holder} has no permission for {labels.get(grant.robot, grant.robot)} any more"
         )
 
     @does("fake_add")
-    def _add(self, _: str, line: FakeAsked, said: Said) -> None:
-        self._fakes.add(line, said)
+    def _add(self, _: str, line: FakeAsked, on_result: OnResult) -> None:
+        self._fakes.add(line, on_result)
 
     @does("fake_remove")
-    def _remove(self, _: str, line: OfDevice, said: Said) -> None:
-        said(True, f"{self._fakes.remove(line['device'])} is removed")
+    def _remove(self, _: str, line: OfDevice, on_result: OnResult) -> None:
+        on_result(True, f"{self._fakes.remove(line['device'])} is removed")
 
     # --- fake devices ----------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Final
 
 from dva_sim.agents.device import AgentDevice
-from dva_sim.console.asking.refusal import Refused, Said, unanswered
+from dva_sim.console.asking.refusal import OnResult, Refused, unanswered
 from dva_sim.console.wire.arguments import FakeAsked
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.errors import ProtocolError
@@ -48,8 +48,8 @@ class FakeDevices:
         self._make, self._is_known, self._id_of, self._dismiss = make, is_known, id_of, dismiss
         self.devices: dict[str, AgentDevice] = {}
 
-    def add(self, line: FakeAsked, said: Said) -> None:
-        """Add one; `said` hears whether the DVA has taken it.
+    def add(self, line: FakeAsked, on_result: OnResult) -> None:
+        """Add one; `on_result` hears whether the DVA has taken it.
 
         Raises:
             Refused: it cannot be.
@@ -63,14 +63,14 @@ class FakeDevices:
         def answered(reply: m.Reply) -> None:
             if reply.code == m.OK:
                 device.clock.every(RENEW, lambda: self._renew(device))
-                said(True, f"{device.label} is registered as {id_tag}", device=id_tag)
+                on_result(True, f"{device.label} is registered as {id_tag}", device=id_tag)
             else:
                 self._drop(device)
-                said(False, f"the DVA refuses it: {reply.text or m.CODE_NAMES[reply.code]}")
+                on_result(False, f"the DVA refuses it: {reply.text or m.CODE_NAMES[reply.code]}")
 
         def failed() -> None:
             self._drop(device)
-            unanswered(said)
+            unanswered(on_result)
 
         try:
             device.ask(device.dva, _registration(device), answered, failed)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from dva_sim.agents.operator.handheld import Gathered
 from dva_sim.console.asking.dispatcher import Doer, does
-from dva_sim.console.asking.refusal import Said
+from dva_sim.console.asking.refusal import OnResult
 from dva_sim.console.events.alarm_desk import AlarmDesk
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import OfAlarm, ShelveAsked
@@ -25,7 +25,7 @@ class AlarmActions:
         self._desk, self._author, self._acknowledge_event = desk, author, acknowledge
 
     @does("alarm_acknowledge")
-    def _acknowledge(self, client: str, line: Asked, said: Said) -> None:
+    def _acknowledge(self, client: str, line: Asked, on_result: OnResult) -> None:
         """Acknowledge an alarm: at the DVA if an open event is behind it, else here."""
         keys = self._desk.members(line["alarm"])
         events = self._desk.by_event(keys)
@@ -33,21 +33,21 @@ class AlarmActions:
             if key not in events:
                 self._desk.acknowledge(key, self._author(client))
         if not events:
-            said(True, "seen")
+            on_result(True, "seen")
             return
-        answers = Gathered(len(events), said)
+        answers = Gathered(len(events), on_result)
         for number in events.values():
             about = {"do": "event_acknowledge", "event": number, "id": f"{line['id']} {number}"}
             who = {key: line[key] for key in ("client", "role") if key in line}
             self._acknowledge_event(client, who | about, answers)
 
     @does("alarm_shelve")
-    def _shelve(self, client: str, line: ShelveAsked, said: Said) -> None:
+    def _shelve(self, client: str, line: ShelveAsked, on_result: OnResult) -> None:
         keys = self._desk.members(line["alarm"])
         self._desk.shelve(keys, line["for_s"], self._author(client))
-        said(True, f"shelved for {line['for_s'] / 60:.0f} minutes")
+        on_result(True, f"shelved for {line['for_s'] / 60:.0f} minutes")
 
     @does("alarm_unshelve")
-    def _unshelve(self, client: str, line: OfAlarm, said: Said) -> None:
+    def _unshelve(self, client: str, line: OfAlarm, on_result: OnResult) -> None:
         self._desk.unshelve(self._desk.members(line["alarm"]))
-        said(True, "back in the list")
+        on_result(True, "back in the list")

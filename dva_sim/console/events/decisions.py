@@ -44,12 +44,12 @@ def decision_of(
         case "event_acknowledge":
             return m.Acknowledge(number), f"event {number} is acknowledged"
         case "event_assign":
-            told = f"{label} is sent to event {number}"
+            text = f"{label} is sent to event {number}"
             task = line.get("task")
-            return m.Assign(number, device(label), None, task, reason, known()), told
+            return m.Assign(number, device(label), None, task, reason, known()), text
         case "event_take_off":
-            told = f"{label} is called off event {number}"
-            return m.TakeOff(number, device(label), reason, known()), told
+            text = f"{label} is called off event {number}"
+            return m.TakeOff(number, device(label), reason, known()), text
         case "event_false_alarm":
             return m.FalseAlarm(number, reason or "", known()), f"event {number} is a false alarm"
         case "event_escalate":

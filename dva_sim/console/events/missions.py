@@ -7,7 +7,7 @@ from typing import Final
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.operator.steps import give_back, start
-from dva_sim.console.asking.refusal import Said, unanswered
+from dva_sim.console.asking.refusal import OnResult, unanswered
 from dva_sim.console.events.rooms import why
 from dva_sim.protocol import messages as m
 
@@ -22,7 +22,7 @@ def inspection_of(status: m.EventStatus) -> m.Inspect:
 
 
 def send_on_mission(
-    device: AgentDevice, robot: str, label: str, body: m.Inspect, said: Said
+    device: AgentDevice, robot: str, label: str, body: m.Inspect, on_result: OnResult
 ) -> None:
     """Get the permission for a robot, and have it begin.
 
@@ -31,26 +31,26 @@ def send_on_mission(
         robot: By its id.
         label: Label of the robot.
         body: Mission with its destination.
-        said: Callback for the result.
+        on_result: Callback for the result.
     """
 
     def granted(reply: m.Reply) -> None:
         if not isinstance(reply.content, m.Permission):
-            said(False, f"{label}: {why(reply)}")
+            on_result(False, f"{label}: {why(reply)}")
             return
         session = reply.content.session
 
         def refused(text: str) -> None:
             give_back(device, robot, session)
-            said(False, f"{label}: {text}")
+            on_result(False, f"{label}: {text}")
 
         def lost() -> None:
             give_back(device, robot, session)
-            unanswered(said, f"{label}: it does not answer")
+            unanswered(on_result, f"{label}: it does not answer")
 
         def begun() -> None:
             _follow(device, robot, label, session)
-            said(True, f"{label} goes to event {body.event_id} by itself")
+            on_result(True, f"{label} goes to event {body.event_id} by itself")
 
         start(
             *(device, robot, body, lambda: session),
@@ -62,7 +62,7 @@ def send_on_mission(
 
     device.connect(robot)
     wish = m.PermissionRequest(robot, "missions")
-    device.ask(device.dva, wish, granted, partial(unanswered, said))
+    device.ask(device.dva, wish, granted, partial(unanswered, on_result))
 
 
 def _follow(device: AgentDevice, robot: str, label: str, session: int) -> None:
@@ -74,8 +74,8 @@ def _follow(device: AgentDevice, robot: str, label: str, session: int) -> None:
             device.clock.call_after(ASK_PERIOD, ask, 0)
             return
         if isinstance(status, m.MissionStatus):
-            told = status.mission_state.replace("_", " ")
-            device.tell(f"the mission of {label} is {told}: {status.reason}", "order")
+            text = status.mission_state.replace("_", " ")
+            device.tell(f"the mission of {label} is {text}: {status.reason}", "order")
         give_back(device, robot, session)
 
     def ask(silences: int) -> None:

@@ -13,7 +13,7 @@ from typing import Final, Unpack
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice
-from dva_sim.console.asking.refusal import Said, unanswered
+from dva_sim.console.asking.refusal import OnResult, unanswered
 from dva_sim.console.events.decisions import dispatch_shown
 from dva_sim.console.wire.events import ControlLine, RoomEntry
 from dva_sim.console.wire.limits import LONG
@@ -47,16 +47,16 @@ class ConsoleRoom:
     agent: ControlRoomAgent
     role: str
     registered: bool = False
-    unanswered: set[Said] = field(default_factory=set)
+    unanswered: set[OnResult] = field(default_factory=set)
 
-    def until_answered(self, said: Said) -> Said:
+    def until_answered(self, on_result: OnResult) -> OnResult:
         """Keep an answer in mind: a room that is left stays until its person has it."""
 
         def told(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
-            self.unanswered.discard(said)
-            said(ok, text, **more)
+            self.unanswered.discard(on_result)
+            on_result(ok, text, **more)
 
-        self.unanswered.add(said)
+        self.unanswered.add(on_result)
         return told
 
     def is_called(self, name: str) -> bool:
@@ -69,13 +69,17 @@ class ConsoleRoom:
         return self.agent.device
 
     def ask(
-        self, body: m.Body, said: Said, done: str, then: Callable[[m.Reply], Answered] | None = None
+        self,
+        body: m.Body,
+        on_result: OnResult,
+        done: str,
+        then: Callable[[m.Reply], Answered] | None = None,
     ) -> None:
         """Ask the DVA, and tell how that went.
 
         Args:
             body: Content of the request.
-            said: Callback for the result.
+            on_result: Callback for the result.
             done: In words, if it is done.
             then: Makes more of a reply that says so.
         """
@@ -83,9 +87,9 @@ class ConsoleRoom:
         def answered(reply: m.Reply) -> None:
             ok = reply.code == m.OK
             more = then(reply) if ok and then is not None else {}
-            said(ok, done if ok else why(reply), **more)
+            on_result(ok, done if ok else why(reply), **more)
 
-        self.agent.ask(body, answered, partial(unanswered, said))
+        self.agent.ask(body, answered, partial(unanswered, on_result))
 
 
 def why(reply: m.Reply) -> str:
@@ -124,17 +128,17 @@ class ConsoleRooms:
 
     # --- who decides ------------------------------------------------------------------------
 
-    def join(self, client: str, role: str, name: str, said: Said) -> None:
+    def join(self, client: str, role: str, name: str, on_result: OnResult) -> None:
         """A page's person gets a device of its role, or its device gets another name."""
         room = self.by_client.get(client)
         if room is not None and (not name or room.is_called(name)):
-            said(True, f"you are {room.device.label}")
+            on_result(True, f"you are {room.device.label}")
             return
         if room is not None:
             self.leave(client)
         room = self._new(role, name)
         if room is None:
-            said(False, "too many control rooms have come and gone: try again in two minutes")
+            on_result(False, "too many control rooms have come and gone: try again in two minutes")
             return
         self.by_client[client] = room
 
@@ -145,9 +149,9 @@ class ConsoleRooms:
             status = room.agent.dispatch
             if status is not None and status.role is not None:
                 room.registered = True
-                said(True, f"you are {room.device.label}, and may {status.role}")
+                on_result(True, f"you are {room.device.label}, and may {status.role}")
             elif clock.now >= ends:
-                unanswered(said)
+                unanswered(on_result)
             return not room.registered and clock.now < ends
 
         room.agent.start()

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Final, Unpack
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
-from dva_sim.console.asking.refusal import Said, unanswered
+from dva_sim.console.asking.refusal import OnResult, unanswered
 from dva_sim.console.events.rooms import why
 from dva_sim.console.wire.seats import Answered
 from dva_sim.protocol import messages as m
@@ -31,7 +31,7 @@ class Takeover:
         event: Event that the robot was sent to; None: it was sent nowhere.
         seat: Id of the device that is to drive it; None: the DVA sends it nowhere.
         take: Asks for the robot, for the seat or otherwise.
-        said: Callback for the result.
+        on_result: Callback for the result.
     """
 
     def __init__(
@@ -41,11 +41,11 @@ class Takeover:
         reason: str,
         event: m.EventStatus | None,
         seat: str | None,
-        take: Callable[[Said], object],
-        said: Said,
+        take: Callable[[OnResult], object],
+        on_result: OnResult,
     ) -> None:
         self._agent, self._robot, self._reason = agent, robot, reason
-        self._event, self._seat, self._take, self._said = event, seat, take, said
+        self._event, self._seat, self._take, self._said = event, seat, take, on_result
         self._tries = 0
 
     def begin(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.console.asking.dispatcher import does
-from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.events.decisions import place_of
 from dva_sim.console.guards.played_guards import PlayedGuards
 from dva_sim.console.wire.actions import Asked
@@ -36,38 +36,38 @@ class GuardActions:
         return guard
 
     @does("guard_join")
-    def _join(self, client: str, line: GuardAsked, said: Said) -> None:
+    def _join(self, client: str, line: GuardAsked, on_result: OnResult) -> None:
         label = line["guard"]
         guard = self._guards.named(label)
         if guard is None:
             raise Refused(f"There is no guard {label!r} that a person can play.")
         if self._guards.by_client.get(client) is guard:
-            said(True, f"you are {label} already")
+            on_result(True, f"you are {label} already")
             return
         if guard.attended:
             raise Refused(f"Somebody else is already {label}.")
         self._guards.leave(client)
         self._guards.join(client, guard)
-        said(True, f"you are {label}")
+        on_result(True, f"you are {label}")
 
     @does("guard_leave")
-    def _leave(self, client: str, _: Asked, said: Said) -> None:
+    def _leave(self, client: str, _: Asked, on_result: OnResult) -> None:
         self._guards.leave(client)
-        said(True, "nobody plays the guard now")
+        on_result(True, "nobody plays the guard now")
 
     @does("guard_answer")
-    def _answer(self, client: str, line: GuardAnswer, said: Said) -> None:
-        self._guard(client).answer(line["accept"], line["reason"], said)
+    def _answer(self, client: str, line: GuardAnswer, on_result: OnResult) -> None:
+        self._guard(client).answer(line["accept"], line["reason"], on_result)
 
     @does("guard_say")
-    def _say(self, client: str, line: GuardWord, said: Said) -> None:
-        self._guard(client).say(line["what"], said)
+    def _say(self, client: str, line: GuardWord, on_result: OnResult) -> None:
+        self._guard(client).say(line["what"], on_result)
 
     @does("guard_place")
-    def _place(self, client: str, line: PlaceAsked, said: Said) -> None:
-        self._guard(client).stand_at(*place_of(line, self._site), said)
+    def _place(self, client: str, line: PlaceAsked, on_result: OnResult) -> None:
+        self._guard(client).stand_at(*place_of(line, self._site), on_result)
 
     @does("guard_report")
-    def _report(self, client: str, line: ReportAsked, said: Said) -> None:
+    def _report(self, client: str, line: ReportAsked, on_result: OnResult) -> None:
         point = place_of(line, self._site)
-        self._guard(client).report(line["kind"], *point, line["severity"], said)
+        self._guard(client).report(line["kind"], *point, line["severity"], on_result)

@@ -195,8 +195,8 @@ class ConsoleProcesses:
 
     def _say_of_phones(self) -> None:
         """Their address, also for a camera; and what people should know of it."""
-        for told in self.serving["told"]:
-            self._say(told)
+        for entry in self.serving["told"]:
+            self._say(entry)
         if address := self.serving["phone"]:
             from dva_sim.console.pages.qr_code import half_blocks  # late: start-up
 

@@ -11,7 +11,7 @@ from typing import Any
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.asking.answers import BYE
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
-from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.asking.seats import Seats
 from dva_sim.console.audit.audited import name_of_page
 from dva_sim.console.events.alarm_actions import AlarmActions
@@ -91,7 +91,7 @@ class Actions:
         return self._world.person(seat.number)
 
     @does("take")
-    def _take(self, client: str, line: OfRobots, said: Said) -> None:
+    def _take(self, client: str, line: OfRobots, on_result: OnResult) -> None:
         robots = self._robots(line)
         number = self._seats.sit(client, self._world.seat_of_order(robots))
         if number is None:
@@ -106,7 +106,7 @@ class Actions:
             if not ok and not person.robots:
                 self._leave(client)
             self._hold()
-            said(ok, text if ok or not holders else f"{text}. {holders}")
+            on_result(ok, text if ok or not holders else f"{text}. {holders}")
 
         person.take(robots, answered)
 
@@ -129,16 +129,16 @@ class Actions:
         return f"{'; '.join(named)}: release it there, or take it over on the page Events.{none}"
 
     @does("release")
-    def _release(self, client: str, line: Asked, said: Said) -> None:
+    def _release(self, client: str, line: Asked, on_result: OnResult) -> None:
         if str(line["id"]).startswith(BYE):
             self._phones.forget(client)
             self._rooms.forget(client)
             self._hold()
         if client not in self._seats.taken:
-            said(True, "released")
+            on_result(True, "released")
             return
         person = self._person(client)
-        person.release(said)
+        person.release(on_result)
         self._leave(client)
 
     def _leave(self, client: str) -> None:
@@ -184,19 +184,19 @@ class Actions:
         return "The simulation is paused. Resume it first." if self._world.clock.paused else ""
 
     @does("start")
-    def _start(self, client: str, _: Asked, said: Said) -> None:
+    def _start(self, client: str, _: Asked, on_result: OnResult) -> None:
         person = self._person(client)
         if why := self._why_not():
             raise Refused(why)
         person.alert = ""
-        person.start(said)
+        person.start(on_result)
 
     @does("stop")
-    def _stop(self, client: str, _: Asked, said: Said) -> None:
-        self._person(client).stop(said)
+    def _stop(self, client: str, _: Asked, on_result: OnResult) -> None:
+        self._person(client).stop(on_result)
 
     @does("emergency")
-    def _emergency(self, client: str, line: OfSome, said: Said) -> None:
+    def _emergency(self, client: str, line: OfSome, on_result: OnResult) -> None:
         seat = self._seats.taken.get(client)
         if "robots" not in line and seat is not None:
             line = {"robots": list(self._world.person(seat.number).robots)}
@@ -207,7 +207,7 @@ class Actions:
         for person in self._world.persons:
             if person is not own or seat is None:
                 person.ended_by_others(robots)
-        own.emergency(robots, said)
+        own.emergency(robots, on_result)
 
     def _drew(self, client: str, line: SampleBatch | Wish) -> None:
         """Note which picture of each robot a page has drawn last, if it says so."""
@@ -276,32 +276,32 @@ class Actions:
             self._stop_one(client, why)
 
     @does("confirm")
-    def _confirm(self, client: str, _: Asked, said: Said) -> None:
-        self._person(client).report("confirmed", said)
+    def _confirm(self, client: str, _: Asked, on_result: OnResult) -> None:
+        self._person(client).report("confirmed", on_result)
 
     @does("refute")
-    def _refute(self, client: str, _: Asked, said: Said) -> None:
-        self._person(client).report("refuted", said)
+    def _refute(self, client: str, _: Asked, on_result: OnResult) -> None:
+        self._person(client).report("refuted", on_result)
 
     @does("decline")
-    def _decline(self, client: str, _: Asked, said: Said) -> None:
+    def _decline(self, client: str, _: Asked, on_result: OnResult) -> None:
         """Decline the order of one's own seat, or of a seat in which nobody sits."""
         if client in self._seats.taken:
-            self._person(client).decline(said)
+            self._person(client).decline(on_result)
             return
         free = [p for p in self._world.persons if p.order is not None and not p.attended]
         if not free:
             raise Refused("You have no order.")
-        free[0].decline(said)
+        free[0].decline(on_result)
 
     # --- what can be changed ---------------------------------------------------------------
 
     @does("link")
-    def _link(self, _: str, line: LinkChange, said: Said) -> None:
-        said(True, self._world.change_link(line))
+    def _link(self, _: str, line: LinkChange, on_result: OnResult) -> None:
+        on_result(True, self._world.change_link(line))
 
     @does("pattern")
-    def _pattern(self, _: str, line: PatternChoice, said: Said) -> None:
+    def _pattern(self, _: str, line: PatternChoice, on_result: OnResult) -> None:
         robot, name = self._robot(line.get("robot")), line.get("name")
         world = self._world
         if name not in PATTERNS and name != world.scenario.pattern:
@@ -309,12 +309,12 @@ class Actions:
         label = world.run.stage.labels[robot]
 
         def changed(ok: bool, text: str = "") -> None:
-            said(ok, f"{label} is driven by {name} next" if ok else text)
+            on_result(ok, f"{label} is driven by {name} next" if ok else text)
 
         change_pattern(world.run, world.persons, robot, str(name), changed)
 
     @does("pace")
-    def _pace(self, _: str, line: PaceChange, said: Said) -> None:
+    def _pace(self, _: str, line: PaceChange, on_result: OnResult) -> None:
         factor, paused = line.get("factor"), line.get("paused")
         if self._world.run.is_real:
             raise Refused("The simulation runs in real time because its links are real sockets.")
@@ -325,31 +325,31 @@ class Actions:
         clock = self._world.clock
         clock.pace(factor, paused)
         now = "time stands still" if clock.paused else f"{clock.factor:g} times real time"
-        said(True, now)
+        on_result(True, now)
 
     @does("tour")
-    def _tour(self, _: str, line: Nothing, said: Said) -> None:
+    def _tour(self, _: str, line: Nothing, on_result: OnResult) -> None:
         plan = tour_of(self._world.run, self._world.feed.numbers)
         if plan is None:
             raise Refused(
                 "the tour needs two robots with 3 m of free way: drive them into the open"
             )
-        said(True, "two goals", tour=plan)
+        on_result(True, "two goals", tour=plan)
 
     @does("tour_time")
-    def _tour_time(self, client: str, line: TourTime, said: Said) -> None:
+    def _tour_time(self, client: str, line: TourTime, on_result: OnResult) -> None:
         robot, took = self._robot(line["robot"]), line["took_s"]
         log = self._world.recorder.newest_drive.get(robot)
         if log is None or log.operator != self._person(client).device.id_tag:
             raise Refused("You have not driven this robot.")
         log.by = log.by._replace(tour_time=took)
-        said(True, f"{took:.1f} s noted")
+        on_result(True, f"{took:.1f} s noted")
 
     @does("mark")
-    def _mark(self, client: str, line: MarkAsked, said: Said) -> None:
+    def _mark(self, client: str, line: MarkAsked, on_result: OnResult) -> None:
         world = self._world
         world.recorder.tell(world.clock.now, world.author(client), f"marks: {line['text']}")
-        said(True, "marked")
+        on_result(True, "marked")
 
     @does("watch")
     def _watch(self, _: str, line: RobotsWatched) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.asking.dispatcher import does
-from dva_sim.console.asking.refusal import NO_ANSWER, Refused, Said
+from dva_sim.console.asking.refusal import NO_ANSWER, OnResult, Refused
 from dva_sim.console.asking.seats import Seats
 from dva_sim.console.phones.phone_input import samples_of, settings_of
 from dva_sim.console.phones.phone_seat import PhoneSeat
@@ -65,20 +65,20 @@ class PhoneActions:
 
     def samples(self, client: str, line: SampleBatch) -> None:
         """Samples of a phone have come."""
-        said, phone = samples_of(line), self._phones.seat(client)
+        samples_, phone = samples_of(line), self._phones.seat(client)
         if phone is None:
             return
         if phone.person is None:
             seat = self._seats.taken.get(client)
             phone.lend(None if seat is None else self._world.person(seat.number))
         now = time.monotonic()
-        if phone.driven is not None and not said.hand:
+        if phone.driven is not None and not samples_.hand:
             self._stop(client, LIFTED)
-        elif phone.driven is not None and said.orientation != phone.orientation:
+        elif phone.driven is not None and samples_.orientation != phone.orientation:
             self._stop(client, TURNED)
-        phone.turn(said.orientation)
-        if phone.take(said, now):  # a sensor that says the same again and again is silent
-            self._seats.heard(client, now, said.hand)
+        phone.turn(samples_.orientation)
+        if phone.take(samples_, now):  # a sensor that says the same again and again is silent
+            self._seats.heard(client, now, samples_.hand)
 
     def leaves(self, client: str) -> None:
         """A page has left its seat of the console: another one there steers as it likes."""
@@ -97,7 +97,7 @@ class PhoneActions:
     # --- who it is -------------------------------------------------------------------------
 
     @does("phone_register")
-    def _register(self, client: str, line: PhoneIdentity, said: Said) -> None:
+    def _register(self, client: str, line: PhoneIdentity, on_result: OnResult) -> None:
         label, kind = line["label"], line["type"]
         address = f"{line['server'].strip()}:{line['port']}"
         seat = self._seats.taken.get(client)
@@ -115,21 +115,21 @@ class PhoneActions:
 
         def answered(reply: m.Reply) -> None:
             if phone.person is not person:
-                said(False, "another registration has taken its place")
+                on_result(False, "another registration has taken its place")
             elif reply.code == m.OK:
                 phone.registered = True
                 self._world.client_of[number] = client
                 for robot in self._world.run.field.robots:
                     person.device.connect(robot)  # an emergency does not wait for a connection
-                said(True, f"{label} is registered", phone=phone.identity())
+                on_result(True, f"{label} is registered", phone=phone.identity())
             else:
                 self._retire(client, phone)
-                said(False, reply.text or m.CODE_NAMES.get(reply.code, str(reply.code)))
+                on_result(False, reply.text or m.CODE_NAMES.get(reply.code, str(reply.code)))
 
         def unreachable() -> None:
             if phone.person is person:
                 self._retire(client, phone)
-            said(False, f"no DVA answers at {address}")
+            on_result(False, f"no DVA answers at {address}")
 
         try:
             person.device.register_once(answered, unreachable)
@@ -162,25 +162,25 @@ class PhoneActions:
     # --- what it asks of the DVA ---------------------------------------------------------------
 
     @does("phone_devices")
-    def _devices(self, client: str, _: Asked, said: Said) -> None:
+    def _devices(self, client: str, _: Asked, on_result: OnResult) -> None:
         device = self._device(client)[1].device
 
         def answered(reply: m.Reply) -> None:
             if not isinstance(reply.content, m.DeviceList):
-                said(False, reply.text or m.CODE_NAMES.get(reply.code, str(reply.code)))
+                on_result(False, reply.text or m.CODE_NAMES.get(reply.code, str(reply.code)))
                 return
             found = [_shown(one) for one in reply.content.devices]
-            said(True, f"{len(found)} devices", devices=found)
+            on_result(True, f"{len(found)} devices", devices=found)
 
-        device.ask(device.dva, m.GetDeviceList(), answered, lambda: said(False, NO_ANSWER))
+        device.ask(device.dva, m.GetDeviceList(), answered, lambda: on_result(False, NO_ANSWER))
 
     @does("phone_permission")
-    def _permission(self, client: str, line: PhoneWish, said: Said) -> None:
+    def _permission(self, client: str, line: PhoneWish, on_result: OnResult) -> None:
         _, person = self._device(client)
         level, robot = line["level"], self._asked(line["device"])
         held = person.robots.get(robot)
         if held is not None and held.level == level:
-            said(True, f"{held.label} is yours already")
+            on_result(True, f"{held.label} is yours already")
             return
         for other in list(person.robots.values()):
             other.give_back()
@@ -189,7 +189,7 @@ class PhoneActions:
         def answered(ok: bool, text: str) -> None:
             held = {robot for one in self._world.persons for robot in one.robots}
             self._world.screens.hold(held)
-            said(ok, text)
+            on_result(ok, text)
 
         person.take([robot], answered, level)
 
@@ -202,13 +202,13 @@ class PhoneActions:
         return given if given in self._world.run.stage.labels else self._robot(given)
 
     @does("phone_calibrate")
-    def _calibrate(self, client: str, line: CalibrationAsked, said: Said) -> None:
+    def _calibrate(self, client: str, line: CalibrationAsked, on_result: OnResult) -> None:
         phone = self._phone(client)
         settings = settings_of(line)
         kept = self._phones.keep_motion(phone, settings.keep)
         phone.calibrate(settings)
         later = " from the next drive on" if phone.driven is not None else ""
-        said(True, f"calibrated{later}{kept}")
+        on_result(True, f"calibrated{later}{kept}")
 
 
 def _shown(device: m.Device) -> DeviceShown:

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any, Unpack
 
 from dva_sim.console.asking.dispatcher import does
-from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.asking.seats import Seats
 from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, place_of, report_of
 from dva_sim.console.events.missions import inspection_of, send_on_mission
@@ -41,7 +41,7 @@ class RoomActions:
         world: ConsoleWorld,
         seats: Seats,
         robot: Callable[[Any], str],
-        take: Callable[[str, OfRobots, Said], object],
+        take: Callable[[str, OfRobots, OnResult], object],
     ) -> None:
         self._world, self._rooms, self._seats = world, world.rooms, seats
         self._robot, self._take = robot, take
@@ -53,29 +53,29 @@ class RoomActions:
     # --- who asks ---------------------------------------------------------------------------
 
     @does("room_join")
-    def _join(self, client: str, line: RoomName, said: Said) -> None:
+    def _join(self, client: str, line: RoomName, on_result: OnResult) -> None:
         name = line["name"].strip()
-        self._rooms.join(client, str(line.get("role", "look")), name, said)
+        self._rooms.join(client, str(line.get("role", "look")), name, on_result)
 
     def _room(
         self,
         client: str,
         line: Mapping[str, Any],
-        said: Said,
-        then: Callable[[ConsoleRoom, Said], object],
+        on_result: OnResult,
+        then: Callable[[ConsoleRoom, OnResult], object],
     ) -> None:
         """The control room of a page; it gets one with its first decision."""
         room = self._rooms.by_client.get(client)
         if room is not None and room.registered:
-            then(room, room.until_answered(said))
+            then(room, room.until_answered(on_result))
             return
 
         def joined(ok: bool, text: str, /, **_: Any) -> None:
             room = self._rooms.by_client.get(client)
             if ok and room is not None:
-                then(room, room.until_answered(said))
+                then(room, room.until_answered(on_result))
             else:
-                said(False, text)
+                on_result(False, text)
 
         self._rooms.join(client, str(line.get("role", "look")), "", joined)
 
@@ -83,23 +83,25 @@ class RoomActions:
         self,
         client: str,
         line: Mapping[str, Any],
-        said: Said,
+        on_result: OnResult,
         body: m.Body,
         done: str,
         then: Callable[[m.Reply], Answered] | None = None,
     ) -> None:
-        self._room(client, line, said, lambda room, told: room.ask(body, told, done, then))
+        self._room(client, line, on_result, lambda room, told: room.ask(body, told, done, then))
 
     # --- events -----------------------------------------------------------------------------
 
     @does(*DECISIONS)
-    def decide(self, client: str, line: Asked, said: Said) -> None:
+    def decide(self, client: str, line: Asked, on_result: OnResult) -> None:
         """Decide on an event."""
         body, done = decision_of(line, self._device, self._rooms.decisions)
-        self._ask(client, line, said, body, done, lambda reply: answer_of(reply, self._is_robot))
+        self._ask(
+            client, line, on_result, body, done, lambda reply: answer_of(reply, self._is_robot)
+        )
 
     @does("event_raise")
-    def _raise(self, client: str, line: ReportAsked, said: Said) -> None:
+    def _raise(self, client: str, line: ReportAsked, on_result: OnResult) -> None:
         site = self._world.run.stage.site
         place = m.Position(*site.frame.to_latlon(*place_of(line, site)))
         body, done = report_of(line, place)
@@ -108,7 +110,7 @@ class RoomActions:
             event = self._world.run.dva.desk.book.near(body.kind, body.position)
             return {} if event is None else {"event": event.number}
 
-        self._ask(client, line, said, body, done, then)
+        self._ask(client, line, on_result, body, done, then)
 
     def _device(self, label: str) -> str:
         """The id of a device by its label.
@@ -129,7 +131,7 @@ class RoomActions:
     # --- robots -----------------------------------------------------------------------------
 
     @does("mission")
-    def _mission(self, client: str, line: MissionAsked, said: Said) -> None:
+    def _mission(self, client: str, line: MissionAsked, said: OnResult) -> None:
         """Have a robot go to an event by itself, and look at it."""
         status = self._rooms.listener.events.get(line["event"])
         if status is None:
@@ -137,20 +139,20 @@ class RoomActions:
         robot = self._robot(line["robot"])
         label, body = self._world.run.stage.labels[robot], inspection_of(status)
 
-        def send(room: ConsoleRoom, told: Said) -> None:
-            send_on_mission(room.device, robot, label, body, told)
+        def send(room: ConsoleRoom, on_result: OnResult) -> None:
+            send_on_mission(room.device, robot, label, body, on_result)
 
         self._room(client, line, said, send)
 
     @does("take_over")
-    def _take_over(self, client: str, line: TakeoverAsked, said: Said) -> None:
+    def _take_over(self, client: str, line: TakeoverAsked, said: OnResult) -> None:
         """Take a robot and its task from its driver into the client's own seat."""
         robot, reason = self._robot(line["robot"]), line["reason"]
 
-        def begin(room: ConsoleRoom, told: Said) -> None:
+        def begin(room: ConsoleRoom, on_result: OnResult) -> None:
             number = self._seats.sit(client)
             if number is None:
-                told(False, "All seats are taken.")
+                on_result(False, "All seats are taken.")
                 return
             seat = self._world.person(number)
             label = self._world.run.stage.labels[robot]
@@ -160,7 +162,7 @@ class RoomActions:
                 if not ok and not seat.robots:
                     self._seats.stand_up(client)
                     seat.attended = client in self._world.client_of.values()
-                told(ok, text, **more)
+                on_result(ok, text, **more)
 
             event = self._rooms.event_of(robot)
             Takeover(
@@ -170,7 +172,7 @@ class RoomActions:
                 event=event,
                 seat=seat.device.id_tag,
                 take=take,
-                said=ended,
+                on_result=ended,
             ).begin()
 
         self._room(client, line, said, begin)

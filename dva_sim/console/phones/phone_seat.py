@@ -151,11 +151,11 @@ class PhoneSeat:
         self._count(said, len(fresh))
         if not fresh:
             return False
-        told = [at for at, _ in fresh]
-        times = self._times.times_of(told, came)
-        for by_phone, taken, (_, xyz) in zip(told, times, fresh, strict=True):
+        reports = [at for at, _ in fresh]
+        times = self._times.times_of(reports, came)
+        for by_phone, taken, (_, xyz) in zip(reports, times, fresh, strict=True):
             self._take_one(by_phone, came - taken, xyz)
-        self._told.extend(told)
+        self._told.extend(reports)
         self._came = came
         driven = self.driven
         if driven is not None and self.tilts:

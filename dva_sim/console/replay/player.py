@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 
 from dva_sim.cameras.lines import Show, contained_line, scene_line
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
-from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.replay.audit import RecordedAudit
 from dva_sim.console.replay.exchanges import ExchangeLog
 from dva_sim.console.replay.recorded_run import RecordedRun
@@ -102,8 +102,8 @@ class Player:
             update={"name" if run.playback.site.rooms else "map": str(site), "options": {}}
         )
         scenario = run.playback.scenario.model_copy(update={"site": named})
-        told = scenario.model_dump(mode="json")
-        self.show(scene_line(told, run.playback.seed))
+        document = scenario.model_dump(mode="json")
+        self.show(scene_line(document, run.playback.seed))
         for number, when in run.playback.contained.items():
             self.show(contained_line(number, when))
 
@@ -201,10 +201,10 @@ class Player:
     def _tell_logs(self) -> None:
         """Tell the messages since the last time; after a jump, all of them again."""
         run, now = self.run, self.now
-        for name, told in self._told.items() if run is not None else ():
-            log, anew = self._log(name), told < 0
+        for name, entry in self._told.items() if run is not None else ():
+            log, anew = self._log(name), entry < 0
             end = log.until(now)
-            lines = log.batches(name, max(0, told), end)
+            lines = log.batches(name, max(0, entry), end)
             if anew and not lines:
                 lines = [{"k": "log", "log": name, "lines": []}]
             if anew:
@@ -231,20 +231,20 @@ class Player:
         self.tell({**answer, "t": round(1000 * self.now)})
 
     @does("pace")
-    def _pace(self, _: str, line: PaceChange, said: Said) -> None:
+    def _pace(self, _: str, line: PaceChange, on_result: OnResult) -> None:
         factor, paused = line.get("factor"), line.get("paused")
         if paused is False and self.now >= self._duration:
             self._go_to(0.0)
         self.clock.pace(factor, paused)
         self.tell_now()
         now = "it stands" if self.clock.paused else f"{self.clock.factor:g} times real time"
-        said(True, now)
+        on_result(True, now)
 
     @does("seek")
-    def _seek(self, _: str, line: MomentAsked, said: Said) -> None:
+    def _seek(self, _: str, line: MomentAsked, on_result: OnResult) -> None:
         self._go_to(line["t_ms"] / 1000)
         self.tell_now()
-        said(True, f"at {self.now:.1f} s")
+        on_result(True, f"at {self.now:.1f} s")
 
     def _go_to(self, time: float) -> None:
         self._offset = min(max(0.0, time), self._duration) - self.clock.now
@@ -252,7 +252,7 @@ class Player:
         self._told = dict.fromkeys(self._told, -1)
 
     @does("open_recording")
-    def _open(self, _: str, line: RecordingAsked, said: Said) -> None:
+    def _open(self, _: str, line: RecordingAsked, on_result: OnResult) -> None:
         if self.shelf is None:
             raise Refused("There are no other recordings.")
         path = self.shelf.find(line["name"])
@@ -262,7 +262,7 @@ class Player:
         self._go_to(0.0)
         self.clock.pace(paused=False)
         self._tell_scene()
-        said(True, f"{path.name} is played")
+        on_result(True, f"{path.name} is played")
 
     @does("watch")
     def _watch(self, _: str, line: RobotsWatched) -> None:

@@ -261,8 +261,8 @@ class RecordedRun:
     def story(self, now: float) -> ToldLine:
         """Return the story up to a moment."""
         end = bisect_right(self._moments, now + ROUNDED)
-        told = self.playback.recorder.timeline[max(0, end - STORY_KEPT) : end]
-        return {"k": "told", "t": _ms(now), "lines": [moment_shown(moment) for moment in told]}
+        moments = self.playback.recorder.timeline[max(0, end - STORY_KEPT) : end]
+        return {"k": "told", "t": _ms(now), "lines": [moment_shown(moment) for moment in moments]}
 
     # --- pictures --------------------------------------------------------------------------
 

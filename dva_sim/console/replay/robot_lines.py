@@ -98,7 +98,7 @@ class RobotLines:
         }
 
     def _emergency(self, now: float) -> EmergencyShown | None:
-        past = [told for told in self._emergencies if told[0] <= now]
+        past = [entry for entry in self._emergencies if entry[0] <= now]
         return {"at_ms": round(1000 * past[-1][0]), "by": past[-1][1]} if past else None
 
     def _one_way(self, now: float) -> LatencyFigures | None:

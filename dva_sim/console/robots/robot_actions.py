@@ -13,7 +13,7 @@ from typing import Any
 
 from dva_sim.agents.robot.controller import Decision
 from dva_sim.console.asking.dispatcher import does
-from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.robots.robot_windows import RobotWindow, RobotWindows
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import FaultSwitch, OfRobot, Wish
@@ -66,7 +66,7 @@ class RobotActions:
     # --- by hand -----------------------------------------------------------------------
 
     @does("manual_take")
-    def _take(self, client: str, line: OfRobot, said: Said) -> None:
+    def _take(self, client: str, line: OfRobot, on_result: OnResult) -> None:
         robot = self._robot(line["robot"])
         window = self._windows.by_id[robot]
         if why := self._why_not():
@@ -81,7 +81,7 @@ class RobotActions:
             self._count += 1
             window.number, window.notice = self._count, ""
             self._hands[client] = PageHand(robot)
-        said(True, "manual control is yours", hand=window.number)
+        on_result(True, "manual control is yours", hand=window.number)
 
     def _must(self, decision: Decision) -> None:
         """Refuse what the robot refuses, by names that people know.
@@ -96,11 +96,11 @@ class RobotActions:
             raise Refused(f"{m.CODE_NAMES[decision.code]}: {text}")
 
     @does("manual_release")
-    def _release(self, client: str, _: Asked, said: Said) -> None:
+    def _release(self, client: str, _: Asked, on_result: OnResult) -> None:
         hand = self._hands.get(client)
         if hand is not None:
             self._let_go(client, hand)
-        said(True, "released")
+        on_result(True, "released")
 
     def _let_go(self, client: str, hand: PageHand) -> None:
         del self._hands[client]
@@ -160,7 +160,7 @@ class RobotActions:
     # --- faults ------------------------------------------------------------------------
 
     @does("fault")
-    def _fault(self, _: str, line: FaultSwitch, said: Said) -> None:
+    def _fault(self, _: str, line: FaultSwitch, on_result: OnResult) -> None:
         robot, what = self._robot(line["robot"]), line["what"]
         window, on = self._windows.by_id[robot], line["on"]
         if what == "processing":
@@ -176,7 +176,7 @@ class RobotActions:
             window.faults.lose_camera(on)
         else:
             self._stick(window, line.get("sensor", ""), on)
-        said(True, f"{what}: {'on' if on else 'off'}")
+        on_result(True, f"{what}: {'on' if on else 'off'}")
 
     def _stick(self, window: RobotWindow, sensor: str, on: bool) -> None:
         if sensor not in window.robot.sensors:

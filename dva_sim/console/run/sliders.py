@@ -75,11 +75,11 @@ class LinkSliders:
             self._change_processing(wanted["processing_s"])
         scenario = with_link(run.scenario, self.link, self._wanted.get("processing_s"))
         run.be_patient(scenario)
-        told = ", ".join(f"{key} {value:g}" for key, value in wanted.items())
+        text = ", ".join(f"{key} {value:g}" for key, value in wanted.items())
         if self.link.jitter_s < self._wanted.get("jitter_s", 0.0):
-            told += f"; jitter is kept within the delay, at {self.link.jitter_s:g} s"
-        run.recorder.tell(now, "console", f"link: {told}", "link")
-        return told, scenario
+            text += f"; jitter is kept within the delay, at {self.link.jitter_s:g} s"
+        run.recorder.tell(now, "console", f"link: {text}", "link")
+        return text, scenario
 
     def _change_processing(self, seconds: float) -> None:
         for robot in self._run.field.robots:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
-from dva_sim.console.asking.refusal import Said
+from dva_sim.console.asking.refusal import OnResult
 from dva_sim.console.robots.robot_actions import RobotActions
 from dva_sim.console.simulator.robot_world import RobotWorld
 from dva_sim.console.wire.actions import ActionPlace, Asked
@@ -54,31 +54,31 @@ class RobotDesk:
         self._world.tell_now()
 
     @does("emergency")
-    def _emergency(self, _: str, line: OfSome, said: Said) -> None:
+    def _emergency(self, _: str, line: OfSome, on_result: OnResult) -> None:
         self._hands.stop(self._world.field.robots)
         self._hands.press_emergency(self._world.robot.device.id_tag)
-        said(True, f"{self._world.robot.device.label} has stopped")
+        on_result(True, f"{self._world.robot.device.label} has stopped")
 
     @does("robot_register")
-    def _register(self, _: str, line: RegistrationAsked, said: Said) -> None:
+    def _register(self, _: str, line: RegistrationAsked, on_result: OnResult) -> None:
         dva = line["dva"].strip()
         check_address(dva)
-        self._world.station.register(dva, said)
+        self._world.station.register(dva, on_result)
 
     @does("robot_listen")
-    def _listen(self, _: str, line: OfRobot, said: Said) -> None:
+    def _listen(self, _: str, line: OfRobot, on_result: OnResult) -> None:
         self._world.station.listen()
-        said(True, f"listens on {self._world.robot.device.address}")
+        on_result(True, f"listens on {self._world.robot.device.address}")
 
     @does("robot_off")
-    def _off(self, _: str, line: OfRobot, said: Said) -> None:
+    def _off(self, _: str, line: OfRobot, on_result: OnResult) -> None:
         self._world.station.switch_off()
-        said(True, "it is off")
+        on_result(True, "it is off")
 
     @does("release")
-    def _release(self, _: str, line: Nothing, said: Said) -> None:
+    def _release(self, _: str, line: Nothing, on_result: OnResult) -> None:
         """Nothing is in hand but by `manual_take`."""
-        said(True, "released")
+        on_result(True, "released")
 
     @does("gone")
     def _gone(self, client: str, _: Asked) -> None:

@@ -24,9 +24,9 @@ class News:
 
     def tell(self, line: Told, key: object = "") -> None:
         """Tell a line; `key` tells lines of one kind apart."""
-        said = {name: value for name, value in line.items() if name != "t"}
-        if self._newest.get((line["k"], key)) != said:
-            self._newest[line["k"], key] = said
+        values = {name: value for name, value in line.items() if name != "t"}
+        if self._newest.get((line["k"], key)) != values:
+            self._newest[line["k"], key] = values
             self._tell()(line, key)
 
     def forget(self, kind: str, key: object) -> None:

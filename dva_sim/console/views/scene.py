@@ -96,7 +96,7 @@ def patterns_of(own: str) -> list[PatternShown]:
 def site_of(site: Site) -> SiteShown:
     """The plan of a site, in metres and as GeoJSON in degrees."""
     tints: dict[str, str] = {}
-    told: SiteShown = {
+    shown: SiteShown = {
         "name": site.name,
         "extent_m": _rounded(site.extent),
         "origin": {
@@ -120,8 +120,8 @@ def site_of(site: Site) -> SiteShown:
         "exits_m": [_rounded(way.ends) for way in site.exits],
     }
     if not site.rooms:
-        told["raster"] = raster_of(site)
-    return told
+        shown["raster"] = raster_of(site)
+    return shown
 
 
 def raster_of(site: Site) -> RasterShown:

@@ -68,7 +68,7 @@ async def run(options: argparse.Namespace) -> None:
     port = sock.getsockname()[1]
     tokens = Tokens() if options.no_token else Tokens.drawn()
     access = rules(options.host, port, options.name, tokens)
-    phones, told = _phones(options, tokens)
+    phones, notices = _phones(options, tokens)
     simulation = Simulation()
     hub = Hub(simulation)
     cameras = ConsoleCameras(simulation, hub.clients.watched)
@@ -77,7 +77,7 @@ async def run(options: argparse.Namespace) -> None:
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
     simulation.open(options.fd)
     door = phones.door if phones else None
-    about = {"phone": door.address if door else None, "told": told}
+    about = {"phone": door.address if door else None, "told": notices}
     simulation.send(serving(access, options.host, port) | about)
     if options.pictures_fd is not None:
         cameras.open(options.pictures_fd)

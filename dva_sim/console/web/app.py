@@ -104,9 +104,9 @@ class Doorkeeper:
         """Response to a request without permission; else the role is noted in the scope."""
         asking = HTTPConnection(scope)
         headers = asking.headers
-        told = self._access.refusal(_asked(scope, headers))
-        if told is not None:
-            return PlainTextResponse(told[1] + "\n", told[0], headers=NOT_KEPT)
+        refusal = self._access.refusal(_asked(scope, headers))
+        if refusal is not None:
+            return PlainTextResponse(refusal[1] + "\n", refusal[0], headers=NOT_KEPT)
         scope[ROLE] = role = self._access.role(headers, asking.query_params)
         if role is Role.NOBODY and scope["path"] not in (OPEN, *UNGUARDED):
             return _unknown(scope["path"])
@@ -267,7 +267,7 @@ def make_app(
         audit: Audit log, if it is kept.
         report: A study's report that is shown as it is.
     """
-    told = StudyReport(report)
+    study_report = StudyReport(report)
     pages, rest, phones = Pages(access, hub, cameras, files), Rest(hub), PhonePages(door, files)
     log = audit or AuditPages(None)
     logs = LogRequests(hub)
@@ -286,7 +286,7 @@ def make_app(
         Route("/api/phones.svg", _for(Role.DRIVE, phones.code)),
         Route("/static/{name:path}", pages.file),
         Route(OPEN, pages.health),
-        Route("/report", told.page),
+        Route("/report", study_report.page),
         Route("/camera/{label:path}.mjpg", pages.stream),
         Route("/camera/{label:path}.jpg", pages.still),
         Route("/api/state", rest.state),

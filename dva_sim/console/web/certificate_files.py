@@ -61,25 +61,25 @@ def certificates(folder: Path, hosts: Hosts, now: datetime | None = None) -> Kep
         NoCertificate: the folder cannot be written.
     """
     now = now or datetime.now(UTC)
-    told: list[str] = []
+    reports: list[str] = []
     try:
         _private(folder)
-        authority = _read(folder / AUTHORITY, told)
+        authority = _read(folder / AUTHORITY, reports)
         fault = authority_fault(authority, hosts, now) if authority else ""
         if authority is None or fault:
-            _renewed("authority", fault, told, "phones have to trust the new one once")
+            _renewed("authority", fault, reports, "phones have to trust the new one once")
             authority = new_authority(socket.gethostname(), hosts, now)
             _write(folder / AUTHORITY, authority)
-        leaf = _read(folder / LEAF, told)
+        leaf = _read(folder / LEAF, reports)
         fault = leaf_fault(leaf, authority, hosts, now) if leaf else ""
         if leaf is None or fault:
-            _renewed("certificate", fault, told)
+            _renewed("certificate", fault, reports)
             _write(folder / LEAF, new_leaf(authority, hosts, now))
     except OSError as error:
         raise NoCertificate(
             f"no certificate can be kept in {folder}: {error.strerror or error}"
         ) from error
-    return KeptCertificates(authority, folder / LEAF, tuple(told))
+    return KeptCertificates(authority, folder / LEAF, tuple(reports))
 
 
 def _private(folder: Path) -> None:

@@ -97,20 +97,22 @@ class Hub:
         return True
 
     def _hear_looker(self, client: Client, text: str) -> None:
-        said = read(text)
-        what = said.get("do")
+        message = read(text)
+        what = message.get("do")
         if what == "ping":
-            line = {"k": "pong", "at": said.get("at"), "now": round(time.time() * 1000, 3)}
+            line = {"k": "pong", "at": message.get("at"), "now": round(time.time() * 1000, 3)}
             client.feed.put(line)
         elif what == "resync":
             client.feed.resync()
         elif what == "watch":
-            asked = read_arguments(OfRobots, {"robots": said.get("robots")}, self.simulation.labels)
+            asked = read_arguments(
+                OfRobots, {"robots": message.get("robots")}, self.simulation.labels
+            )
             client.watches = frozenset(asked["robots"])
             client.feed.watches = client.watches
             self.watching()
         elif what == "look" and client.role is not Role.PHONE:
-            client.feed.looks.look(said.get("logs", {}), said.get("tables", []))
+            client.feed.looks.look(message.get("logs", {}), message.get("tables", []))
             self._tell_looks()
         else:
             raise BadMessage("no such message; there are: ping, resync, watch, look")
@@ -204,18 +206,18 @@ class Hub:
     def _hear_driver(self, client: Client, driver: Driver, text: str) -> None:
         if driver.replaced:
             return
-        said = read(text)
-        name, key = said.pop("do", None), said.pop("id", None)
+        message = read(text)
+        name, key = message.pop("do", None), message.pop("id", None)
         try:
             if not client.is_here and name not in WITHOUT_PAGE:
                 raise BadMessage("this page has lost its other connection; it may only stop")
             check_role(client.role, name)
-            asked = asked_of(name, said, self.simulation.labels, silent=True)
+            asked = asked_of(name, message, self.simulation.labels, silent=True)
             asked["client"] = client.name
             if not ACTIONS[name].has_answer:
                 self.simulation.send(asked)
                 return
-            if client.role is Role.PHONE and "robots" not in said:
+            if client.role is Role.PHONE and "robots" not in message:
                 asked.pop("robots", None)  # an emergency is for its own robot
             asked |= {"id": id_of(key), "role": client.role.name.lower()}
             self.simulation.ask(asked, lambda line: driver.answer(encode(line)))

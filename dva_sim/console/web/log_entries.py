@@ -139,12 +139,12 @@ def header_of(data: bytes) -> dict[str, str]:
 def payload_of(body: Any) -> str:
     """Summarise a message in a few characters: the values of its fields."""
     names = getattr(body, "_fields", None) or [one.name for one in fields(body)]
-    said = ", ".join(
+    text = ", ".join(
         f"{name} {_value(getattr(body, name))}"
         for name in names
         if getattr(body, name) not in (None, (), "")
     )
-    return said if len(said) <= _SHOWN else said[: _SHOWN - 1] + "…"
+    return text if len(text) <= _SHOWN else text[: _SHOWN - 1] + "…"
 
 
 def _value(value: Any) -> str:

@@ -30,13 +30,13 @@ PROGRAM = "program"  # with its role: the client of a request without a key
 def state_of(state: RunState, clients: int) -> dict[str, Any]:
     """The newest of everything, with units in the names."""
     rows = state.lines.get("rows", {})
-    told = {row["i"]: row for row in rows.get("robots", ())}
+    values = {row["i"]: row for row in rows.get("robots", ())}
     doing = {row["i"]: row for row in rows.get("people", ())}
     robots, people = [], []
     for thing in (state.scene or {}).get("things", ()):
         place = _place(state, thing["i"])
         about = {"label": thing["label"], "id": thing["id"], "kind": thing["kind"]}
-        more = told if thing["kind"] == "robot" else doing
+        more = values if thing["kind"] == "robot" else doing
         entry = about | place | _without(more.get(thing["i"], {}), "i")
         if thing["kind"] == "robot":
             robots.append(entry)
@@ -124,16 +124,16 @@ class Rest:
     async def action(self, request: Request) -> Response:
         """`POST /api/actions`: the answer to an action; repeating its id does nothing twice."""
         try:
-            said, role = await body_of_request(request), request.scope[ROLE]
-            name = said.get("action")
-            client = self._client(said, role)
+            body, role = await body_of_request(request), request.scope[ROLE]
+            name = body.get("action")
+            client = self._client(body, role)
             if name == "gone":
                 self._simulation.send({"do": "gone", "client": client})
                 return JSONResponse({"ok": True, "text": ""}, headers=NOT_KEPT)
             check_role(role, name)
-            asked = asked_of(name, said.get("arguments", {}), self._simulation.labels)
-            key = id_of(said.get("id"))
-            if ACTIONS[asked["do"]].seats and "key" not in said:
+            asked = asked_of(name, body.get("arguments", {}), self._simulation.labels)
+            key = id_of(body.get("id"))
+            if ACTIONS[asked["do"]].seats and "key" not in body:
                 return await self._do_in_new_seat(asked, key, role)
             return self._answer(await self._do(asked, key, client, role))
         except NotAllowed as error:
@@ -144,11 +144,11 @@ class Rest:
     async def emergency(self, request: Request) -> Response:
         """`POST /api/emergency`: stops all robots, or some, before anything else that waits."""
         try:
-            said, role = await body_of_request(request), request.scope[ROLE]
-            asked = asked_of("emergency", self._robots_of(said), self._simulation.labels)
-            known = self._hub.clients.find(said.get("key"), role)  # else anybody's, all the same
+            body, role = await body_of_request(request), request.scope[ROLE]
+            asked = asked_of("emergency", self._robots_of(body), self._simulation.labels)
+            known = self._hub.clients.find(body.get("key"), role)  # else anybody's, all the same
             client = known.name if known is not None else _program(role)
-            key = said.get("id")
+            key = body.get("id")
             key = key if is_id(key) else secrets.token_hex(8)  # a stop is not refused for its id
             return self._answer(await self._do(asked, key, client, role))
         except BadMessage as error:

@@ -82,8 +82,8 @@ class Simulation:
             except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
                 self._complaints += 1
                 if self._complaints <= MOST_COMPLAINTS:
-                    told = "dva-sim: a line of the simulation makes no sense"
-                    print(f"{told}: {error!r}", file=sys.stderr)
+                    words = "dva-sim: a line of the simulation makes no sense"
+                    print(f"{words}: {error!r}", file=sys.stderr)
 
     def _take_line(self, line: dict[str, Any]) -> None:
         kind = line.get("k")
@@ -107,8 +107,8 @@ class Simulation:
             self._answer({"k": "done", "id": key, "ok": False, "text": self.why})
 
     def _answer(self, line: Answer) -> None:
-        for told in self._pending.pop(str(line.get("id")), ()):
-            told(line)
+        for entry in self._pending.pop(str(line.get("id")), ()):
+            entry(line)
 
     # --- what it is asked for ------------------------------------------------------------
 

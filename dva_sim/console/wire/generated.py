@@ -50,8 +50,8 @@ def line_types() -> str:
     found: dict[type, str] = {}
     for one in (*get_args(ToPage), AuditRow, AuditCheck, AuditMeasures):
         _declare(one, found)
-    told = " | ".join(map(name_of, get_args(ToPage)))
-    union = _typedef("A line sent to a page.", f"({told}) & {{s?: number}}", "ToPage")
+    text = " | ".join(map(name_of, get_args(ToPage)))
+    union = _typedef("A line sent to a page.", f"({text}) & {{s?: number}}", "ToPage")
     head = "// Written by dva_sim/console/wire/generated.py.\n"
     return head + "".join((*found.values(), union)) + "export {};\n"
 
@@ -78,8 +78,8 @@ def _declare(declared: type, found: dict[type, str]) -> None:
 
 
 def _typedef(about: str, type_: str, name: str) -> str:
-    told = f"@typedef {{{type_}}} {name}".replace(": ", ":~")  # a key and its type stay together
-    wrapped = wrap(told, 96, subsequent_indent="  ", break_on_hyphens=False)
+    text = f"@typedef {{{type_}}} {name}".replace(": ", ":~")  # a key and its type stay together
+    wrapped = wrap(text, 96, subsequent_indent="  ", break_on_hyphens=False)
     lines = [*([about] if about else []), *(line.replace(":~", ": ") for line in wrapped)]
     return "/**\n" + "".join(f" * {line}\n" for line in lines) + " */\n"
 

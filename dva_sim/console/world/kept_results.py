@@ -119,8 +119,8 @@ class KeptResults:
         self._kept.put(self._journal.lines())
         if self._kept.problem != self._problem:
             self._problem = self._kept.problem
-            told = f"cannot be written: {self._problem}" if self._problem else "is written again"
-            self._world.note(f"the results folder {self._out} {told}")
+            text = f"cannot be written: {self._problem}" if self._problem else "is written again"
+            self._world.note(f"the results folder {self._out} {text}")
 
     def _look(self) -> None:
         assert self._world is not None

@@ -174,9 +174,9 @@ class ToldWorld:
 
     def _tell_events(self) -> None:
         """Events with what was decided on them, and who decides."""
-        told, now_ms = self.rooms.listener, self.feed.now_ms
+        listener, now_ms = self.rooms.listener, self.feed.now_ms
         self._events = [
-            {**event, **about_event(told.events, told.told_at, event["number"])}
+            {**event, **about_event(listener.events, listener.told_at, event["number"])}
             for event in self.feed.events()
         ]
         self._news.tell({"k": "events", "t": now_ms, "events": self._events})

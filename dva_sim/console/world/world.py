@@ -295,8 +295,8 @@ class ConsoleWorld(ToldWorld):
         Raises:
             ConfigError: what cannot be.
         """
-        told, scenario = self.sliders.change(given)
+        text, scenario = self.sliders.change(given)
         self._console = console_of(self.run.stage, scenario)
         for person in self.persons:
             person.console = self._console
-        return told
+        return text

@@ -169,8 +169,8 @@ def contradictions_in(cells: Sequence[DesignCell]) -> list[str]:
     """
     found: dict[str, list[str]] = defaultdict(list)
     for cell in cells:
-        for told in model_for(cell.scenario).contradictions(cell.scenario):
-            found[re.split(r"\d", told, maxsplit=1)[0]].append(told)
+        for entry in model_for(cell.scenario).contradictions(cell.scenario):
+            found[re.split(r"\d", entry, maxsplit=1)[0]].append(entry)
     return [
         f"{alike[0]} (in {len(alike)} of {len(cells)} configurations)" for alike in found.values()
     ]
@@ -194,8 +194,8 @@ def rehearse_all(
     plan = StudyPlan.of(study)
     refuse_what_cannot_be_recorded(plan)
     missing = {model_for(cell.scenario).lacks(cell.scenario): None for cell in plan.rehearsed}
-    if told := list(filter(None, missing)):
-        raise ConfigError("; ".join(told))
+    if problems := list(filter(None, missing)):
+        raise ConfigError("; ".join(problems))
     for done, cell in enumerate(plan.rehearsed, 1):
         cell_grid.rehearse(study, cell)
         progress(done, len(plan.rehearsed))

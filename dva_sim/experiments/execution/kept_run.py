@@ -67,13 +67,13 @@ class KeptRun:
     ) -> None:
         self._folder, self.problem = folder, ""
         _remove(folder, KEPT_RUN)
-        told = json.dumps(manifest), json.dumps(scenario.model_dump(mode="json"))
+        documents = json.dumps(manifest), json.dumps(scenario.model_dump(mode="json"))
         try:
             self._db = _connected(folder)
             self._db.execute("PRAGMA journal_mode = WAL")
             self._db.execute("PRAGMA synchronous = NORMAL")
             self._db.executescript(_SCHEMA)
-            self._db.execute("INSERT INTO run VALUES (1, ?, ?, ?, ?)", [_FORMAT, *told, seed])
+            self._db.execute("INSERT INTO run VALUES (1, ?, ?, ?, ?)", [_FORMAT, *documents, seed])
         except sqlite3.Error as error:
             raise DvaSimError(f"{folder} cannot be written: {error}") from None
         self._waiting: queue.SimpleQueue[Sequence[JournalLine] | None] = queue.SimpleQueue()
@@ -227,11 +227,14 @@ def _read(
         raise ConfigError(
             f"is not the journal of a run, or damaged ({error}); move it away to start over", path
         ) from None
-    told = json.loads(scenario)
-    if not own_code and OWN_CODE in json.dumps(told["events"]):
+    document = json.loads(scenario)
+    if not own_code and OWN_CODE in json.dumps(document["events"]):
         raise ConfigError("names a class in a Python file; results never run code", path)
-    told, every = Scenario.model_validate(told), [*lines, *(("", line) for (line,) in grown)]
-    return json.loads(manifest), told, seed, every
+    document, every = (
+        Scenario.model_validate(document),
+        [*lines, *(("", line) for (line,) in grown)],
+    )
+    return json.loads(manifest), document, seed, every
 
 
 def _tables(

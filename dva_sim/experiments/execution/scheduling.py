@@ -259,7 +259,7 @@ def _by_signal(seconds: float) -> Iterator[None]:
 @contextmanager
 def _by_thread(seconds: float) -> Iterator[None]:
     """Signals reach the main thread only; another thread has to be told by a third."""
-    told, over = threading.get_ident(), threading.Event()
+    thread, over = threading.get_ident(), threading.Event()
     lock, raised = threading.Lock(), False
 
     def insist() -> None:
@@ -269,7 +269,7 @@ def _by_thread(seconds: float) -> Iterator[None]:
             with lock:
                 if not over.is_set():
                     raised = True
-                    _raise_in(told)
+                    _raise_in(thread)
             pause = INSIST
 
     watch = threading.Thread(target=insist, daemon=True)
@@ -283,7 +283,7 @@ def _by_thread(seconds: float) -> Iterator[None]:
             with suppress(RunTooLong), lock:  # it may come as late as here
                 over.set()
                 if raised:
-                    _raise_in(told)  # in place of one that may still be under way
+                    _raise_in(thread)  # in place of one that may still be under way
                     while True:  # until it comes
                         pass
 

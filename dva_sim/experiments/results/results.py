@@ -306,8 +306,8 @@ class Results:
         """
         runs = self.table("runs") if self.has("runs") else {}
         parts = np.asarray(runs.get("part", []))
-        told = {str(part): _failures_in(runs, parts == part) for part in dict.fromkeys(parts)}
-        return {part: said for part, said in told.items() if said}
+        values = {str(part): _failures_in(runs, parts == part) for part in dict.fromkeys(parts)}
+        return {part: entry for part, entry in values.items() if entry}
 
     @property
     def tables(self) -> list[str]:
@@ -338,8 +338,8 @@ class Results:
         scenarios = self.manifest.get("scenarios", {}).values()
         models = dict.fromkeys(scenario.get("model", "full") for scenario in scenarios)
         factors = [*self.factors, *((self.study.get("design") or {}).get("ranges") or {})]
-        told = self.manifest.get("columns")
-        return describe(table, self.names(table), list(models), factors, told)
+        described = self.manifest.get("columns")
+        return describe(table, self.names(table), list(models), factors, described)
 
     def names(self, table: str) -> list[str]:
         """The columns of a table, without its rows being read.
@@ -356,8 +356,8 @@ class Results:
             ConfigError: no such table, or another than the manifest was written beside.
         """
         if not self.has(table):
-            told = hint(table, self.tables, "tables")
-            raise ConfigError(f"{self.folder} has no table {table!r}; {told}")
+            suggestion = hint(table, self.tables, "tables")
+            raise ConfigError(f"{self.folder} has no table {table!r}; {suggestion}")
         path = self._tables / f"{table}.parquet"
         expected = self.manifest.get("tables", {}).get(table)
         if expected is not None and table not in self._seen:

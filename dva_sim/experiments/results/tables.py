@@ -178,8 +178,8 @@ class _Table:
             self._seen.setdefault(column, set()).update(map(type, found))
         kinds = {column: _sql_type(types) for column, types in self._seen.items()}
         if not self._kinds:
-            told = ", ".join(f"{quoted(column)} {kind}" for column, kind in kinds.items())
-            self._database.execute(f"CREATE TABLE rows ({told})")
+            text = ", ".join(f"{quoted(column)} {kind}" for column, kind in kinds.items())
+            self._database.execute(f"CREATE TABLE rows ({text})")
             self._kinds = kinds
         self._fits = self._fits and kinds == self._kinds
         if self._fits and batch:

@@ -21,8 +21,10 @@ def located(study: Study, part: str, error: ConfigError, changes: Mapping[str, A
     """
     if error.file is not None:
         return error
-    told = error.problem
-    named = [k for k, v in changes.items() if k in told or (isinstance(v, str) and repr(v) in told)]
+    problem = error.problem
+    named = [
+        k for k, v in changes.items() if k in problem or (isinstance(v, str) and repr(v) in problem)
+    ]
     keys = error.keys if len(error.keys) == 1 else (named or list(error.keys))
     for key in keys:
         if pair := study.setting_of(tuple(key.split("."))):

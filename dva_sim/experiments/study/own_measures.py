@@ -43,12 +43,12 @@ def columns_told(
         measures: Those of the study itself.
         scenarios: Scenarios of the runs.
     """
-    told: dict[str, list[Measure]] = {}
+    values: dict[str, list[Measure]] = {}
     named = {scenario.model: scenario for scenario in scenarios if scenario.model not in MODELS}
     for scenario in named.values():
         for table, columns in model_for(scenario).columns.items():
-            told.setdefault(table, []).extend(columns)
+            values.setdefault(table, []).extend(columns)
     own = [measure.about for measure in measures]
     if own:
-        told.setdefault("runs", []).extend(own)
-    return {table: {c.name: c.as_json() for c in columns} for table, columns in told.items()}
+        values.setdefault("runs", []).extend(own)
+    return {table: {c.name: c.as_json() for c in columns} for table, columns in values.items()}

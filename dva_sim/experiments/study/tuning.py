@@ -116,8 +116,8 @@ class TunedValues(Config):
         for choice in self.chosen:
             if choice.when == when:
                 return choice.value
-        told = ", ".join(f"{name} {level}" for name, level in when.items())
-        raise ConfigError(f"nothing was tuned for {told}; {_how_to_make(self.study)}")
+        text = ", ".join(f"{name} {level}" for name, level in when.items())
+        raise ConfigError(f"nothing was tuned for {text}; {_how_to_make(self.study)}")
 
 
 def choose(means: Mapping[float, float]) -> float:

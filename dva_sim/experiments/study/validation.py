@@ -91,8 +91,8 @@ def of_factors(study: Study) -> Iterator[Problem]:
         if named is not None:
             yield from _faults_of_name(study, factor)
             for level in (level for level in levels if level not in named):
-                told = hint(str(level), named, "named")
-                yield f"{level!r} is not a treatment; {told}", _place(study, factor, level)
+                suggestion = hint(str(level), named, "named")
+                yield f"{level!r} is not a treatment; {suggestion}", _place(study, factor, level)
         keys = {key for changes in (named or {}).values() for key in changes} or {factor}
         for key in keys if factor != TUNING else ():
             if setters.setdefault(key, factor) != factor:
@@ -113,8 +113,8 @@ def _faults_of_numbers(study: Study, factor: str, levels: Sequence[Level]) -> It
     numbers = {n for n in levels if isinstance(n, int | float) and not isinstance(n, bool)}
     for low, high in itertools.pairwise(sorted(numbers)):
         if math.isclose(low, high, rel_tol=SAME):
-            told = f"{low!r} and {high!r} are one level of {factor!r}, written twice"
-            yield told, _place(study, factor, high)
+            text = f"{low!r} and {high!r} are one level of {factor!r}, written twice"
+            yield text, _place(study, factor, high)
 
 
 def _faults_of_name(study: Study, factor: str) -> Iterator[Problem]:
@@ -363,5 +363,5 @@ def _fault_of_level(
         return
     for level in levels:
         if level not in study.factors[factor]:
-            told = hint(str(level), map(str, study.factors[factor]), "levels")
-            yield f"{level!r} is not a level of {factor!r}; {told}", path
+            suggestion = hint(str(level), map(str, study.factors[factor]), "levels")
+            yield f"{level!r} is not a level of {factor!r}; {suggestion}", path

@@ -41,9 +41,9 @@ def hold(
     socket.send_fds(channel, [b"{}"], list(spaces))
     for space in spaces:
         os.close(space)  # a namespace ends with the last process that uses it
-    while (said := _listen(forwarder, channel)) == BEGIN:
+    while (message := _listen(forwarder, channel)) == BEGIN:
         forwarder.begin()
-    if said == END:
+    if message == END:
         overrun = sum(dropped.count() for dropped in drops)
         channel.send(forwarder.report(overrun).to_json().encode())
 

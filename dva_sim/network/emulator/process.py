@@ -106,9 +106,9 @@ class LinkProcess:
         """
         self._send(holder.END)
         with suppress(OSError):
-            said = self._channel.recv(1 << 16)
-            if said:
-                return LinkReport.from_json(said.decode())
+            data = self._channel.recv(1 << 16)
+            if data:
+                return LinkReport.from_json(data.decode())
         raise self.ended()
 
     @property
@@ -135,11 +135,11 @@ class LinkProcess:
 
     def _take_spaces(self) -> None:
         try:
-            said, self._spaces, *_ = socket.recv_fds(self._channel, 1 << 16, _SPACES)
+            data, self._spaces, *_ = socket.recv_fds(self._channel, 1 << 16, _SPACES)
         except OSError:
-            said = b""
-        if not said:
+            data = b""
+        if not data:
             raise EmulatorError("the process of the emulated link ended before it was ready")
-        problem = json.loads(said).get("problem")
+        problem = json.loads(data).get("problem")
         if problem is not None:
             raise EmulatorError(f"the emulated link {NEEDS}; here {problem}")

@@ -135,8 +135,8 @@ class _Far(_WebRtcEnd):
 
 
 def _line(peer: RTCPeerConnection) -> bytes:
-    told = {"sdp": peer.localDescription.sdp, "type": peer.localDescription.type}
-    return json.dumps(told).encode() + b"\n"
+    values = {"sdp": peer.localDescription.sdp, "type": peer.localDescription.type}
+    return json.dumps(values).encode() + b"\n"
 
 
 def _description(line: bytes) -> object:

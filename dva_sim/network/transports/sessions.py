@@ -56,8 +56,8 @@ def rate_session(clock: Clock, ends: Ends, config: Trinomial | Irtp | Btp) -> Tr
     """Two directions, each with a law of rate of its own."""
     header, repeats = config.header_bytes, isinstance(config, Irtp)
     up, down = (
-        DatagramSender(clock, link, header, law_of(config), told, repeats)
-        for link, told in ((ends.up, ends.on_command), (ends.down, ends.on_picture))
+        DatagramSender(clock, link, header, law_of(config), entry, repeats)
+        for link, entry in ((ends.up, ends.on_command), (ends.down, ends.on_picture))
     )
     if isinstance(config, Btp):
         answer_each_other(up, down)
@@ -71,9 +71,9 @@ def zeromq_session(clock: Clock, ends: Ends, config: Zeromq) -> TransportSession
     """Two publishers, each with one subscriber, on two connections that the operator opens."""
     tcp = TcpOptions(send_buffer=config.send_buffer_bytes)
     options = ZmtpOptions(conflate=config.conflate, tcp=tcp)
-    told = ends.on_command, ends.on_picture
+    callbacks = ends.on_command, ends.on_picture
     commands, pictures = (
-        ZmtpConnection(clock, ends.up, ends.down, *told, options, options) for _ in range(2)
+        ZmtpConnection(clock, ends.up, ends.down, *callbacks, options, options) for _ in range(2)
     )
     for connection in (commands, pictures):
         connection.open(lambda: None)

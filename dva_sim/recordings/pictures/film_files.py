@@ -95,15 +95,15 @@ def _write_mp4(film: Film, path: Path) -> None:
     # Most players want an even number of pixels and this order of colours.
     command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-c:v", "libx264"]
     command += ["-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(path)]
-    with TemporaryFile() as said:
-        process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said)
+    with TemporaryFile() as errors:
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=errors)
         try:
             _feed(process, first.tobytes(), frames)
         finally:
             process.kill()  # where it has ended already, that does nothing
             process.wait()
         if process.returncode != 0:
-            raise ConfigError(f"ffmpeg could not write the video: {_last_line(said, process)}")
+            raise ConfigError(f"ffmpeg could not write the video: {_last_line(errors, process)}")
 
 
 def _feed(process: subprocess.Popen[bytes], first: bytes, frames: Iterator[Any]) -> None:

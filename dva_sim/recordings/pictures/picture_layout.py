@@ -102,8 +102,8 @@ def heading_of(recordings: Sequence[Playback]) -> str:
     first = recordings[0]
     what = pattern_name(first) if len(recordings) == 1 else "The same run under two patterns"
     delay = first.scenario.link.delay_s
-    told = f"{1000 * delay:g}\N{NO-BREAK SPACE}ms" if delay < 1 else f"{delay:g}\N{NO-BREAK SPACE}s"
-    return f"{what}, {told} of delay each way" if delay else what
+    text = f"{1000 * delay:g}\N{NO-BREAK SPACE}ms" if delay < 1 else f"{delay:g}\N{NO-BREAK SPACE}s"
+    return f"{what}, {text} of delay each way" if delay else what
 
 
 def _new_figure(dpi: float) -> Figure:

@@ -97,8 +97,8 @@ class Scene:
         if self._verdict.text and time >= self._verdict.time:
             return ended
         timeline = self._moments.recording.recorder.timeline
-        told = _told(timeline, time) if self._outlook is None else self._outlook
-        self._told.set_text(_shortened(told, int(self._across() / (PLAIN * style.FONT))))
+        text = _told(timeline, time) if self._outlook is None else self._outlook
+        self._told.set_text(_shortened(text, int(self._across() / (PLAIN * style.FONT))))
         line: Artist = self._told
         return line
 
@@ -152,8 +152,8 @@ def _colour_of(verdict: RunVerdict) -> str:
 
 def _told(timeline: Sequence[Moment], time: float) -> str:
     """The newest line of the story."""
-    told = [m for m in timeline if m.time <= time and m.kind != "link"]
-    return f"{told[-1].who} {told[-1].what}".replace("_", " ") if told else ""
+    reports = [m for m in timeline if m.time <= time and m.kind != "link"]
+    return f"{reports[-1].who} {reports[-1].what}".replace("_", " ") if reports else ""
 
 
 def _shortened(text: str, most: int) -> str:

@@ -312,7 +312,7 @@ class DvaAgent:
         self._told[event.number] = event.state
         if len(self._told) > MOST_TOLD:
             del self._told[next(iter(self._told))]
-        told = f"event {event.number} ({event.kind}) is {event.state}"
+        text = f"event {event.number} ({event.kind}) is {event.state}"
         if event.state is State.ASSIGNED and event.holder:
-            told += f" to {self.device.label_of(event.holder)}"
-        self.device.tell(told)
+            text += f" to {self.device.label_of(event.holder)}"
+        self.device.tell(text)

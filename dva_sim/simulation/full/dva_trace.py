@@ -77,23 +77,23 @@ class TracedDva:
 
     def handle(self, message: m.Message, now: float) -> Reaction:
         """See `Dva`, as for all that follow."""
-        told = {"do": "handle", "message": encode(message).decode(), "now": now}
-        return self._decided(told, lambda: self._desk.handle(message, now))
+        values = {"do": "handle", "message": encode(message).decode(), "now": now}
+        return self._decided(values, lambda: self._desk.handle(message, now))
 
     def note(self, message: m.Message, now: float) -> list[Send]:
         """Handle a published message."""
-        told = {"do": "note", "message": encode(message).decode(), "now": now}
-        return self._decided(told, lambda: self._desk.note(message, now))
+        values = {"do": "note", "message": encode(message).decode(), "now": now}
+        return self._decided(values, lambda: self._desk.note(message, now))
 
     def delivered(self, send: Send, now: float, content: Any = None) -> list[Send]:
         """Answered with OK, and with this content."""
-        told = self._about(send, now, m.Reply(1, m.OK, "", content))
-        return self._decided(told, lambda: self._desk.delivered(send, now, content))
+        entry = self._about(send, now, m.Reply(1, m.OK, "", content))
+        return self._decided(entry, lambda: self._desk.delivered(send, now, content))
 
     def refused_grant(self, send: Send, reply: m.Reply, now: float) -> list[Send]:
         """Answered, but not with OK."""
-        told = self._about(send, now, reply)
-        return self._decided(told, lambda: self._desk.refused_grant(send, reply, now))
+        entry = self._about(send, now, reply)
+        return self._decided(entry, lambda: self._desk.refused_grant(send, reply, now))
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
         """Not answered."""
@@ -111,8 +111,8 @@ class TracedDva:
 
     def dismiss(self, device: str, now: float) -> list[Send]:
         """Somebody is to be there no more."""
-        told = {"do": "dismiss", "device": device, "now": now}
-        return self._decided(told, lambda: self._desk.dismiss(device, now))
+        values = {"do": "dismiss", "device": device, "now": now}
+        return self._decided(values, lambda: self._desk.dismiss(device, now))
 
     def close(self) -> list[Send]:
         """The end."""
@@ -124,11 +124,11 @@ class TracedDva:
         self._sink(json.dumps({"do": "recall", "now": now}))
 
     def _about(self, send: Send, now: float, reply: m.Reply | None) -> dict[str, Any]:
-        said = None if reply is None else encode(_as_message(reply)).decode()
+        data = None if reply is None else encode(_as_message(reply)).decode()
         number = self._numbers.get(send)
         if number is None:  # so many were sent since that it was forgotten: no replay goes on
             self._sink = _nowhere
-        return {"do": "answer", "to": number, "reply": said, "now": now}
+        return {"do": "answer", "to": number, "reply": data, "now": now}
 
     def _decided(self, told: dict[str, Any], decide: Callable[[], T]) -> T:
         self._bits = []
@@ -209,8 +209,8 @@ def replay_dva(lines: Iterable[str | bytes], path: Path) -> Iterator[Decided]:
                 then, now = entry.get("decided", []), again.decide(entry)
                 yield Decided(number, entry["do"], then, now)
         except _BROKEN as error:
-            said = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-            raise ConfigError(f"is no line of a DVA's trace: {said}", path, number) from error
+            text = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+            raise ConfigError(f"is no line of a DVA's trace: {text}", path, number) from error
     if again is None:
         raise ConfigError("is no line of a DVA's trace: it is empty", path, 1)
 

@@ -125,9 +125,9 @@ class RunJournal:
 
     def _new(self, about: str, name: str, values: Any) -> list[Any]:
         """Return the entries of a list that are not written yet."""
-        told = self._told.get((about, name), 0)
+        written = self._told.get((about, name), 0)
         self._told[about, name] = len(values)
-        return list(islice(values, told, None))
+        return list(islice(values, written, None))
 
     # --- what changes ----------------------------------------------------------------------
 
@@ -159,13 +159,13 @@ class RunJournal:
 
     def _event(self, event: Event) -> dict[str, Any]:
         """Return an event without the names of people and without their notes."""
-        told: dict[str, Any] = _EVENT.dump_python(event, mode="json")
-        handling = told["handling"] | {"note": ""}
+        values: dict[str, Any] = _EVENT.dump_python(event, mode="json")
+        handling = values["handling"] | {"note": ""}
         for name in ("last", "acknowledged"):
             choice: Choice | None = getattr(event.handling, name)
             if choice is not None:
                 handling[name] = choice._replace(label=self._label_of(choice.author))
-        return told | {"handling": handling}
+        return values | {"handling": handling}
 
 
 def recording_of(scenario: Scenario, seed: int, lines: Iterable[JournalLine]) -> Recording:
@@ -196,8 +196,8 @@ def recording_of(scenario: Scenario, seed: int, lines: Iterable[JournalLine]) ->
 def _assembled(
     scenario: Scenario, seed: int, state: Mapping[str, Any], grown: Iterable[list[Any]]
 ) -> Recording:
-    recorder, told = Recorder(), state["run"]
-    recorder.messages, recorder.bytes = told["messages"], told["bytes"]
+    recorder, run_state = Recorder(), state["run"]
+    recorder.messages, recorder.bytes = run_state["messages"], run_state["bytes"]
     for name in _COUNTED:
         getattr(recorder, name).update(state[name])
     drives = {int(n): _drive(facts) for n, facts in _numbered(state, "drive")}
@@ -224,15 +224,15 @@ def _assembled(
         surroundings=Surroundings(site, [i.hazard for i in incidents if not i.false_alarm]),
         labels=state["labels"],
         radii=state["radii"],
-        duration=told["duration"],
-        contained=dict(told["contained"]),
+        duration=run_state["duration"],
+        contained=dict(run_state["contained"]),
         endings=[ending_of(event_about(i, events, site, robots)) for i in incidents],
         events=events,
         facts=facts,
         robots=robots,
-        people=[PersonLog._make(values) for values in told["people"]],
-        depth=told["depth"],
-        persons=tuple(told["persons"]),
+        people=[PersonLog._make(values) for values in run_state["people"]],
+        depth=run_state["depth"],
+        persons=tuple(run_state["persons"]),
     )
 
 

@@ -623,10 +623,10 @@ def _confirms_as_given(witness: Witness, content: m.Content | None) -> Iterator[
     """Yield a permission that the DVA confirms to a robot otherwise than it gave it."""
     if not isinstance(content, m.Permission):
         return
-    told = Held(content.device, content.level, content.sensors)
-    given = witness.sessions.get(content.session, told)
-    if given != told:
-        yield "S5", f"gives {given.level} to {given.holder}, and confirms {told.level}"
+    held = Held(content.device, content.level, content.sensors)
+    given = witness.sessions.get(content.session, held)
+    if given != held:
+        yield "S5", f"gives {given.level} to {given.holder}, and confirms {held.level}"
 
 
 def _shown_to(witness: Witness, reader: str, value: m.Body, now: float) -> Iterator[Broken]:

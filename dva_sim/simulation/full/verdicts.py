@@ -98,8 +98,8 @@ def refuse_broken(found: Iterable[Verdict]) -> None:
     Raises:
         RulesBroken: one was broken.
     """
-    if told := broken_rules(found):
-        raise RulesBroken(told)
+    if broken := broken_rules(found):
+        raise RulesBroken(broken)
 
 
 def broken_rules(found: Iterable[Verdict]) -> str:

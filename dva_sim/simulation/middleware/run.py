@@ -171,8 +171,8 @@ def _problem(side: Side, program: subprocess.Popen[bytes], plan: Plan) -> str:
     """Return why a program failed; empty if it runs, was done or found no connection."""
     if program.poll() in (None, 0, NOT_CONNECTED):
         return ""
-    said = _complaints(side, plan).read_text(errors="replace").strip()
-    return f"the {side} program failed: {said.splitlines()[-1] if said else program.returncode}"
+    text = _complaints(side, plan).read_text(errors="replace").strip()
+    return f"the {side} program failed: {text.splitlines()[-1] if text else program.returncode}"
 
 
 # --- tables ------------------------------------------------------------------------------

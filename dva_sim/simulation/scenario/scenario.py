@@ -181,8 +181,8 @@ def phone_profile(scenario: Scenario, error: Fail | None = None) -> PhoneProfile
         return _profile(PhoneProfile, phone.profile, "agents/phones")
 
     def wrong(problem: str, path: KeyPath) -> ConfigError:
-        told = f"phone: {problem}"
-        return error(told, ("phone", *path)) if error else ConfigError(told)
+        text = f"phone: {problem}"
+        return error(text, ("phone", *path)) if error else ConfigError(text)
 
     data = _merged(_read_document(phone.profile, "agents/phones").data, phone.changes)
     return validate(PhoneProfile, data, wrong)

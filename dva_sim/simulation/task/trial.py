@@ -247,8 +247,8 @@ class Trial(ABC, Generic[S]):
     @property
     def move_and_wait_share(self) -> float:
         """For how much of its time the strategy moved and waited, if it can tell."""
-        told = self._driver.workload() if isinstance(self._driver, Strategy) else {}
-        return told.get("move_and_wait_share", 0.0)
+        workload = self._driver.workload() if isinstance(self._driver, Strategy) else {}
+        return workload.get("move_and_wait_share", 0.0)
 
     @property
     def failures(self) -> int:

@@ -191,12 +191,12 @@ def _events(checks: Sequence[Check]) -> int:
 
 def _agreeing(checks: Sequence[Check]) -> list[str]:
     """Count the checks that agree, by kind, results excepted."""
-    told = {
+    values = {
         "input": "checks of what the scenarios put in agree",
         "identity": "identities hold (Little's law, conservation, scaling, the oracle, ...)",
     }
     found = Counter(c.kind for c in checks if c.verdict == "agrees")
-    return [f"{found[kind]} {words}." for kind, words in told.items()]
+    return [f"{found[kind]} {words}." for kind, words in values.items()]
 
 
 def headline(checks: Sequence[Check]) -> str:

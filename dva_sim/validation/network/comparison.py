@@ -90,12 +90,12 @@ def perform(job: StudyJob) -> Tables:
 
 def _jobs(order: ModelRuns, seed: int) -> list[StudyJob]:
     left_out = f" without {', '.join(order.without)}" if order.without else ""
-    told = f"{order.condition.label} ({order.condition.hash}) {order.depth}{left_out}"
+    text = f"{order.condition.label} ({order.condition.hash}) {order.depth}{left_out}"
     jobs = []
     for first in range(0, order.runs, CHUNK):
         count = min(CHUNK, order.runs - first)
         asked = order.condition.to_row(), order.depth, order.without, first, count
-        jobs.append(job_of(f"{told}, runs from {first}", seed, None, order=json.dumps(asked)))
+        jobs.append(job_of(f"{text}, runs from {first}", seed, None, order=json.dumps(asked)))
     return jobs
 
 

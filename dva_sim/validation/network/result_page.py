@@ -190,7 +190,7 @@ def evidence(
     )
     largest = _sheet("Largest deviations of pooled conditions", WORST_HEADS, worst(comparison))
     shown = criteria, reasons, without, *tables, unjudged, largest
-    told = *tables, unjudged, largest, reasons, criteria, without
+    sheets = *tables, unjudged, largest, reasons, criteria, without
     kept = {NAME: rows_of(comparison)}
     if comparison.controls or comparison.ablated:
         kept["variants"] = variant_rows(comparison)
@@ -201,7 +201,7 @@ def evidence(
         notes=notes(comparison),
         conditions=conditions,
         sheets=[sheet for sheet in shown if sheet.rows],
-        told=[sheet for sheet in told if sheet.rows],
+        told=[sheet for sheet in sheets if sheet.rows],
         draw=partial(draw_all, comparison),
         tables=kept,
     )

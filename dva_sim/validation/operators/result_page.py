@@ -106,8 +106,8 @@ def steered(played: Mapping[str, Cells]) -> list[tuple[str, str]]:
             f"{100 * mean(trials, STEERED):.0f}\N{NO-BREAK SPACE}%" for trials in cells.values()
         ]
         each = ", ".join(f"{cell}: {s}" for cell, s in zip(cells, shares, strict=True))
-        told = f"{name}, by {BY[name]}" if name in BY else name
-        found.append((told, f"{shares[0]} everywhere" if len(set(shares)) == 1 else each))
+        text = f"{name}, by {BY[name]}" if name in BY else name
+        found.append((text, f"{shares[0]} everywhere" if len(set(shares)) == 1 else each))
     return found
 
 
@@ -154,10 +154,10 @@ def notes(verdicts: Sequence[LineVerdict]) -> list[str]:
 def words(verdict: LineVerdict) -> list[str]:
     """A verdict in words: line, what, published, simulated, verdict."""
     line = verdict.line
-    said: str = verdict.word
-    if said == "shown only" and line.has_band:
-        said += ", inside" if verdict.inside else ", outside"
-    return [line.id, line.what, published(line), simulated(verdict), said]
+    text: str = verdict.word
+    if text == "shown only" and line.has_band:
+        text += ", inside" if verdict.inside else ", outside"
+    return [line.id, line.what, published(line), simulated(verdict), text]
 
 
 def published(line: TargetLine) -> str:

@@ -76,14 +76,14 @@ def headline(beside: Beside) -> str:
 
 def notes(beside: Beside) -> list[str]:
     """Notes on the origin of the bands."""
-    told = []
+    reports = []
     if beside.kept:
-        told.append(
+        reports.append(
             f"The bands of {beside.kept} configurations were kept before their rows were measured."
         )
     if now := len(rows_of(beside.played)):
-        told.append(f"{now} configurations were played now, by the model as it is.")
-    return told
+        reports.append(f"{now} configurations were played now, by the model as it is.")
+    return reports
 
 
 def summary_of(beside: Beside) -> list[tuple[str, str, str, str]]:

@@ -81,9 +81,9 @@ class Node:
             ChildProcessError: it ended or said nothing.
         """
         with contextlib.suppress(OSError):
-            said, handed, *_ = socket.recv_fds(self.channel, 256, 1)
-            if said:
-                return said, handed
+            data, handed, *_ = socket.recv_fds(self.channel, 256, 1)
+            if data:
+                return data, handed
         raise ChildProcessError(f"the {self.name} did not become ready")
 
     def end(self) -> int:
@@ -226,14 +226,14 @@ class EmulatedCell:
     def play(self) -> EmulatedOutcome:
         """Set up, run, and end everything; problems become part of the outcome."""
         problem, realtime = "", False
-        told: Told = {}
+        columns: Told = {}
         try:
             realtime = linux_calls.be_punctual(FORWARDER_PRIORITY)
             link, word = self._set_up()
             gc.disable()  # a pause would look like delay
             self._nodes[0].channel.send(word)
             problem = self._run(link)
-            told = columns_of(link.report())
+            columns = columns_of(link.report())
             link.close()
         except OSError as error:
             problem = error.strerror or str(error)
@@ -242,7 +242,7 @@ class EmulatedCell:
             notes = [node.notes.read() for node in self._nodes] or [[], []]
         if not problem and codes[0] != 0:
             problem = "the operator failed"
-        return EmulatedOutcome(notes[0], notes[-1], told, self._way, realtime, problem)
+        return EmulatedOutcome(notes[0], notes[-1], columns, self._way, realtime, problem)
 
     def _set_up(self) -> tuple[EmulatedLink[Any], bytes]:
         """Set up the link with both ends, and the operator's start message."""
@@ -275,14 +275,14 @@ class EmulatedCell:
 
 def columns_of(report: LinkReport) -> Told:
     """The columns of the emulator, by the letters of both ends: a is the operator."""
-    told: Told = {}
+    columns: Told = {}
     for way, flow in (("ab", report.up), ("ba", report.down)):
-        told[f"emu_pkts_{way}"] = flow.offered_packets
-        told[f"emu_lost_{way}"] = flow.lost_by_chance
-        told[f"emu_tail_{way}"] = flow.lost_in_queue
+        columns[f"emu_pkts_{way}"] = flow.offered_packets
+        columns[f"emu_lost_{way}"] = flow.lost_by_chance
+        columns[f"emu_tail_{way}"] = flow.lost_in_queue
     for name in ("p50", "p99", "max"):
-        told[f"emu_late_{name}_ms"] = 1e3 * float(getattr(report, f"late_{name}_s"))
-    return told
+        columns[f"emu_late_{name}_ms"] = 1e3 * float(getattr(report, f"late_{name}_s"))
+    return columns
 
 
 def _networked(program: Program, end: End, congestion: str) -> Program:
@@ -336,10 +336,10 @@ def run_job(job: EmulatedJob) -> EmulatedOutcome:
             process.wait()
             if process.stdin is not None:
                 process.stdin.close()
-        said, complaint = _text(out), _text(err)
-    if not said:
+        output, complaint = _text(out), _text(err)
+    if not output:
         raise EmulatorError(f"the run ended without an answer: {_last_line(complaint)}")
-    outcome = EmulatedOutcome.from_json(said)
+    outcome = EmulatedOutcome.from_json(output)
     if outcome.problem:
         raise EmulatorError(": ".join(filter(None, (outcome.problem, _last_line(complaint)))))
     return outcome

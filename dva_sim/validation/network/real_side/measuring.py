@@ -222,8 +222,8 @@ class Table(AbstractContextManager["Table"]):
             known = json.loads(beside.read_text(encoding="utf-8"))
             other = [name for name in machine if known.get(name) != machine[name]]
             if other:
-                told = ", ".join(f"{n} was {known.get(n)}, is {machine[n]}" for n in other)
-                raise ConfigError(f"was measured elsewhere ({told}): begin another file", self.path)
+                text = ", ".join(f"{n} was {known.get(n)}, is {machine[n]}" for n in other)
+                raise ConfigError(f"was measured elsewhere ({text}): begin another file", self.path)
         beside.write_text(json.dumps(machine, indent=1) + "\n", encoding="utf-8")
 
     def _take_over(self) -> list[dict[str, str]]:

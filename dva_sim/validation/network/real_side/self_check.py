@@ -77,10 +77,10 @@ class Probe:
         wire = self.wire
         linger_s = wire.delay_s + wire.jitter_s + 0.1
         linger_s += max(0.0, self.count * (8 * self.size / wire.rate_bps - self.interval_s))
-        told = {"count": self.count, "size": self.size, "interval_s": self.interval_s}
+        values = {"count": self.count, "size": self.size, "interval_s": self.interval_s}
         bound_s = self.count * self.interval_s + linger_s + 10.0
         return EmulatedJob(
-            "probe", wire, bound_s=bound_s, arguments=told | {"linger_s": linger_s},
+            "probe", wire, bound_s=bound_s, arguments=values | {"linger_s": linger_s},
             room=self.count + 1, rootless=rootless,
         )  # fmt: skip
 

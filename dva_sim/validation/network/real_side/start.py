@@ -19,12 +19,12 @@ def main() -> None:
     The one argument is the id of the process that waits for it: it may be gone by now.
     """
     line = sys.stdin.readline()
-    told = json.loads(line)
+    job = json.loads(line)
     os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
-    way, problem = told["link"], ""
+    way, problem = job["link"], ""
     if way != "proxy":
         try:
-            way = become_owner(told["rootless"])
+            way = become_owner(job["rootless"])
         except OSError as error:
             problem = error.strerror or str(error)
     die_with_parent(int(sys.argv[1]))
