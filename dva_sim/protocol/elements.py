@@ -182,8 +182,8 @@ _WRITERS: Final[dict[type, tuple[str, Write]]] = {
 
 
 def _write_reply(body: m.Reply) -> str:
-    content_ = body.content
-    content = "" if content_ is None else _CONTENTS[type(content_).__name__].write(content_)
+    given = body.content
+    content = "" if given is None else _CONTENTS[type(given).__name__].write(given)
     return (
         f"<reply><Answers>{_ANSWERS(body.answers)}</Answers><Code>{_CODE(body.code)}</Code>"
         f"<Text>{_TEXT(body.text)}</Text>{content}</reply>"

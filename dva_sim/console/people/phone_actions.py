@@ -65,20 +65,20 @@ class PhoneActions:
 
     def samples(self, client: str, line: SampleBatch) -> None:
         """Samples of a phone have come."""
-        samples_, phone = samples_of(line), self._phones.seat(client)
+        batch, phone = samples_of(line), self._phones.seat(client)
         if phone is None:
             return
         if phone.person is None:
             seat = self._seats.taken.get(client)
             phone.lend(None if seat is None else self._world.person(seat.number))
         now = time.monotonic()
-        if phone.driven is not None and not samples_.hand:
+        if phone.driven is not None and not batch.hand:
             self._stop(client, LIFTED)
-        elif phone.driven is not None and samples_.orientation != phone.orientation:
+        elif phone.driven is not None and batch.orientation != phone.orientation:
             self._stop(client, TURNED)
-        phone.turn(samples_.orientation)
-        if phone.take(samples_, now):  # a sensor that says the same again and again is silent
-            self._seats.heard(client, now, samples_.hand)
+        phone.turn(batch.orientation)
+        if phone.take(batch, now):  # a sensor that says the same again and again is silent
+            self._seats.heard(client, now, batch.hand)
 
     def leaves(self, client: str) -> None:
         """A page has left its seat of the console: another one there steers as it likes."""

@@ -60,8 +60,8 @@ def _interval_name(f: Finding) -> str:
 
 def _reach(f: Finding) -> str:
     """One sentence: where it differs from zero, and what holds elsewhere."""
-    told = [*_differs(f), *_elsewhere(f)]
-    return capital("; ".join(told)) + "." if told else ""
+    clauses = [*_differs(f), *_elsewhere(f)]
+    return capital("; ".join(clauses)) + "." if clauses else ""
 
 
 def _differs(f: Finding) -> list[str]:
@@ -71,11 +71,11 @@ def _differs(f: Finding) -> list[str]:
         return []
     where = found[0]
     there = "only there" if len(where) == 1 < len(f.levels) else places(f, where)
-    told = [f"it differs from zero{_after(there)}{_remark_on_size(f, where)}"]
+    clauses = [f"it differs from zero{_after(there)}{_remark_on_size(f, where)}"]
     if len(found) > 1:
         stop = _telling_level(f, found[1])
-        told.append(f"it is the other way round {places(f, found[1])}: {_size(f, stop)}")
-    return told
+        clauses.append(f"it is the other way round {places(f, found[1])}: {_size(f, stop)}")
+    return clauses
 
 
 def _remark_on_size(f: Finding, where: NDArray[np.intp]) -> str:
@@ -96,10 +96,10 @@ def _elsewhere(f: Finding) -> Iterator[str]:
         (f.is_open, partial(_left_open, f)),
         (~np.isfinite(f.low), lambda _: "runs are missing"),
     ]
-    for chosen, told in kinds:
+    for chosen, clause in kinds:
         where = np.flatnonzero(chosen)
         if len(where):
-            yield f"{places(f, where)} {told(float(f.bounds[where].max()))}".lstrip()
+            yield f"{places(f, where)} {clause(float(f.bounds[where].max()))}".lstrip()
 
 
 def _ruled_out(f: Finding, bound: float) -> str:

@@ -137,10 +137,10 @@ def with_endings(runs: Table, events: Table) -> Table:
             how[key].append(_OF_RUNS.get(str(word), str(word)))
     keys = _keys(runs)
     share = [float(np.mean(met[key])) if key in met else math.nan for key in keys]
-    told = np.asarray(runs.get("outcome", np.full(len(keys), None)), dtype=object)
+    outcomes = np.asarray(runs.get("outcome", np.full(len(keys), None)), dtype=object)
     outcome = [
         how[key][0] if not isinstance(word, str) and len(how[key]) == 1 else word
-        for key, word in zip(keys, told, strict=True)
+        for key, word in zip(keys, outcomes, strict=True)
     ]
     return dict(runs) | {"confirmed": np.array(share), "outcome": np.array(outcome, dtype=object)}
 

@@ -180,7 +180,7 @@ def _told(events: Table) -> tuple[SeenIncident, ...]:
     columns = (events["kind"], as_floats(events["t_occurred_s"]), events["room"], events["is_true"])
     rows = zip(*(np.asarray(column).tolist() for column in columns), strict=True)
     real = [(kind, t, math.nan, math.nan, room or "") for kind, t, room, true in rows if true]
-    return tuple(SeenIncident(*told) for told in real)
+    return tuple(SeenIncident(*fields) for fields in real)
 
 
 _ENDS = {"confirmation": "t_confirmed_s", "response": "t_arrived_s"}

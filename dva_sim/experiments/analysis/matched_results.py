@@ -87,8 +87,8 @@ class MatchedResults:
         where = [t for t, names in self.columns.items() if column in names and table in ("", t)]
         if not where:
             there = self.columns.get(table or "runs", ())
-            told = hint(column, there, table or "runs")
-            raise ConfigError(f"measure {name!r} is not in both; {told}")
+            suggestion = hint(column, there, table or "runs")
+            raise ConfigError(f"measure {name!r} is not in both; {suggestion}")
         if len(where) > 1 and where[0] != "runs":
             several = " or ".join(f"{table}.{column}" for table in where)
             raise ConfigError(f"measure {name!r} is in several tables; name {several}")
@@ -106,8 +106,8 @@ class MatchedResults:
         """
         known = dict.fromkeys(name for pair in self.matched.pairs for name, _ in pair.levels)
         if unknown := [name for name in by or () if name not in known]:
-            told = hint(unknown[0], known, "common")
-            raise ConfigError(f"factor {unknown[0]!r} is not common to both; {told}")
+            suggestion = hint(unknown[0], known, "common")
+            raise ConfigError(f"factor {unknown[0]!r} is not common to both; {suggestion}")
         groups: dict[tuple[str, Levels, int], list[Pair]] = {}
         for pair in self.matched.pairs:
             groups.setdefault(_group_of(pair, by), []).append(pair)
@@ -163,8 +163,8 @@ class MatchedResults:
             ConfigError: there is such a part.
         """
         for name, side in zip("AB", self.sides, strict=True):
-            for part, told in side.distrusted.items():
-                raise ConfigError(f"nothing is compared: in part {part} of {name} {told}")
+            for part, reason in side.distrusted.items():
+                raise ConfigError(f"nothing is compared: in part {part} of {name} {reason}")
 
 
 def _group_of(pair: Pair, by: Sequence[str] | None) -> tuple[str, Levels, int]:

@@ -252,13 +252,13 @@ def _told(r: RepeatedAnswer, stop: RepeatedStop) -> str:
     if not count:
         return f"{where} no repeat under another model is complete."
     unit, means = unit_of(r.measure), [x.mean for x in stop.others]
-    told = f"{where} the sign holds in {_of(stop.same_sign, count)} repeats"
-    told += f", in {stop.clear} of them with its whole interval"
+    text = f"{where} the sign holds in {_of(stop.same_sign, count)} repeats"
+    text += f", in {stop.clear} of them with its whole interval"
     if stop.smallest is not None:
-        told += f"; in {_of(stop.relevant, count)} the effect exceeds the smallest that matters"
-        told += f", in {stop.negligible} it is below that either way"
+        text += f"; in {_of(stop.relevant, count)} the effect exceeds the smallest that matters"
+        text += f", in {stop.negligible} it is below that either way"
     reach = f"{number(min(means))} to {quantity(max(means), unit)}"
-    return f"{told}. Effects run from {reach}.{_where_it_fails(r, stop)}{_beyond(stop)}"
+    return f"{text}. Effects run from {reach}.{_where_it_fails(r, stop)}{_beyond(stop)}"
 
 
 def _beyond(stop: RepeatedStop) -> str:

@@ -99,8 +99,8 @@ def _has(part: RunGrid, strategy: str) -> Marks:
 
 
 def _coverage(strategy: str) -> str:
-    told = [
+    lines = [
         f"{known.low_s:g} to {known.high_s:g} s, {' '.join(known.why.split())}"
         for known in supports_of(strategy)
     ]
-    return f"{strategy}: {', and '.join(told) or 'no published data'}"
+    return f"{strategy}: {', and '.join(lines) or 'no published data'}"

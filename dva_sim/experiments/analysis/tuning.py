@@ -58,8 +58,8 @@ def tune(
     if results.failures:
         error = str(results.failures[0]["error"])
         raise RunsFailed(f"{len(results.failures)} runs failed, so nothing is chosen: {error}")
-    for told in results.distrusted.values():
-        raise RunsFailed(f"{told}, so nothing is chosen")
+    for reason in results.distrusted.values():
+        raise RunsFailed(f"{reason}, so nothing is chosen")
     factors = [Factor(name, levels) for name, levels in trials.factors.items()]
     part = RunGrid(results.table("runs"), rule.part, factors)
     if not part.has(rule.measure):

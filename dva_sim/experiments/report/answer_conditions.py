@@ -46,13 +46,13 @@ def depends(reading: ResultsReading) -> dict[str, str]:
     view, finding = reading.view, reading.finding
     if view is None or finding is None:
         return {}
-    told = {
+    sentences = {
         _whom(reading): _persons(reading, view, finding),
         "Settings": " ".join(_settings(reading, view, finding)),
         "Assumptions": _assumptions(reading, finding),
         "Delays": _beyond(view, finding),
     }
-    return {about: words for about, words in told.items() if words}
+    return {about: words for about, words in sentences.items() if words}
 
 
 def _whom(reading: ResultsReading) -> str:
@@ -103,11 +103,11 @@ def _how(view: StudyView, finding: Finding) -> str:
     shares = [_mean(view.curve(grid, view.panels[0], side)[stop]) for side in sides]
     if not all(0 <= share < 1 for share in shares) or not any(shares):
         return ""
-    told = [
+    clauses = [
         f"{percent(share)} of the time under {level_name(finding.factor, side)}"
         for share, side in zip(shares, sides, strict=True)
     ]
-    return f", here by moving and waiting for {listing(told)}"
+    return f", here by moving and waiting for {listing(clauses)}"
 
 
 def _mean(values: Floats) -> float:
@@ -117,10 +117,10 @@ def _mean(values: Floats) -> float:
 
 def _under_others(found: RepeatedAnswer) -> str:
     """At the last level at which it was repeated."""
-    told = [stop for stop in found.stops if stop.others]
-    if not told:
+    stops = [stop for stop in found.stops if stop.others]
+    if not stops:
         return "No repeat under another model of them is complete."
-    stop, unit = told[-1], found.unit
+    stop, unit = stops[-1], found.unit
     means = [repeat.mean for repeat in stop.others]
     sign = f"{stop.same_sign} of {len(means)}"
     return (
@@ -152,12 +152,12 @@ def _elsewhere(view: StudyView, finding: Finding, others: list[Setting]) -> str:
         means = [mean for _, mean, _, _ in found]
         reach = f"{number(min(means))} to {quantity(max(means), finding.unit)}"
         return f"Under the {len(found)} other settings the difference{where} is {reach}."
-    told = [
+    clauses = [
         f"{quantity(mean, finding.unit)} ({number(low)} to {quantity(high, finding.unit)}) "
         f"with {_apart(panel, finding.within)}"
         for panel, mean, low, high in found
     ]
-    return f"The difference{where} is {listing(told)}."
+    return f"The difference{where} is {listing(clauses)}."
 
 
 def _difference(

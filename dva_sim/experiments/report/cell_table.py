@@ -117,8 +117,8 @@ def _told_once(table: CellTable) -> CellTable:
 def _note(table: CellTable, covered: str) -> str:
     """Note below the table: values common to all rows, and which rows are extrapolated."""
     same = [f"{table.heads[n]} {table.rows[0][n]}" for n in _constant(table)]
-    told = f"The same in all configurations: {', '.join(same)}." if same else ""
-    return " ".join(filter(None, (told, covered)))
+    text = f"The same in all configurations: {', '.join(same)}." if same else ""
+    return " ".join(filter(None, (text, covered)))
 
 
 _Column = tuple[str, list[str]]

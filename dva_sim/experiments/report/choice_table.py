@@ -29,8 +29,8 @@ def choice_table(found: ChoiceMap, part: str) -> CellTable:
         cells = [regret_text(found, g, c) for c in range(len(choices))]
         notes = [found.notes.get(str(situation), "")] if found.notes else []
         rows.append([name, _best(found, g), *cells, *notes])
-    told = note("map", found=found)
-    return CellTable(part, heads, 2, rows, note=told)
+    text = note("map", found=found)
+    return CellTable(part, heads, 2, rows, note=text)
 
 
 def beside_table(found: ChoiceMap, part: str) -> CellTable:

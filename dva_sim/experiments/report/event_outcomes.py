@@ -47,17 +47,17 @@ class EventOutcomes(NamedTuple):
     def __str__(self) -> str:
         """`Events: 288, of which 263 were confirmed, 23 missed (real but refuted: ...)`."""
         if self.real == self.confirmed:
-            told = f"Events: {self._all_of(self.real)} confirmed"
+            text = f"Events: {self._all_of(self.real)} confirmed"
         else:
-            told = f"Events: {self.real}, of which {self.confirmed} were confirmed"
+            text = f"Events: {self.real}, of which {self.confirmed} were confirmed"
             if number := self.missed.total():
                 ways = listing([_looked(*who, n) for who, n in self.missed.most_common()])
-                told += f", {number} missed (real but refuted: {ways})"
+                text += f", {number} missed (real but refuted: {ways})"
             for outcome, n in self.left.most_common():
-                told += f", {n} {_LEFT.get(outcome, outcome)}"
+                text += f", {n} {_LEFT.get(outcome, outcome)}"
         if self.false_alarms:
-            told += f"; of {self.false_alarms} false alarms {self.believed} were taken for real"
-        return f"{told}."
+            text += f"; of {self.false_alarms} false alarms {self.believed} were taken for real"
+        return f"{text}."
 
     @staticmethod
     def _all_of(number: int) -> str:

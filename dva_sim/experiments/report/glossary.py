@@ -52,8 +52,8 @@ def _all() -> Iterator[Term]:
     for kind in PATTERNS.values():
         yield Term(kind.title, meaning_of(kind), _called(kind))
     words = load_yaml(Path(__file__).with_name("words.yaml")).data
-    for name, said in words["reports"].items():
-        yield Term(name, **said) if isinstance(said, dict) else Term(name, said)
+    for name, entry in words["reports"].items():
+        yield Term(name, **entry) if isinstance(entry, dict) else Term(name, entry)
     for name, means in words["documentation"].items():
         yield Term(name, means, in_reports=False)
 

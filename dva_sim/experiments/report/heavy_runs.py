@@ -19,12 +19,12 @@ def few_that_weigh(finding: Finding, view: StudyView) -> str:
     """Warn where runs that count with the whole horizon dominate the mean; give the median."""
     if finding.horizon is None or not view.part.has("confirmed"):
         return ""
-    told = [_weight(finding, view, stop) for stop in range(len(view.stops))]
-    if not any(told):
+    clauses = [_weight(finding, view, stop) for stop in range(len(view.stops))]
+    if not any(clauses):
         return ""
     return (
         f"Where some runs count with {quantity(finding.horizon, 's')}, the mean hangs on them and "
-        f"the median of the differences tells more: {'; '.join(filter(None, told))}."
+        f"the median of the differences tells more: {'; '.join(filter(None, clauses))}."
     )
 
 

@@ -101,8 +101,8 @@ def comparison_table(found: Judgement, cluster: str = "person") -> CellTable:
     persons = max((c.difference.n_persons for c in compared if c.difference), default=0)
     least = 2.0 ** (1 - persons) if persons else 0.0  # whatever the runs
     facts = {"families": list(families.items()), "persons": persons}
-    told = note("comparisons", **facts, least_p=least if least > 1 - LEVEL else None)
-    return CellTable("", heads, len(heads), rows, note=told)
+    text = note("comparisons", **facts, least_p=least if least > 1 - LEVEL else None)
+    return CellTable("", heads, len(heads), rows, note=text)
 
 
 def _sides(compared: Compared) -> str:

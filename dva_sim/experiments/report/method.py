@@ -21,11 +21,11 @@ _FEW = 6  # persons: with fewer nothing can be drawn anew
 def remarks(reading: Reading) -> list[str]:
     """Remarks on study size, statistics and program version."""
     own = reading.page.method(reading.pair_correlation) if reading.view else None
-    said = _usual(reading) if own is None else own
+    lines = _usual(reading) if own is None else own
     study = {"hypotheses": None, "comparisons": None} | reading.study
     tests = paragraphs("tests", study=study)
     size = [] if reading.by_people else [_size(reading)]
-    return [*size, *said, *tests, _made_by(reading)]
+    return [*size, *lines, *tests, _made_by(reading)]
 
 
 _SAMPLES: Final = {"shift": "Independent shifts", "repeat": "Repeats of each configuration"}
@@ -131,10 +131,10 @@ def _alike(reading: Reading) -> str:
     if found is None or not np.isfinite(found.ratio.mean):
         return words
     ratio = found.ratio
-    told = f"{number(ratio.mean)} ({number(ratio.low)} to {number(ratio.high)})"
+    text = f"{number(ratio.mean)} ({number(ratio.low)} to {number(ratio.high)})"
     if found.is_lower:
-        return f"{words}, so the variance of the difference is {told} of that of unpaired runs"
-    return f"{words}; that pairing lowers the variance is not shown (ratio {told})"
+        return f"{words}, so the variance of the difference is {text} of that of unpaired runs"
+    return f"{words}; that pairing lowers the variance is not shown (ratio {text})"
 
 
 def _reduction(reading: Reading) -> VarianceReduction | None:

@@ -45,8 +45,8 @@ class Episode:
 
     def __repr__(self) -> str:
         """Summary of measures and tables."""
-        told = {name: plain(value) for name, value in self.measures.items()}
-        some = listed(f"{name} {value}" for name, value in told.items() if value)
+        values = {name: plain(value) for name, value in self.measures.items()}
+        some = listed(f"{name} {value}" for name, value in values.items() if value)
         tables = ", ".join(f"{name} ({table.rows})" for name, table in self.tables.items())
         head = f"Episode of a {self.scenario.model} scenario, seed {self.seed}"
         return "\n".join((head, f"measures: {some}", f"tables: {tables}"))

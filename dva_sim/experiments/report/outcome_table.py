@@ -31,11 +31,11 @@ def sentences(endings: Endings, view: StudyView, finding: Finding | None) -> lis
             "that the answer compares; at the others not all were."
         ]
     stop = stops[-1]
-    told = "; ".join(_side(view, endings.at(level, stop)) for level in sides)
+    text = "; ".join(_side(view, endings.at(level, stop)) for level in sides)
     where = place_of(finding, view.stops.index(stop))
     when = f"by {quantity(endings.horizon, 's')} after the report"
     there = ", ".join(filter(None, (f"in part {finding.part}", where, when)))
-    return [f"{capital(there)}: {told}.{_apart(endings, finding, stop)}"]
+    return [f"{capital(there)}: {text}.{_apart(endings, finding, stop)}"]
 
 
 def in_a_line(endings: Endings, part: str, failed: int = 0) -> str:
@@ -68,8 +68,8 @@ def table(endings: Endings, view: StudyView, cluster: str) -> CellTable:
     heads = [*factors, "events", *(last if w == NOTHING else w for w in endings.ways)]
     where = setting(view.panels[0]) if panels == view.panels[:1] else ""
     facts = {"where": where, "has_drives": view.part.has("confirmed")}
-    told = note("endings", cluster=cluster, **facts, shown=_MOST_PLACES, places=len(places))
-    return CellTable(view.part.name, heads, len(factors), rows, note=told)
+    text = note("endings", cluster=cluster, **facts, shown=_MOST_PLACES, places=len(places))
+    return CellTable(view.part.name, heads, len(factors), rows, note=text)
 
 
 _MOST_PLACES = 12
@@ -111,12 +111,12 @@ def _all_right(
 def _side(view: StudyView, ended: Ended) -> str:
     """`REQ/REP confirmed 83 % (60 to 94 %), link lost 17 % (6 to 40 %)`."""
     name = level_name(view.line.name, ended.line) if view.line else "all"
-    told = [
+    clauses = [
         f"{way} {_share(share)}"
         for way, share in ended.shares.items()
         if share.mean > 0 or way == CONFIRMED
     ]
-    return f"{name}: {listing(told)}"
+    return f"{name}: {listing(clauses)}"
 
 
 def _apart(endings: Endings, finding: Finding, stop: Level) -> str:

@@ -61,8 +61,8 @@ def print_page(page: Path, to: Path) -> None:
         except subprocess.TimeoutExpired:
             raise DvaSimError(f"{program} has not printed {page} in {PATIENCE_S} s") from None
     if ended.returncode or not to.is_file():
-        said = ended.stderr.decode(errors="replace").strip().rpartition("\n")[2]
-        raise DvaSimError(f"{program} could not print {page}: {said or ended.returncode}")
+        problem = ended.stderr.decode(errors="replace").strip().rpartition("\n")[2]
+        raise DvaSimError(f"{program} could not print {page}: {problem or ended.returncode}")
     to.write_bytes(_undated(to.read_bytes()))
 
 

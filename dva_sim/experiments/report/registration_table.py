@@ -64,15 +64,15 @@ def _claims(study: Mapping[str, Any], runs: Table) -> Iterator[list[str]]:
 def _design(study: Mapping[str, Any]) -> str:
     """Describe how levels are combined, and the number of levels of each factor."""
     design, factors = study.get("design") or {}, study.get("factors") or {}
-    told = [f"{factor_name(f)} ({len(v)} levels)" for f, v in factors.items() if f != POINT]
+    lines = [f"{factor_name(f)} ({len(v)} levels)" for f, v in factors.items() if f != POINT]
     for kind, words in _DESIGNS.items():
         if design.get(kind):
             ranges = listing([factor_name(name) for name in design.get("ranges") or {}])
-            return "; ".join([f"{design[kind]} {words} over {ranges}", *told])
+            return "; ".join([f"{design[kind]} {words} over {ranges}", *lines])
     how = "one after another" if design.get("zip") else "every combination"
     if design.get("rows") or design.get("csv"):
         how = "rows of a list"
-    return f"{how}: {', '.join(told)}"
+    return f"{how}: {', '.join(lines)}"
 
 
 def _program(versions: Mapping[str, Any]) -> str:

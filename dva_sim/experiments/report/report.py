@@ -208,14 +208,14 @@ def _what_varied(reading: Reading) -> Iterator[Block]:
     """Before the figures, whose words must be known."""
     factors = [f for f in factors_of(reading.study) if f.name != POINT]
     design = reading.study.get("design") or {}
-    told = [f"{factor_name(f.name)} ({_levels(f.name, f.levels)})" for f in factors]
+    lines = [f"{factor_name(f.name)} ({_levels(f.name, f.levels)})" for f in factors]
     ranges = design.get("ranges") or {}
-    told += [
+    lines += [
         f"{with_unit(k)} from {number(r['low'])} to {number(r['high'])}" for k, r in ranges.items()
     ]
-    if told:
+    if lines:
         yield Heading("What was varied")
-        yield Words(f"{capital(_how(design, len(factors)))}: {'; '.join(told)}.")
+        yield Words(f"{capital(_how(design, len(factors)))}: {'; '.join(lines)}.")
     if treatments := _treatments(reading.study):
         yield Items(tuple(f"{level}: {changes}" for level, changes in treatments))
 

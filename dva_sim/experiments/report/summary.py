@@ -86,10 +86,10 @@ class Reading(ResultsReading):
     @property
     def _decided(self) -> set[str]:
         """Hypotheses and comparisons that need no more persons."""
-        told, shown = self.judgement.tested, 1 - statistics.LEVEL
+        tested, shown = self.judgement.tested, 1 - statistics.LEVEL
         at_last = {c.name: c.adjusted <= shown for c in self.judgement.compared}  # as planned
         decided = {name for name, is_shown in at_last.items() if is_shown}
-        return decided | {claim.name for claim in told if claim.verdict != "open"}
+        return decided | {claim.name for claim in tested if claim.verdict != "open"}
 
     @cached_property
     def cells(self) -> list[CellTable]:
@@ -127,8 +127,8 @@ class Reading(ResultsReading):
             errors = dict.fromkeys(str(failure.get("error")) for failure in failures)
             shown = "; ".join(list(errors)[:_MOST_ERRORS])
             found.append(f"Runs that failed and are missing below: {len(failures)} ({shown}).")
-        for part, told in self.distrusted.items():
-            found.append(f"In part {part} {told}: no contrast of this part is shown.")
+        for part, reason in self.distrusted.items():
+            found.append(f"In part {part} {reason}: no contrast of this part is shown.")
         if self.events is not None and self.events.warns:
             found.append(str(self.events))
         if broken := _broken(self.runs):

@@ -89,24 +89,24 @@ def show_columns(results: Results, tables: Sequence[str], console: Console) -> N
     for index, name in enumerate(tables or results.tables):
         gap = "\n" if index else ""
         console.print(f"{gap}[bold]{escape(name)}[/bold]")
-        told = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
-        told.add_column("column", no_wrap=True)
-        told.add_column("unit", no_wrap=True)
-        told.add_column("meaning", overflow="fold")
+        table = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
+        table.add_column("column", no_wrap=True)
+        table.add_column("unit", no_wrap=True)
+        table.add_column("meaning", overflow="fold")
         for column in results.columns(name):
-            told.add_row(escape(column.name), column.unit, escape(column.meaning))
-        console.print(told)
+            table.add_row(escape(column.name), column.unit, escape(column.meaning))
+        console.print(table)
 
 
 def program(results: Results) -> str:
     """Version of the program that made the results."""
     versions = results.manifest.get("versions", {})
-    told = f"dva-sim {versions.get('dva-sim')}"
+    text = f"dva-sim {versions.get('dva-sim')}"
     if commit := versions.get("commit"):
-        told += f", commit {commit[:12]}"
+        text += f", commit {commit[:12]}"
     else:
-        told += ", commit not known"
-    return told + (" with changes that are not committed" if versions.get("dirty") else "")
+        text += ", commit not known"
+    return text + (" with changes that are not committed" if versions.get("dirty") else "")
 
 
 def print_table(

@@ -31,8 +31,8 @@ def tuned_table(manifest: Mapping[str, Any]) -> CellTable | None:
     heads = [*(factor_name(name) for name in rule.by), factor_name(rule.key)]
     heads += [f"{measure_name(rule.measure)}, mean (95 % interval)", ""]
     is_other = str(manifest["versions"].get("fingerprint")) not in tuned.made_with
-    told = note("tuning", rule=rule, at=setting(rule.at), is_other_version=is_other)
-    return CellTable(rule.part, heads, len(rule.by), rows, note=told)
+    text = note("tuning", rule=rule, at=setting(rule.at), is_other_version=is_other)
+    return CellTable(rule.part, heads, len(rule.by), rows, note=text)
 
 
 def tuning_warning(manifest: Mapping[str, Any]) -> str:

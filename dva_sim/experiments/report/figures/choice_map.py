@@ -120,6 +120,6 @@ def _numbers(found: ChoiceMap) -> Numbers:
             found.choice.name: found.choice.levels[c],
             found.models.name: found.models.levels[m],
         }
-        told = in_units(found.measure, mean=found.mean[g, c, m], regret=regret)
-        numbers.row(where, **told, is_clear=bool(found.is_clear[g, c, m]))
+        columns = in_units(found.measure, mean=found.mean[g, c, m], regret=regret)
+        numbers.row(where, **columns, is_clear=bool(found.is_clear[g, c, m]))
     return numbers

@@ -48,8 +48,8 @@ class CommandAge(style.ReportFigure):
             for level, offset in style.dodge(view.lines):
                 ages = [_cell_means(view.curve(grid, panel, level)) for grid in grids]
                 _ranges(ax, [stop + offset for stop in range(len(view.stops))], ages, look[level])
-                told = dict(zip(columns, ages, strict=True))
-                numbers.add(view.setting(panel, level), view.along_x() | told)
+                by_column = dict(zip(columns, ages, strict=True))
+                numbers.add(view.setting(panel, level), view.along_x() | by_column)
         style.log_axis(axes[0])
         style.label_panels(
             axes, view, style.axis_label("age_s", style.wrapped("Command age at application", 22))
@@ -81,8 +81,8 @@ class CommandRate(style.ReportFigure):
                     x = np.arange(len(means)) + place
                     ax.plot(x, means, look[level].mark, ms=5, color=look[level].colour)
                 ends[level] = float(means[-1])
-                told = view.along_x() | {"command_rate_hz": means}
-                numbers.add(view.setting(panel, level), told)
+                columns = view.along_x() | {"command_rate_hz": means}
+                numbers.add(view.setting(panel, level), columns)
             _closed_form(ax, view, found)
             every.append(ends)
         tops = [ax.dataLim.y1 for ax in axes if np.isfinite(ax.dataLim.y1)]  # a panel may be empty

@@ -57,8 +57,8 @@ class DelayBudget(style.ReportFigure):
             measured = _means(view, view.part.grid(_MEASURED), panel, level)
             stack(ax, means, STAGES)
             _mark(ax, measured)
-            told = view.along_x() | means | {_MEASURED: measured}
-            numbers.add(view.setting(panel, level), told)
+            columns = view.along_x() | means | {_MEASURED: measured}
+            numbers.add(view.setting(panel, level), columns)
         stacks.close()
         return self.finish(stacks.figure, caption("delay_budget"), numbers)
 

@@ -49,9 +49,9 @@ class Distributions(style.ReportFigure):
                 width = min(0.3, 0.62 / len(view.lines))
                 _dots(ax, offset, width, values, ok, look[level])
                 _boxes(ax, offset, width, values)
-                for stop, told in enumerate(values):
+                for stop, columns in enumerate(values):
                     where = view.setting(panel, level) | view.at_stop(stop)
-                    numbers.add(where, _columns(view, told, ok[stop]))
+                    numbers.add(where, _columns(view, columns, ok[stop]))
             _reference_line(ax, view)
             style.panel_title(ax, panel)
             style.stops_axis(ax, view.over)
@@ -72,12 +72,12 @@ def _columns(view: StudyView, values: Floats, ok: NDArray[np.bool_]) -> dict[str
     """The runs of a cell that gave a value, with who drove and whether it was confirmed."""
     persons, trials = view.part.persons, view.part.trials
     there = np.isfinite(values)
-    told = {
+    columns = {
         "person": np.repeat(persons, len(trials))[there],
         "trial": np.tile(trials, len(persons))[there],
         view.measure: values[there],
     }
-    return told | ({"confirmed": ok[there]} if view.part.has("confirmed") else {})
+    return columns | ({"confirmed": ok[there]} if view.part.has("confirmed") else {})
 
 
 def _dots(

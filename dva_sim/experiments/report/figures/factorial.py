@@ -133,11 +133,11 @@ def _numbers(view: StudyView, found: Sequence[Effect]) -> Numbers:
     for effect in found:
         interval = effect.interval
         edges = {"mean": interval.mean, "low": interval.low, "high": interval.high}
-        told = in_units(view.measure, **edges)
+        columns = in_units(view.measure, **edges)
         words = {
             "factors": " x ".join(effect.factors),
             "from": " x ".join(str(_plain(word)) for word in effect.baselines),
             "to": " x ".join(str(_plain(word)) for word in effect.levels),
         }
-        numbers.row(words, **told, is_found=effect.is_found)
+        numbers.row(words, **columns, is_found=effect.is_found)
     return numbers

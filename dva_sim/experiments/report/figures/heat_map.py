@@ -142,16 +142,16 @@ def _write(ax: Axes, field: EffectField, image: QuadMesh, reach: float) -> None:
         if not np.isfinite(mean):
             continue
         paint = image.to_rgba(np.asarray(mean))
-        told = _mark(float(field.low[y, x]), float(field.high[y, x]))
+        mark = _mark(float(field.low[y, x]), float(field.high[y, x]))
         text = number(float(mean)) if field.mean.shape[1] <= _MOST_WRITTEN else ""
         ax.text(
             x,
             y,
-            " ".join(filter(None, (told, text))),
+            " ".join(filter(None, (mark, text))),
             ha="center",
             va="center",
             fontsize=8,
-            fontweight="bold" if told else "normal",
+            fontweight="bold" if mark else "normal",
             color=PAPER if abs(mean) > _DARK * reach else INK,
             bbox={"fc": paint, "ec": "none", "pad": 0.6},  # no line through it
             zorder=5,
@@ -186,6 +186,6 @@ def _heat_numbers(view: StudyView, fields: Sequence[EffectField]) -> Numbers:
         edges = {"mean": field.mean, "band_low": field.low, "band_high": field.high}
         columns = in_units(view.measure, **edges)
         for row, level in enumerate(field.second.levels):
-            told = {name: values[row] for name, values in columns.items()}
-            numbers.add(field.panel | {field.second.name: level}, view.along_x() | told)
+            row_values = {name: values[row] for name, values in columns.items()}
+            numbers.add(field.panel | {field.second.name: level}, view.along_x() | row_values)
     return numbers

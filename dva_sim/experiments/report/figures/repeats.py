@@ -61,10 +61,10 @@ def _numbers(view: StudyView, robustness: RepeatedAnswer) -> Numbers:
     for stop in robustness.stops:
         for repeat in stop.repeats:
             edges = {"mean": repeat.mean, "low": repeat.low, "high": repeat.high}
-            told = in_units(view.measure, **edges)
+            columns = in_units(view.measure, **edges)
             who = {"strategy": repeat.strategy, "parameters": repeat.parameters}
             flags = {"is_own": repeat.is_own, "is_extrapolated": repeat.is_beyond}
-            numbers.row({robustness.over: stop.level}, **who, **told, **flags)
+            numbers.row({robustness.over: stop.level}, **who, **columns, **flags)
     return numbers
 
 

@@ -126,8 +126,8 @@ class Scatter(style.ReportFigure):
             legend(figure, view.line)
         numbers = Numbers()
         for cloud, y in zip(clouds, means, strict=True):
-            told = dict(zip(names, where, strict=True)) | {with_unit("mean", view.measure): y}
-            numbers.add(panel | {"of": cloud.name}, {POINT: range(len(y))} | told)
+            columns = dict(zip(names, where, strict=True)) | {with_unit("mean", view.measure): y}
+            numbers.add(panel | {"of": cloud.name}, {POINT: range(len(y))} | columns)
         title = f"{capital(_what(view, clouds))} against each factor{_place(panel)}"
         return self.finish(figure, caption("scatter"), numbers, title=title)
 
@@ -196,12 +196,12 @@ class Sobol(style.ReportFigure):
             for row, index in enumerate(found):
                 _bar(ax, row - 0.14, index, "first")
                 _bar(ax, row + 0.14, index, "total")
-                told = {
+                columns = {
                     f"{kind}_{edge}": getattr(getattr(index, kind), edge)
                     for kind in ("first", "total")
                     for edge in ("mean", "low", "high")
                 }
-                numbers.row(panel | {"of": cloud.name, "factor": index.factor}, **told)
+                numbers.row(panel | {"of": cloud.name, "factor": index.factor}, **columns)
             ax.axvline(0, color=INK, lw=0.8)
             ax.set_title(cloud.name)
             ax.set_xlabel("Share of the variance")

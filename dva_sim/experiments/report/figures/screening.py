@@ -66,9 +66,9 @@ def _draw(found: Screening, label: str, path: Path) -> None:
 def _called(number: Assumption) -> str:
     """The name of a number without what all names have in common."""
     parts = number.key.removesuffix(".median").split(".")
-    told = [part for part in parts[1:] if part not in ("habits", "traits")]
-    name = factor_name(number.key) if len(parts) < 2 else without_unit(told[-1])
-    group = " ".join(told[:-1]).replace("_", " ") or parts[0]
+    words = [part for part in parts[1:] if part not in ("habits", "traits")]
+    name = factor_name(number.key) if len(parts) < 2 else without_unit(words[-1])
+    group = " ".join(words[:-1]).replace("_", " ") or parts[0]
     return f"{group}: {name.replace('_', ' ')}"
 
 

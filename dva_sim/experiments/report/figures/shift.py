@@ -115,12 +115,12 @@ def _scatter(shifts: Shifts, column: str, label: str) -> Figure:
 
 def _scatter_numbers(shifts: Shifts, column: str) -> Numbers:
     """Means, and ends of bars: the interval of the difference against the baseline."""
-    numbers, told = Numbers(), dict[str, Any]()
+    numbers, columns = Numbers(), dict[str, Any]()
     for name in ("response_mean_s", column):
         means, half = shifts.means(name), _half_widths(shifts, name)
-        told |= with_limits(name, means, means - half, means + half)
+        columns |= with_limits(name, means, means - half, means + half)
     for stop, title in enumerate(shifts.titles):
-        at_stop: dict[str, Any] = {name: values[:, stop] for name, values in told.items()}
+        at_stop: dict[str, Any] = {name: values[:, stop] for name, values in columns.items()}
         numbers.add({"at": title}, at_stop | {"dispatch.policy": shifts.policies})
     return numbers
 
@@ -203,8 +203,8 @@ class WayToBest(ShiftFigure):
         figure, (axes,) = panels(1, len(shifts.stops), _height(len(names)), sharey=True)
         for stop, ax in enumerate(axes):
             found = shifts.progress(stop)
-            told = with_limits("share", found.mean, found.low, found.high)
-            numbers.add({"at": shifts.titles[stop]}, told | {"dispatch.policy": names})
+            columns = with_limits("share", found.mean, found.low, found.high)
+            numbers.add({"at": shifts.titles[stop]}, columns | {"dispatch.policy": names})
             for row, policy in enumerate(names):
                 colour, mark = look[policy]
                 ax.hlines(row, 100 * found.low[row], 100 * found.high[row], color=colour, lw=1.6)
@@ -238,9 +238,9 @@ class Percentiles(ShiftFigure):
                 colour = look[policy].colour
                 value, low, high = pooled(shifts.events_of(policy, stop), _QUANTILES, shifts.follow)
                 where = {"at": shifts.titles[stop], "dispatch.policy": policy}
-                told = with_limits("response_s", value, low, high)
+                columns = with_limits("response_s", value, low, high)
                 shown = {"quantile": _QUANTILES, "drawn_until_s": [shifts.follow] * len(_QUANTILES)}
-                numbers.add(where, told | shown)
+                numbers.add(where, columns | shown)
                 inside = [np.minimum(x, shifts.follow) for x in (value, low, high)]
                 ax.hlines([row] * 3, inside[1], inside[2], color=colour, lw=5, alpha=0.3)
                 ax.plot(inside[0], [row] * 3, color=colour, lw=0.8)
@@ -275,8 +275,8 @@ class Burden(ShiftFigure):
         names, numbers, look = shifts.policies, Numbers(), _looks(shifts)
         figure, (axes,) = panels(1, len(there), _height(len(names)), sharey=True)
         for stop, title in enumerate(shifts.titles):
-            told: dict[str, Any] = {column: shifts.means(column)[:, stop] for column in there}
-            numbers.add({"at": title}, told | {"dispatch.policy": names})
+            values: dict[str, Any] = {column: shifts.means(column)[:, stop] for column in there}
+            numbers.add({"at": title}, values | {"dispatch.policy": names})
         shades = np.linspace(0.35, 1.0, len(shifts.stops))
         for ax, (column, text) in zip(axes, there.items(), strict=True):
             means = shifts.means(column)

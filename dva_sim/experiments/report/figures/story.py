@@ -190,9 +190,9 @@ class StoryOutcomes(_Story):
             masks = [events.under(panel, level, v) for v in view.stops]
             shares = [events.shares(mask) for mask in masks]
             counts += [int(mask.sum()) for mask in masks if mask.any()]
-            told = {fate: np.array([share[fate] for share in shares]) for fate in _FATES}
-            stack(ax, told, FATES)
-            numbers.add(view.setting(panel, level), view.along_x() | told)
+            columns = {fate: np.array([share[fate] for share in shares]) for fate in _FATES}
+            stack(ax, columns, FATES)
+            numbers.add(view.setting(panel, level), view.along_x() | columns)
         stacks.close()
         stacks.axes[0].set_xlim(0, 1)
         stacks.axes[0].set_xticks([0, 0.5, 1])

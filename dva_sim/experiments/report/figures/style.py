@@ -159,7 +159,7 @@ def finish(
     metadata = {"Date": None, "Creator": None}
     FigureCanvasSVG(figure).print_svg(svg, metadata=metadata)  # type: ignore[no-untyped-call]
     table = numbers.csv() if numbers else b""
-    told = tuple(filter(None, reads))
+    notes = tuple(filter(None, reads))
     return Drawn(
         name=name,
         title=title,
@@ -168,7 +168,7 @@ def finish(
         png=png.getvalue(),
         csv=table,
         figure=figure,
-        reads=told,
+        reads=notes,
     )
 
 

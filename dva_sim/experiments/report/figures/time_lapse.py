@@ -116,8 +116,8 @@ class _TimeLapse(ReportFigure):
             ax.label_outer()
         for name, (when, places) in moved.items():
             x, y, heading = places.T
-            told = {"t_s": when, "x_m": x, "y_m": y, "heading_rad": heading}
-            numbers.add({"agent": name}, told)
+            columns = {"t_s": when, "x_m": x, "y_m": y, "heading_rad": heading}
+            numbers.add({"agent": name}, columns)
         rows[0][0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         scale_bar(rows[-1][0], low)
         _key(figure, list(moved), any(not i.room for i in episode.incidents))

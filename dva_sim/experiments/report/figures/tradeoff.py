@@ -49,14 +49,14 @@ class TradeOff(style.ReportFigure):
                 bands = [_band(view, column, panel, level) for column in columns]
                 bars += _line(ax, view, level, *bands)
                 ends.append((ax, bands[0].mean, bands[1].mean))
-                told = {
+                values = {
                     with_unit(f"{word}_{edge}", column): getattr(found, name)
                     for word, column, found in zip(
                         ("exposure", "response"), columns, bands, strict=True
                     )
                     for edge, name in _EDGES.items()
                 }
-                numbers.add(view.setting(panel, level), view.along_x() | told)
+                numbers.add(view.setting(panel, level), view.along_x() | values)
             style.panel_title(ax, panel, 78 // len(axes))
             ax.grid(True, axis="both")
             ax.margins(0.12)

@@ -91,11 +91,11 @@ def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> Numbers:
     grids = {each.column: view.part.grid(each.column) for each in shown}
     for level in view.lines:
         curves = {name: view.curve(grid, panel, level) for name, grid in grids.items()}
-        told: dict[str, Floats] = {}
+        columns: dict[str, Floats] = {}
         for name, curve in curves.items():
             persons = person_means(curve)
-            told |= with_limits(name, nan_mean(persons, axis=0), *_middle(persons))
-        numbers.add(view.setting(panel, level), view.along_x() | told)
+            columns |= with_limits(name, nan_mean(persons, axis=0), *_middle(persons))
+        numbers.add(view.setting(panel, level), view.along_x() | columns)
     return numbers
 
 
