@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +82,14 @@ def _shown(line: dict[str, str]) -> list[str]:
 
 def questions() -> dict[str, str]:
     """Return the question of each shipped study, by name."""
-    return {each.name: each.description for each in everything("studies")["studies"]}
+    return {name: str(study["question"]) for name, study in _studies().items()}
+
+
+@cache
+def _studies() -> dict[str, dict[str, Any]]:
+    """Return the content of each shipped study's file, by name."""
+    found = everything("studies")["studies"]
+    return {each.name: load_yaml(Path(str(each.file))).data for each in found}
 
 
 def _summary(kept: dict[str, KeptAnswer]) -> str:
@@ -151,8 +159,7 @@ def _answered(answer: KeptAnswer, folder: Path) -> Iterator[str]:
 
 def _calls(study: str) -> list[str]:
     """Return the commands that run a study: how long it takes, its small version, all of it."""
-    file = next(e.file for e in everything("studies")["studies"] if e.name == study)
-    has_small = "quick" in load_yaml(Path(str(file))).data
+    has_small = "quick" in _studies().get(study, {})
     small = [f"dva-sim run {study} --quick -o results/quick"] if has_small else []
     return [f"dva-sim run {study} --dry-run", *small, f"dva-sim run {study}"]
 
