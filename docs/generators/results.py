@@ -152,9 +152,13 @@ def _answered(answer: KeptAnswer, folder: Path) -> Iterator[str]:
     yield (
         f"{capital(_status(answer))}. dva-sim {answer.version}, commit {code(answer.commit[:12])}, "
         f"{answer.date}, seed {answer.seed}, {answer.persons} persons, {answer.runs} runs, "
-        f"{answer.cpu_s / 60:.0f} minutes of CPU time."
+        f"{_duration(answer.cpu_s)} of CPU time."
     )
     yield shell(_calls(answer.study))
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds / 60:.0f} min" if seconds >= 120 else f"{seconds:.0f} s"
 
 
 def _calls(study: str) -> list[str]:
