@@ -32,7 +32,7 @@ def test_the_picture_and_the_story_come_before_the_study(tmp_path, played, monke
     assert played == [(STUDY, True)]
     told = capsys.readouterr().out
     assert unnamed(told, "131.4 s", "22 s ahead") == []
-    assert told.index("about a minute") < told.index("side by side") < told.index("Film")
+    assert told.index("one to two minutes") < told.index("side by side") < told.index("Film")
 
 
 def test_a_film_that_is_still_being_made_ends_with_the_demo(tmp_path, monkeypatch):
