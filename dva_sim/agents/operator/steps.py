@@ -15,6 +15,7 @@ from dva_sim.protocol import messages as m
 
 START_TRIES = 20  # design: to start, while the grant may be on its way
 GIVE_BACK_AGAIN = 2.0  # design: after nobody has answered [s]
+GIVE_BACK_TRIES = 3  # design: of a session that the DVA does not know
 START_AGAIN = 1.0  # design: when the grant may still be on its way to the robot [s]
 NOT_YET = (m.BUSY, m.NOT_PERMITTED, m.BAD_SESSION)  # what is then answered
 
@@ -116,15 +117,24 @@ def start(
     device.ask(robot, body, answered, lost, session())
 
 
-def give_back(device: AgentDevice, robot: str, session: int) -> None:
-    """Tell the DVA that a permission is needed no longer, until it has heard and kept that."""
+def give_back(device: AgentDevice, robot: str, session: int, tries: int = 1) -> None:
+    """Tell the DVA that a permission is needed no longer, until it has heard and kept that.
 
-    def again() -> None:
-        device.clock.call_after(GIVE_BACK_AGAIN, give_back, device, robot, session)
+    Args:
+        device: Device with the permission.
+        robot: Id of the robot.
+        session: Of the permission.
+        tries: Which try this is.
+    """
+
+    def again(tries: int = tries) -> None:
+        device.clock.call_after(GIVE_BACK_AGAIN, give_back, device, robot, session, tries)
 
     def answered(reply: m.Reply) -> None:
         if reply.code == m.BUSY:
             again()
+        elif reply.code == m.BAD_SESSION and tries < GIVE_BACK_TRIES:
+            again(tries + 1)  # a message that was damaged on its way names another session
 
     body = m.PermissionRevocation(robot, device.id_tag, session)
     device.ask(device.dva, body, answered, again)
