@@ -338,12 +338,12 @@ def outcome(root: Path, *tests: str, left_out: Sequence[str] = ()) -> tuple[int,
         start_new_session=True,
     )
     try:
-        told, _ = program.communicate(timeout=PATIENCE_S)
+        text, _ = program.communicate(timeout=PATIENCE_S)
     except subprocess.TimeoutExpired:
-        told = ""
+        text = ""
     finally:
         end(program)
-    return program.returncode, next(iter(FAILED.findall(told)), "")
+    return program.returncode, next(iter(FAILED.findall(text)), "")
 
 
 def end(program: subprocess.Popen[str]) -> None:

@@ -44,12 +44,12 @@ def digest_of_recording(name):
 def digests():
     """All lines, as they are made."""
     with ProcessPoolExecutor(mp_context=get_context("forkserver")) as pool:
-        told = [pool.submit(digest_of_recording, name) for name in RECORDED]
+        reports = [pool.submit(digest_of_recording, name) for name in RECORDED]
         for file in sorted((ROOT / "experiments").glob("*.yaml")):
-            told += [
+            reports += [
                 pool.submit(told_of_run, file.stem, *run) for run in sampled_jobs(load_study(file))
             ]
-        for line in told:
+        for line in reports:
             yield line.result()
 
 

@@ -142,13 +142,13 @@ REFUSALS = [
 @pytest.mark.invariant("S2")
 @pytest.mark.parametrize("row", REFUSALS, ids=lambda row: row[0])
 def test_which_refusal_is_as_the_specification_says(driven, row):
-    told, who, session, body, code, *before = row
+    text, who, session, body, code, *before = row
     driven.robot.sensors = (m.Sensor("smoke", "1/m"),)
     for grant in before:
         assert driven.say(DVA, grant).code == m.OK
     assert driven.say(who, body, session=session).code == code
     name = "NOT_PERMITTED" if code == m.NOT_PERMITTED else "BAD_SESSION"
-    assert f"| {told} | `{name}` |" in SPECIFICATION.read_text()
+    assert f"| {text} | `{name}` |" in SPECIFICATION.read_text()
 
 
 def test_no_row_on_refusals_goes_untested():
@@ -297,9 +297,9 @@ def test_who_may_read_sensors_takes_the_robot_from_nobody(sensing):
 
 
 def test_a_robot_tells_everybody_which_sensors_it_has(sensing):
-    told = sensing.say("02:00:00:00:00:99", m.GetSensorInfo(), session=0).content
-    assert told is not None
-    assert [sensor.name for sensor in told.sensors] == ["heat_flux", "smoke"]
+    body = sensing.say("02:00:00:00:00:99", m.GetSensorInfo(), session=0).content
+    assert body is not None
+    assert [sensor.name for sensor in body.sensors] == ["heat_flux", "smoke"]
 
 
 def test_a_robot_knows_nothing_of_the_sensors_of_others(sensing):

@@ -95,7 +95,7 @@ class Silenced:
 
     def told(self, who: str, what: str) -> list[float]:
         return [
-            t for t, name, told, _ in self.run.recorder.timeline if name == who and what in told
+            t for t, name, entry, _ in self.run.recorder.timeline if name == who and what in entry
         ]
 
 

@@ -74,8 +74,8 @@ def test_who_cannot_get_past_what_is_in_the_way_says_so_in_the_story_too(dva, gu
     walk.blocked()
     dva.run_for(1.0)
     assert dva.progress(1) == ["departed", "failed"]
-    told = [moment.what for moment in dva.stage.recorder.timeline]
-    assert any("gives up" in what for what in told)
+    story = [moment.what for moment in dva.stage.recorder.timeline]
+    assert any("gives up" in what for what in story)
 
 
 def test_only_the_dva_gives_orders(dva, guard):

@@ -72,7 +72,7 @@ def test_who_drives_the_same_robot_on_keeps_its_permission(dva, operator):
     dva.start(1, EAST)
     dva.order(2, WEST, robot=ROBOT)
     dva.run_until(lambda: "departed" in dva.progress(2))
-    assert not any(isinstance(told.body, m.PermissionRevocation) for told in dva.told)
+    assert not any(isinstance(entry.body, m.PermissionRevocation) for entry in dva.told)
     assert dva.sessions[ROBOT].session == 1
 
 
@@ -192,8 +192,8 @@ def test_who_drives_a_robot_keeps_it_and_says_so(dva, operator):
     dva.start(1, EAST)
     assert dva.say(OPERATOR, m.HandoverRequest(ROBOT, OPERATOR, "control room")) == m.BUSY
     assert is_driven(dva, ROBOT)
-    told = [moment.what for moment in dva.stage.recorder.timeline if moment.kind == "order"]
-    assert unnamed(told[-1], "robot-1", "control room") == []
+    story = [moment.what for moment in dva.stage.recorder.timeline if moment.kind == "order"]
+    assert unnamed(story[-1], "robot-1", "control room") == []
 
 
 def test_who_does_not_drive_it_yet_gives_it_up(dva, operator):

@@ -142,9 +142,9 @@ def test_faults_by_chance_come_after_their_mean_time_on_average():
     ],
 )
 def test_a_mistake_in_the_configuration_is_told(config, names):
-    with pytest.raises(ValidationError) as told:
+    with pytest.raises(ValidationError) as error:
         SensorConfig.model_validate(config)
-    assert unnamed(told.value, *names.split()) == []
+    assert unnamed(error.value, *names.split()) == []
 
 
 def test_two_sensors_of_one_name_are_one_too_many():

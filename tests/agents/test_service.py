@@ -57,9 +57,9 @@ def test_a_number_is_always_the_same():
     ],
 )
 def test_a_law_that_cannot_be_is_refused(wrong, names):
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(ConfigError) as error:
         scenarios.build({}, {"robot.processing_s": wrong})
-    assert unnamed(told.value, *names.split()) == []
+    assert unnamed(error.value, *names.split()) == []
 
 
 def test_robots_draw_their_own_times_the_same_for_the_same_seed():

@@ -87,15 +87,15 @@ def test_the_runs_are_columns(results):
 
 
 def test_a_finished_study_is_only_opened_again(study, results):
-    told = []
+    reports = []
     again = dva_sim.run(
         study,
         results.folder,
         set=["persons=1"],
-        progress=lambda done, total: told.append((done, total)),
+        progress=lambda done, total: reports.append((done, total)),
         report=False,
     )
-    assert told[0] == (2, 2)
+    assert reports[0] == (2, 2)
     assert again.manifest == results.manifest
 
 

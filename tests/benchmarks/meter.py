@@ -50,7 +50,7 @@ def figures(root: Path, names: Sequence[str], counter: str, repeats: int) -> Fig
         program = [sys.executable, runner.__file__, counter, str(repeats), str(into), *names]
         environment = pinned() | {"PYTHONPATH": str(root), FOLDER: folder}
         output([*under, *program], env=environment, cwd=root)
-        return {told["case"]: told for told in runner.read(into)}
+        return {entry["case"]: entry for entry in runner.read(into)}
 
 
 def measured(roots: Sequence[Path], names: Sequence[str], counter: str) -> list[Figures]:
@@ -62,7 +62,7 @@ def measured(roots: Sequence[Path], names: Sequence[str], counter: str) -> list[
         counted = list(pool.map(lambda root: figures(root, brief, counter, 0), roots))
     timed = [figures(root, names, Nothing.name, REPEATS) for root in roots]
     return [
-        {name: told | known.get(name, {}) for name, told in times.items()}
+        {name: entry | known.get(name, {}) for name, entry in times.items()}
         for known, times in zip(counted, timed, strict=True)
     ]
 
@@ -70,8 +70,8 @@ def measured(roots: Sequence[Path], names: Sequence[str], counter: str) -> list[
 def started(root: Path, names: Iterable[str], counter: str) -> Figures:
     """Costs of commands in the version in a folder."""
     environment = pinned() | {"PYTHONPATH": str(root)}
-    told = [startup.measured(name, counter, root, environment) for name in names]
-    return {each["case"]: each for each in told}
+    reports = [startup.measured(name, counter, root, environment) for name in names]
+    return {each["case"]: each for each in reports}
 
 
 # --- told --------------------------------------------------------------------------------------
@@ -157,7 +157,7 @@ def main() -> int:
         print(line)
     if not asked.only:
         print(echo(ROOT))
-    crashed = {name for name, told in ours.items() if "error" in told}
+    crashed = {name for name, entry in ours.items() if "error" in entry}
     return 1 if crashed - {name for name, case in CASES.items() if case.optional} else 0
 
 

@@ -30,12 +30,12 @@ def measured(name: str, counter: Any, repeats: int) -> dict[str, Any]:
     work()
     gc.collect()
     units, instructions = counter.count(work)
-    told: dict[str, Any] = {"case": name}
+    values: dict[str, Any] = {"case": name}
     if instructions is not None:
-        told["instructions"] = instructions / units
+        values["instructions"] = instructions / units
     if repeats:
-        told["cpu_s"] = min(spent(work) for _ in range(repeats))
-    return told
+        values["cpu_s"] = min(spent(work) for _ in range(repeats))
+    return values
 
 
 def spent(work: Any) -> float:
@@ -50,17 +50,17 @@ def in_a_copy(name: str, counter: str, repeats: int, into: Path) -> None:
     if copy := os.fork():
         _, status = os.waitpid(copy, 0)
         if status:
-            told = {"case": name, "error": f"crashed ({os.waitstatus_to_exitcode(status)})"}
-            write(told, into)
+            reported = {"case": name, "error": f"crashed ({os.waitstatus_to_exitcode(status)})"}
+            write(reported, into)
         return
     from benchmarks.counting import COUNTERS
 
     try:
         with open(os.devnull, "w") as nowhere, redirect_stdout(nowhere):  # noqa: PTH123
-            told = measured(name, COUNTERS[counter](), repeats)
+            reported = measured(name, COUNTERS[counter](), repeats)
     except BaseException as error:  # pytest's skip, too
-        told = {"case": name, "error": traceback.format_exception_only(error)[-1].strip()}
-    write(told, into)
+        reported = {"case": name, "error": traceback.format_exception_only(error)[-1].strip()}
+    write(reported, into)
     os._exit(0)
 
 

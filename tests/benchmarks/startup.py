@@ -66,11 +66,11 @@ def started(words: list[str], environment: Mapping[str, str]) -> tuple[int, floa
     with subprocess.Popen(words, env=environment, start_new_session=True, **pipes) as process:
         RUNNING.append(process)
         assert process.stderr is not None
-        said = process.stderr.read().decode()
+        output = process.stderr.read().decode()
         _, status, used = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode not in (0, 2) or "Traceback" in said:
-        raise RuntimeError(said.strip().splitlines()[-1])
+    if process.returncode not in (0, 2) or "Traceback" in output:
+        raise RuntimeError(output.strip().splitlines()[-1])
     return process.pid, used.ru_utime + used.ru_stime
 
 

@@ -363,8 +363,8 @@ class Scene:
         self._waves += 1
         words = [sys.executable, __file__, "--wave", str(self._waves), "--net", str(self.net)]
         words += ["--size", str(size), "--dva", self.dva]
-        told = json.loads(subprocess.run(words, stdout=subprocess.PIPE, check=True).stdout)
-        return self.rest(began + period - time.monotonic(), f"wave {self._waves}", told)
+        output = json.loads(subprocess.run(words, stdout=subprocess.PIPE, check=True).stdout)
+        return self.rest(began + period - time.monotonic(), f"wave {self._waves}", output)
 
     def rest(self, seconds: float, name: str, told: dict[str, int] | None = None) -> Figures:
         """Let time pass [s], and look."""

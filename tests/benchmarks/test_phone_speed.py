@@ -215,14 +215,14 @@ def test_what_phones_cost_and_what_they_lose(tmp_path, many):
         began, cpu = time.monotonic(), sum(at.cpu_s().values())
         in_threads(lambda phone: swing(phone, round(MANY_S / STEP_S)), phones)
         spent = (sum(at.cpu_s().values()) - cpu) / (time.monotonic() - began)
-        told = [phone.line["phone"] for phone in phones]
+        reports = [phone.line["phone"] for phone in phones]
         drives = sum(phone.is_driving for phone in phones)
         cpu = sum(at.cpu_s().values())
         time.sleep(MANY_S)  # they are there, and say nothing
         idle = (sum(at.cpu_s().values()) - cpu) / MANY_S
         for phone in phones:
             phone.close()
-    lost, came = (sum(one[key] for one in told) for key in ("samples_lost", "samples"))
+    lost, came = (sum(one[key] for one in reports) for key in ("samples_lost", "samples"))
     whole = [part[0] for phone in phones for part in phone.parts] or [np.nan]
     print(
         f"\n{many} phones, {drives} of which drive: {1000 * spent:.0f} ms of CPU a "

@@ -134,9 +134,9 @@ def pictures(port: int, path: str, count: int) -> list[tuple[dict[str, str], byt
 
 
 def test_the_url_that_a_robot_tells_is_a_stream_that_any_player_shows(world):
-    told = world.robots[ROBOT].controller.camera_url
-    assert told == f"http://127.0.0.1:{world.port}/camera/robot-1.mjpg"
-    assert m.SensorInfo(told, ()).camera_url == told
+    reported = world.robots[ROBOT].controller.camera_url
+    assert reported == f"http://127.0.0.1:{world.port}/camera/robot-1.mjpg"
+    assert m.SensorInfo(reported, ()).camera_url == reported
     (line,) = world.told
     assert unnamed(line, f"http://127.0.0.1:{world.port}/camera/LABEL.mjpg") == []
     seen = list[tuple[dict[str, str], bytes]]()

@@ -64,30 +64,30 @@ def test_a_misspelt_word_of_a_study_is_the_one_that_is_blamed(study, old, new, l
 @pytest.mark.parametrize("command", ["run", "episode", "check"])
 def test_a_file_that_is_not_there_is_told_as_a_file(tmp_path, command):
     (tmp_path / "mine.yaml").write_text("question: what?\n")
-    told = call(command, "mine.yml", cwd=tmp_path)
-    assert told.returncode == 2
-    assert "mine.yml" in told.stderr
+    ended = call(command, "mine.yml", cwd=tmp_path)
+    assert ended.returncode == 2
+    assert "mine.yml" in ended.stderr
     if command != "check":
-        assert unnamed(told.stderr, "file 'mine.yml'", "'mine.yaml'") == []
-    assert "not found; available" not in told.stderr
+        assert unnamed(ended.stderr, "file 'mine.yml'", "'mine.yaml'") == []
+    assert "not found; available" not in ended.stderr
 
 
 def test_a_plan_names_its_site(tmp_path):
     (tmp_path / "plan.geojson").write_text("{}")
-    told = call("site", "show", "plan.geojson", cwd=tmp_path)
-    assert unnamed(told.stderr, "plan.geojson", "'plan: plan.geojson'") == []
+    ended = call("site", "show", "plan.geojson", cwd=tmp_path)
+    assert unnamed(ended.stderr, "plan.geojson", "'plan: plan.geojson'") == []
     (tmp_path / "hall.yaml").write_text("name: hall\nplan: plan.geojson\n")
-    told = call("site", "show", "plan.geojson", cwd=tmp_path)
-    assert unnamed(told.stderr, "plan.geojson", "hall.yaml") == []
+    ended = call("site", "show", "plan.geojson", cwd=tmp_path)
+    assert unnamed(ended.stderr, "plan.geojson", "hall.yaml") == []
 
 
 @pytest.mark.parametrize("words", [["console", "--no-open"], ["robot", "--no-open"]])
 def test_a_port_in_use_names_the_way_out(words):
     with closing(socket.create_server(("127.0.0.1", 0))) as other:
         port = str(other.getsockname()[1])
-        told = call(*words, "--port", port)
-    assert told.returncode == 2
-    assert unnamed(told.stderr, port, "--port 0") == []
+        ended = call(*words, "--port", port)
+    assert ended.returncode == 2
+    assert unnamed(ended.stderr, port, "--port 0") == []
 
 
 @pytest.mark.parametrize(
@@ -151,9 +151,9 @@ def test_an_address_of_a_host_and_a_port_is_one(text):
     ],
 )
 def test_an_option_is_named_with_its_dashes(tmp_path, words, names):
-    told = call(*words, cwd=tmp_path)
-    assert told.returncode == 2
-    assert unnamed(told.stderr, *names) == []
+    ended = call(*words, cwd=tmp_path)
+    assert ended.returncode == 2
+    assert unnamed(ended.stderr, *names) == []
 
 
 @pytest.mark.system
@@ -166,9 +166,9 @@ def test_signs_that_a_terminal_lacks_are_shown_as_plain_ones(tmp_path, encoding)
     environment = os.environ | {"PYTHONIOENCODING": encoding, "PYTHONPATH": PYTHON_PATH}
     done = subprocess.run([sys.executable, "-c", shown], env=environment, capture_output=True)
     assert done.returncode == 0, done.stderr
-    told = done.stdout.decode(encoding)
+    output = done.stdout.decode(encoding)
     wanted = {"ascii": "9.3-120 s ... ? cafe", "latin-1": "9.3-120\u00a0s ... ? caf\u00e9"}
-    assert told.strip() == wanted.get(encoding, "9.3\u2013120\u00a0s \u2026 ? caf\u00e9")
+    assert output.strip() == wanted.get(encoding, "9.3\u2013120\u00a0s \u2026 ? caf\u00e9")
 
 
 def test_too_few_open_files_are_told_with_how_many_it_takes(monkeypatch):

@@ -75,9 +75,9 @@ def test_mistakes_are_told_at_their_place_in_a_scenario(tmp_path):
     (tmp_path / "run.yaml").write_text(
         "model: full\nlink:\n  partitions:\n    - {from_s: 0, for_s: 1, source: robot-1}\n"
     )
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(ConfigError) as error:
         read_link(str(tmp_path / "run.yaml"), {}, ENDS)
-    assert not unnamed(str(told.value), "run.yaml:3:3", "robot-1", "near", "far")
+    assert not unnamed(str(error.value), "run.yaml:3:3", "robot-1", "near", "far")
 
 
 def test_a_table_has_a_row_for_each_direction_and_says_what_its_columns_mean(tmp_path):

@@ -77,8 +77,8 @@ def test_where_no_terminal_is_the_table_is_as_wide_as_a_usual_one(monkeypatch):
 
 def test_where_the_dva_listens_is_said_once_and_before_all_else():
     out = io.StringIO()
-    told = InOrder(Console(file=out, width=80), Board())
+    reported = InOrder(Console(file=out, width=80), Board())
     for _ in range(3):
-        told.hear(report([], "127.0.0.1:5600"))
-    told.close()
+        reported.hear(report([], "127.0.0.1:5600"))
+    reported.close()
     assert out.getvalue() == "DVA: 127.0.0.1:5600\n"

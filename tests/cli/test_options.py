@@ -43,14 +43,14 @@ def test_a_command_takes_what_its_function_takes_with_its_defaults_and_words(nam
     options = {option.name: option for option in COMMANDS[name].params}
     assert set(options) - set(asked) == ADDED.get(name, set())
     assert set(asked) - set(options) == FOR_PROGRAMS.get(name, set())
-    told = " ".join(inspect.getdoc(function).replace("`", "").split())
+    text = " ".join(inspect.getdoc(function).replace("`", "").split())
     for each in asked.keys() & options.keys():
         needed = asked[each].default is inspect.Parameter.empty
         assert options[each].required == needed
         assert options[each].default == (None if needed else asked[each].default)
         words = options[each].help.removesuffix("; may be given again.").removesuffix(".")
         assert words
-        assert f" {each}: {words}" in told
+        assert f" {each}: {words}" in text
 
 
 def test_each_option_of_each_command_has_words():
@@ -73,9 +73,9 @@ def test_a_command_takes_the_options_of_its_function_and_hands_on_what_it_does_n
     program = typer.Typer(rich_markup_mode=None, add_completion=False)
     program.command(cls=CommandWithExamples)(command)
     program(["--help"], standalone_mode=False)
-    told = " ".join(capsys.readouterr().out.split())
-    assert unnamed(told, "STUDY", "--full", "--rows N", "[default: 2]", "-q, --quiet ") == []
-    assert "secret" not in told
+    output = " ".join(capsys.readouterr().out.split())
+    assert unnamed(output, "STUDY", "--full", "--rows N", "[default: 2]", "-q, --quiet ") == []
+    assert "secret" not in output
     program(["mine", "--full", "--rows", "3"], standalone_mode=False)
     assert seen == [("mine", False, {"full": True, "rows": 3})]
     with pytest.raises(typer.BadParameter, match=r"'0' .*at least 1"):

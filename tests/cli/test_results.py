@@ -120,8 +120,8 @@ def test_a_narrow_terminal_shows_fewer_columns_and_names_the_others(folders):
 def test_compare_tells_medians_and_differences_with_intervals(folders):
     code, out, _ = command("compare", folders["cheap"], folders["later"], "--by", "pattern")
     assert code == 0
-    told = ("8 cells are in both", "Compared in pairs", "all runs of A", "drive_time_s [s]")
-    assert unnamed(out, *told) == []
+    expected = ("8 cells are in both", "Compared in pairs", "all runs of A", "drive_time_s [s]")
+    assert unnamed(out, *expected) == []
     row = next(line for line in out.splitlines() if line.startswith("drive  REQ/REP"))
     assert row.split()[-4:] == ["(5.0", "to", "5.0)", "*"]
     assert unnamed(out, "1 of 5", "changed: drive_time_s") == []

@@ -88,8 +88,10 @@ def test_an_estimate_says_what_it_rests_on(plan, names):
 
 def test_a_plan_says_that_a_study_may_stop_early():
     plan = DryRun(42, 7, 9, 4, 2, 30.0, 0, "")
-    told = study_runs._plan(plan, Path("out"))
-    assert unnamed(told, "at most 42 runs", " 9 ", "up to 4 rounds", "7 of them", "into out") == []
+    reported = study_runs._plan(plan, Path("out"))
+    assert (
+        unnamed(reported, "at most 42 runs", " 9 ", "up to 4 rounds", "7 of them", "into out") == []
+    )
 
 
 def test_a_probe_spreads_over_the_design():

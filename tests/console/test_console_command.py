@@ -71,8 +71,8 @@ class Client:
 
     def want(self, speed, turn=0.0):
         self._count += 1
-        told = {"do": "input", "n": self._count, "speed": speed, "turn": turn, "held": True}
-        self._drive.send(json.dumps(told))
+        values = {"do": "input", "n": self._count, "speed": speed, "turn": turn, "held": True}
+        self._drive.send(json.dumps(values))
         self._hear(0.02)
 
     def _hear(self, wait):
@@ -137,8 +137,8 @@ def test_killed_it_loses_the_last_seconds_alone(programs, tmp_path):
     console = running(programs, "-o", out)
     second = call("console", *QUIET, "-o", out)
     assert second.returncode == 2
-    (told,) = second.stderr.splitlines()
-    assert unnamed(told, "error: ", out, f"process {console.process.pid} ") == []
+    (line,) = second.stderr.splitlines()
+    assert unnamed(line, "error: ", out, f"process {console.process.pid} ") == []
     wait_until(lambda: shown(out) > 2.0, "two seconds are kept")
     console.process.kill()
     console.process.wait()
@@ -152,8 +152,8 @@ def test_what_an_earlier_run_left_of_a_recording_is_not_replaced(tmp_path):
     left.write_text("lines")
     ended = call("console", *QUIET, "--record", "run.mcap", cwd=tmp_path)
     assert ended.returncode == 2
-    (told,) = ended.stderr.splitlines()
-    assert unnamed(told, "run.mcap.part", "--mcap", "--overwrite") == []
+    (line,) = ended.stderr.splitlines()
+    assert unnamed(line, "run.mcap.part", "--mcap", "--overwrite") == []
     assert left.read_text() == "lines"
 
 
@@ -170,9 +170,9 @@ def test_its_results_are_written_though_the_recording_breaks_off(programs, tmp_p
     (tmp_path / "film").write_text("a file where the folder was")
     console.send(signal.SIGINT)
     assert console.ends() == 2
-    (told,) = console.complained
-    assert "run.mcap was not recorded: " in told
-    assert "is left" not in told
+    (line,) = console.complained
+    assert "run.mcap was not recorded: " in line
+    assert "is left" not in line
     assert dva_sim.load(tmp_path / "mine").runs.rows == 1
 
 
@@ -280,9 +280,9 @@ def test_a_second_address_is_for_those_who_only_look(programs, console):
     with urllib.request.urlopen(seen) as answer:
         assert answer.status == 200
     acts = urllib.request.Request(f"{base}api/emergency", b'{"id": "a"}', headers)
-    with pytest.raises(urllib.error.HTTPError) as told:
+    with pytest.raises(urllib.error.HTTPError) as error:
         urllib.request.urlopen(acts)
-    with told.value as refused:
+    with error.value as refused:
         assert refused.code == 403
 
 

@@ -116,7 +116,7 @@ def test_types_of_the_pages_hold():
     tsc = shutil.which("tsc", path=str(own)) or shutil.which("tsc")
     if tsc is None:
         pytest.skip("TypeScript is missing (make tools)")
-    told = run([tsc, "-p", str(HERE / "typing")], capture_output=True, text=True)
+    ended = run([tsc, "-p", str(HERE / "typing")], capture_output=True, text=True)
 
-    assert told.stdout == ""
-    assert told.returncode == 0
+    assert ended.stdout == ""
+    assert ended.returncode == 0

@@ -159,9 +159,9 @@ def test_an_emergency_is_obeyed_whoever_it_says_it_is_from(world):
 
 def test_a_reply_in_the_name_of_another_is_not_believed(world):
     """Whatever the transport, who was asked must be who answers."""
-    phone, said = small_device(world, PHONE), Outbox(TABLET)
+    phone, reported = small_device(world, PHONE), Outbox(TABLET)
     world.serve(
-        ROBOT, lambda r: r.answer(said.encode(PHONE, m.Reply(1, m.OK, ""), world.clock.now))
+        ROBOT, lambda r: r.answer(reported.encode(PHONE, m.Reply(1, m.OK, ""), world.clock.now))
     )
     believed: list[m.Reply] = []
     phone.ask(ROBOT, m.StopTeleOp(), believed.append)

@@ -271,8 +271,8 @@ def test_publications_of_another_form_are_dropped_and_counted(sockets):
 def test_what_is_said_to_a_publisher_does_no_harm(sockets):
     """A subscriber says what it wants, and nothing keeps it from saying anything else."""
     program = sockets.program(zmq.XSUB, PHONE, published=True)
-    for said in (b"", b"\x02", b"\x00never wanted", b"\x01\xff\xfe", b"\xff" * 60_000):
-        program.send(said)
+    for entry in (b"", b"\x02", b"\x00never wanted", b"\x01\xff\xfe", b"\xff" * 60_000):
+        program.send(entry)
     program.send_multipart([b"\x01a", b"\x01b", b""])
     (listener,) = marked(Listener(sockets, "news|"))
     sockets.run_until(lambda: sockets.network.ready(PHONE, "news|", 10))

@@ -271,8 +271,8 @@ def test_from_each_stage_an_event_is_ended_once_and_who_was_sent_hears_it(body, 
     _, sends = decide(office, body, 6.0)
     assert office.event().state is state
     assert sum(office.desk.book.counts.values()) == office.desk.book.total == 1
-    told = {send.to for send in sends if send.body == OVER}
-    assert told == {"pending": set(), "confirmed": {GUARD}}.get(stage, {OPERATOR})
+    kinds = {send.to for send in sends if send.body == OVER}
+    assert kinds == {"pending": set(), "confirmed": {GUARD}}.get(stage, {OPERATOR})
     reply, sends = decide(office, m.Assign(1, GUARD), 8.0, OTHER_ROOM)
     assert (reply.code, sends) == (m.OUT_OF_ORDER, [])
     assert unnamed(reply.text, "controlroom", "2.0 s") == []

@@ -102,9 +102,9 @@ def test_a_robot_that_has_not_heard_of_an_end_lasts_and_is_told_when_it_is_back(
     sends = only(office, ROBOT, until=SILENT)
     assert over in sends  # its holder is silent
     office.no([over], SILENT)
-    told = only(office, GUARD, since=SILENT, until=300.0)
+    reported = only(office, GUARD, since=SILENT, until=300.0)
     assert ROBOT in known(office)
-    assert told.count(over) <= 1  # while the robot was just silent; it is not there to hear
+    assert reported.count(over) <= 1  # while the robot was just silent; it is not there to hear
     office.no([over], 300.0)
     office.status(ROBOT, 10, now=301.0)
     assert office.tick(301.0, alive=False) == [over]
@@ -148,12 +148,12 @@ def test_of_whom_something_is_open_makes_room_last_and_its_holder_hears_that(off
     only(office, OPERATOR, until=20.0)
     office.desk.registry.most = 4
     everybody = [f"02:00:00:09:00:{number:02X}" for number in range(3)]
-    told: list[Send] = []
+    reported: list[Send] = []
     for device in everybody:
         assert ROBOT in known(office)
-        told = office.say(device, m.Registration("x", "TeleOp", ADDRESS), 20.0)[1]
+        reported = office.say(device, m.Registration("x", "TeleOp", ADDRESS), 20.0)[1]
     over = m.PermissionRevocation(ROBOT, OPERATOR, session)
-    assert Send(OPERATOR, over) in told
+    assert Send(OPERATOR, over) in reported
     assert known(office) == {OPERATOR, *everybody}
     assert office.say(STRANGER, m.Registration("x", "TeleOp", ADDRESS), 20.0)[0].code == m.BUSY
     # The robot was never told: as soon as it is back, it is.

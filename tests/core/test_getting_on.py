@@ -35,8 +35,8 @@ def test_who_says_ok_and_does_nothing_but_live_loses_the_order_after_the_stated_
     send_a_guard(office)
     for now in range(1, 101):
         assert office.tick(float(now)) == []  # with all heartbeats
-    told = office.tick(101.0)
-    assert [(s.to, type(s.body).__name__) for s in told] == [
+    reported = office.tick(101.0)
+    assert [(s.to, type(s.body).__name__) for s in reported] == [
         (GUARD, "OrderProgress"),
         (OTHER_GUARD, "Order"),
     ]

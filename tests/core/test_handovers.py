@@ -78,11 +78,11 @@ def test_a_robot_is_handed_over_through_standstill_and_a_confirmed_end(office):
     assert not unnamed(reply.text, "teleop for 1 s", "asked")
     assert sends == [HANDOVER]
     assert ask(office, now=2.0)[1] == []  # once is enough
-    told = office.ok(sends, 3.0)
-    assert told == [Send(ROBOT, over), Send(OPERATOR, over)]
+    reported = office.ok(sends, 3.0)
+    assert reported == [Send(ROBOT, over), Send(OPERATOR, over)]
     office.status(ROBOT, 10, now=3.5)  # it stands, but has not said that it has heard
     assert ask(office, now=4.0)[0].text.startswith("it is being stopped")
-    office.ok(told, 4.5)
+    office.ok(reported, 4.5)
     office.status(ROBOT, 10, now=5.0, speed=0.3)
     assert ask(office, now=5.5)[0].code == m.BUSY
     office.status(ROBOT, 10, now=6.0)

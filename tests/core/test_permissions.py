@@ -49,8 +49,8 @@ def test_a_robot_is_held_by_one_and_the_robot_is_told(office):
     office.register(OTHER_OPERATOR, "TeleOp")
     reply, sends = office.say(OPERATOR, ASK)
     assert isinstance(reply.content, m.Permission)
-    told = m.PermissionGrant(OPERATOR, "teleoperation", reply.content.session, ADDRESS)
-    assert sends == [Send(ROBOT, told, told.session)]
+    reported = m.PermissionGrant(OPERATOR, "teleoperation", reply.content.session, ADDRESS)
+    assert sends == [Send(ROBOT, reported, reported.session)]
     assert office.say(OTHER_OPERATOR, ASK)[0].code == m.BUSY
 
 

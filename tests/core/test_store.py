@@ -264,15 +264,15 @@ def test_a_process_that_is_killed_forgets_nothing_that_it_has_said(file):
         command += [str(TESTS), OPERATOR]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
-            said = 0
+            reported = 0
             for line in process.stdout:
-                said = int(line)
-                if said == enough:
+                reported = int(line)
+                if reported == enough:
                     process.send_signal(signal.SIGKILL)
         memory, desk = Store(file), Office().new_desk()
         memory.recall(desk, 0.0)
         memory.close()
-        assert desk.book.total in (said, said + 1)
+        assert desk.book.total in (reported, reported + 1)
         assert sum(desk.book.counts.values()) == desk.book.total
         for path in file.parent.iterdir():
             path.unlink()

@@ -56,10 +56,10 @@ def _constants(node: ast.stmt) -> list[str]:
 
 def _said(node: ast.stmt, after: ast.stmt | None, comments: dict[int, str]) -> str:
     assert node.end_lineno is not None
-    said = [comments.get(line, "") for line in range(node.lineno, node.end_lineno + 1)]
+    reports = [comments.get(line, "") for line in range(node.lineno, node.end_lineno + 1)]
     if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):
-        said.append(str(after.value.value))
-    return " ".join(said)
+        reports.append(str(after.value.value))
+    return " ".join(reports)
 
 
 def test_every_number_about_people_is_a_key_or_says_where_it_is_from():

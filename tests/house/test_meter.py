@@ -65,8 +65,8 @@ def test_the_start_of_the_version_in_a_folder_is_measured_wherever_one_stands(tm
     (tmp_path / "dva_sim/__init__.py").touch()
     (tmp_path / "dva_sim/cli.py").write_text("raise SystemExit('this is another version')")
     environment = counting.pinned() | {"PYTHONPATH": str(tmp_path)}
-    told = startup.measured("--help", counting.Nothing.name, tmp_path, environment)
-    assert told["error"] == "this is another version"
+    reported = startup.measured("--help", counting.Nothing.name, tmp_path, environment)
+    assert reported["error"] == "this is another version"
 
 
 def test_a_case_whose_process_dies_is_told_as_a_crash(tmp_path, monkeypatch):

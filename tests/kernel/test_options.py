@@ -31,7 +31,7 @@ def test_what_is_within_its_bounds_is_taken():
     ],
 )
 def test_what_is_not_gets_a_line_that_says_what_would_be_right(ask, names):
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(ConfigError) as error:
         ask()
-    assert unnamed(told.value, *names.split()) == []
-    assert not str(told.value).endswith(" ")
+    assert unnamed(error.value, *names.split()) == []
+    assert not str(error.value).endswith(" ")

@@ -25,9 +25,9 @@ def _impatient(monkeypatch):
 @pytest.mark.parametrize("part", ["operator", "world"])
 def test_a_part_that_no_dva_answers_says_so_and_what_to_do(capsys, part):
     assert call(["live", "drive-to-event", "--only", part, "--dva", "127.0.0.1:9"]) == 3
-    said = capsys.readouterr()
-    assert unnamed(said.out, "127.0.0.1:9", "0.2 s") == []
-    (line,) = said.err.splitlines()
+    captured = capsys.readouterr()
+    assert unnamed(captured.out, "127.0.0.1:9", "0.2 s") == []
+    (line,) = captured.err.splitlines()
     assert unnamed(line, "error: ", "127.0.0.1:9", "0.2 s") == []
 
 

@@ -146,10 +146,10 @@ def test_a_trace_that_ends_in_the_middle_of_a_line_is_checked_up_to_there(drill,
 
 def test_a_trace_runs_no_class_in_a_file(drill, tmp_path):
     start, *rest = drill.read_text().splitlines(keepends=True)
-    told = json.loads(start)
-    told["scenario"]["dispatch"]["policy"] = "mine.py:Mine"
+    reported = json.loads(start)
+    reported["scenario"]["dispatch"]["policy"] = "mine.py:Mine"
     path = tmp_path / "dva.trace.jsonl"
-    path.write_text("".join([json.dumps(told) + "\n", *rest]))
+    path.write_text("".join([json.dumps(reported) + "\n", *rest]))
     (problem,) = check_trace(path)[0]
     assert unnamed(problem.text, "mine.py:Mine", "class") == []
 
@@ -216,17 +216,17 @@ def test_of_strangers_what_arrives_is_kept_of_others_what_they_send():
 
 
 def test_after_a_gap_a_trace_goes_on_no_more():
-    said = []
+    reports = []
 
     class Full(LiveRecorder):
         def trace(self, who: str, line: str) -> bool:
-            said.append(line)
+            reports.append(line)
             return line != "second"
 
     take = recording.TraceLines(Full(Clock(), PipeEnd(os.open(os.devnull, os.O_WRONLY))), "dva")
     for line in ("first", "second", "third"):
         take(line)
-    assert said == ["first", "second"]
+    assert reports == ["first", "second"]
 
 
 # --- from lines to a recording ------------------------------------------------------------
@@ -286,9 +286,9 @@ def test_lines_that_were_left_are_read_like_a_recording_and_stay(tmp_path):
     with keeper.path.open("ab") as file:
         file.write(b'["sent", 9.9, "02')
     left = keeper.path.read_bytes()
-    told = call("check", str(keeper.path))
-    assert told.returncode == 0, told.stdout
-    assert "interrupted" in told.stdout
+    done = call("check", str(keeper.path))
+    assert done.returncode == 0, done.stdout
+    assert "interrupted" in done.stdout
     ended = call("replay", str(keeper.path))
     assert (ended.returncode, ended.stderr) == (0, "")
     assert unnamed(ended.stdout, "mode Idle", "run.mcap.part", " 2 s ") == []
@@ -355,11 +355,11 @@ def test_a_run_that_has_grown_too_large_is_kept_up_to_there(tmp_path, monkeypatc
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no disk that is always full")
 def test_a_trace_on_a_full_disk_ends_and_is_told_once():
-    told: list[str] = []
-    take = TraceFile(Path("/dev/full"), told.append)
+    reports: list[str] = []
+    take = TraceFile(Path("/dev/full"), reports.append)
     for _ in range(3):
         take("line")
-    (line,) = told
+    (line,) = reports
     assert unnamed(line, "trace", os.strerror(errno.ENOSPC)) == []
 
 

@@ -54,8 +54,8 @@ def part_of(fact: Any) -> int:
 def line_of(fact: Any) -> Line:
     """Line in which a part of a live run reports a fact."""
     if not isinstance(fact, Sent):
-        word, time, told = as_plain(fact)
-        return [SEEN, time, word, told]
+        word, time, text = as_plain(fact)
+        return [SEEN, time, word, text]
     if isinstance(fact.payload, bytes):
         return [SAID, fact.time, fact.source, fact.destination, fact.payload.decode()]
     return [FRAME, fact.time, fact.source, fact.payload.observation, fact.payload.captured]
@@ -77,7 +77,7 @@ def judged(run: Run, lines: dict[int, list[Line]], seed: int = 1) -> dict[str, s
     judge, rng = LiveJudge(terms_of(run.scenario)), random.Random(seed)
     for part in lines:
         judge.joins(part)
-    left = {part: list(said) for part, said in lines.items()}
+    left = {part: list(entry) for part, entry in lines.items()}
     while left:
         part = min(left, key=lambda one: left[one][0][1] + rng.uniform(0.0, 4.0))
         some, left[part] = left[part][:20], left[part][20:]

@@ -45,8 +45,8 @@ def test_a_scenario_stands_for_all_its_devices(tmp_path):
 def test_keys_that_are_there_are_kept(tmp_path):
     make_keys(tmp_path, ["robot-1", "robot-2"])
     before = KeyRing(tmp_path).pair(ROBOT)
-    said = make_keys(tmp_path, ["drive-to-event", "robot-1", "dva"])
-    assert unnamed(said, tmp_path, "made 3 ", " 1 were there") == []
+    reported = make_keys(tmp_path, ["drive-to-event", "robot-1", "dva"])
+    assert unnamed(reported, tmp_path, "made 3 ", " 1 were there") == []
     assert KeyRing(tmp_path).pair(ROBOT) == before
 
 

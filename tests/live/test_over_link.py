@@ -56,7 +56,7 @@ def test_the_link_becomes_that_of_the_scenario(tmp_path):
         assert (link.delay_s, link.rate_bps, link.toward("up").loss) == (delay, rate, loss)
     law = '{"law": "gamma", "sd_s": 0.05}'
     assert json.loads(law) == link.model_dump(exclude_defaults=True)["delay_law"]
-    assert not any("modelled" in told for told in contradictions(options.read()))
+    assert not any("modelled" in entry for entry in contradictions(options.read()))
 
 
 @pytest.mark.parametrize(

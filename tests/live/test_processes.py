@@ -102,14 +102,14 @@ def test_a_robot_that_answers_an_emergency_and_ignores_it_lets_no_run_end_as_don
     run = programs.start(*SCRIPTED, "--record", "run.mcap")
     assert run.ends() == 1
     assert "an emergency: obeyed" in run.said
-    story, told = [line for line in run.said.splitlines() if "S3 broken" in line]
+    story, entry = [line for line in run.said.splitlines() if "S3 broken" in line]
     assert re.fullmatch(r" +[\d.]+ s  robot-1 +S3 broken: .*", story)
-    assert re.fullmatch(r"S3 broken: robot-1, at \d+\.\d s.*: .*", told)
+    assert re.fullmatch(r"S3 broken: robot-1, at \d+\.\d s.*: .*", entry)
     (complaint,) = run.complained  # on a busy machine S1, too: it moves for longer than allowed
     assert unnamed(complaint, "S3") == []
     ended = call("check", tmp_path / "run.mcap")
     assert ended.returncode == 1
-    assert f"run.mcap: {told}" in ended.stdout
+    assert f"run.mcap: {entry}" in ended.stdout
     assert "S3 broken: " in call("replay", tmp_path / "run.mcap").stdout
 
 
@@ -132,10 +132,10 @@ def test_a_run_leaves_a_recording_that_is_replayed_and_whose_decisions_hold(prog
     opened = read_recording(file)
     assert set(opened.traces) == {"dva", "robot-1"}
     assert "robot-1" in opened.playback.recorder.tracks
-    told = call("replay", file, "--still", "still.png", cwd=tmp_path)
-    assert told.returncode == 0, told.stderr
+    ended = call("replay", file, "--still", "still.png", cwd=tmp_path)
+    assert ended.returncode == 0, ended.stderr
     words = ("breaks out", "an emergency: obeyed", "refused (wrong mode)", "event 1 (fire)")
-    assert unnamed(told.stdout, *words) == []
+    assert unnamed(ended.stdout, *words) == []
     assert not list(tmp_path.glob("*.part"))
 
 
@@ -204,9 +204,9 @@ def test_parts_whose_supervisor_is_killed_end_and_what_was_recorded_can_be_repla
     assert again.returncode == 2
     assert unnamed(again.stderr, "run.mcap.part", "dva-sim replay") == []
     left = (tmp_path / "run.mcap.part").read_bytes()
-    told = call("replay", tmp_path / "run.mcap.part", "--mcap", tmp_path / "run.mcap")
-    assert told.returncode == 0, told.stderr
-    assert "mode Teleoperation" in told.stdout
+    ended = call("replay", tmp_path / "run.mcap.part", "--mcap", tmp_path / "run.mcap")
+    assert ended.returncode == 0, ended.stderr
+    assert "mode Teleoperation" in ended.stdout
     assert count_in(tmp_path / "run.mcap", b"<StartTeleOp") > 0
     assert (tmp_path / "run.mcap.part").read_bytes() == left
 

@@ -86,20 +86,20 @@ def test_what_is_shown_now_is_what_the_recording_will_hold(run, running, tmp_pat
     recorded = of(kept, "/robot-1/pose")
     assert len(recorded) > 50
     assert sum(live.get(message.time) == message for message in recorded) > 0.9 * len(recorded)
-    said = [message for message in kept if message.schema == XML]
-    assert len(said) > 100
-    assert sorted(said, key=str) == sorted((m for m in running if m.schema == XML), key=str)
+    reports = [message for message in kept if message.schema == XML]
+    assert len(reports) > 100
+    assert sorted(reports, key=str) == sorted((m for m in running if m.schema == XML), key=str)
     hazards = {(m.time, m.content["number"]): m for m in of(kept, channels.HAZARDS)}
     assert all(m.schema == "dva_sim.Hazard" for m in hazards.values())
     assert {m.content["kind"] for m in of(running, channels.HAZARDS)} == {"fire"}
 
 
 def test_delays_are_those_of_the_link(running):
-    told = {"command": [], "picture": []}
+    values = {"command": [], "picture": []}
     for message in of(running, channels.LATENCIES):
-        told[message.content["what"]].append(message.content["delay_s"])
-    assert all(len(delays) > 20 for delays in told.values())
-    assert all(0.0 < delay < 5.0 for delays in told.values() for delay in delays)
+        values[message.content["what"]].append(message.content["delay_s"])
+    assert all(len(delays) > 20 for delays in values.values())
+    assert all(0.0 < delay < 5.0 for delays in values.values() for delay in delays)
 
 
 def test_events_are_told_as_they_change(running):

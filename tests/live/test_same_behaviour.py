@@ -68,8 +68,8 @@ GIVEN_UP = [("starts", 200), ("1 of 200", "stale", "10 s"), ("stops", "obeyed")]
 
 @pytest.mark.parametrize(("changes", "words"), [({}, WHOLE), (LATE, GIVEN_UP)])
 def test_the_operator_tells_what_was_done_and_gives_up_a_robot_that_obeys_no_more(changes, words):
-    told = told_in_virtual_time(**changes)
-    missing = [unnamed(line, "robot-1", *each) for line, each in zip(told, words, strict=True)]
+    reported = told_in_virtual_time(**changes)
+    missing = [unnamed(line, "robot-1", *each) for line, each in zip(reported, words, strict=True)]
     assert missing == [[]] * len(words)
 
 
@@ -89,8 +89,8 @@ def test_a_shorter_limit_leads_to_other_decisions(changed):
 @pytest.mark.parametrize("live", [False, True])
 def test_a_grant_forged_in_the_dvas_name_is_found_out_by_asking_the_dva(live):
     decisions = over_sockets(forged) if live else in_virtual_time(forged)
-    told = [d.message for d in decisions]
-    assert told.count("PermissionGrant") == 2
+    reports = [d.message for d in decisions]
+    assert reports.count("PermissionGrant") == 2
     started = next(d for d in decisions if d.message == "StartTeleOp")
     assert (started.code, started.mode) == (m.OK, "Teleoperation")
-    assert told.count("SetTeleOp") == 211
+    assert reports.count("SetTeleOp") == 211

@@ -147,8 +147,8 @@ def test_a_supervisor_takes_a_moving_robot_over_and_it_stands_in_between(network
     assert abs(speeds[0]) < 0.05
     assert first[-1].code in (m.WRONG_MODE, m.NOT_PERMITTED, m.BAD_SESSION)
     kinds = [d.message for d in scene.witness.decisions if d.code == m.OK]
-    told = [k for k in kinds if k.startswith("Permission")]
-    assert told == ["PermissionGrant", "PermissionRevocation", "PermissionGrant"]
+    reports = [k for k in kinds if k.startswith("Permission")]
+    assert reports == ["PermissionGrant", "PermissionRevocation", "PermissionGrant"]
     assert kinds[-20:] == ["SetTeleOp"] * 20
     assert scene.robot.controller.owner == SUPERVISOR
 
@@ -201,9 +201,9 @@ def test_nobody_plays_the_supervisor_where_the_sender_is_told(network):
     impostor.outbox.source = SUPERVISOR
     impostor.ask(DVA, request("force").body, second.append)
     scene.until(lambda: second)
-    told = isinstance(network, MqttNetwork) or bool(getattr(network, "_ring", None))
-    assert second[0].code == (m.NOT_PERMITTED if told else m.BUSY)
-    assert (ROBOT in scene.dva.desk.sessions.reserved) is not told
+    reported = isinstance(network, MqttNetwork) or bool(getattr(network, "_ring", None))
+    assert second[0].code == (m.NOT_PERMITTED if reported else m.BUSY)
+    assert (ROBOT in scene.dva.desk.sessions.reserved) is not reported
 
 
 def test_the_dva_lists_sensors_and_smoke_at_a_robot_is_an_event(network):

@@ -73,7 +73,7 @@ def drive(tmp_path: Path) -> Path:
     path = tmp_path / "robot-1.trace.jsonl"
     controller = RobotController(ROBOT, DVA, Limits(watchdog=1.0, max_age=2.0))
     trace = DecisionLog(path, controller)
-    told: list[tuple[str, m.Body]] = [
+    reports: list[tuple[str, m.Body]] = [
         (DVA, grant := m.PermissionGrant(PHONE, "teleoperation", 7)),
         (DVA, confirmation(grant)),
         (PHONE, m.StartTeleOp()),
@@ -83,7 +83,7 @@ def drive(tmp_path: Path) -> Path:
         (PHONE, m.Emergency()),
         (PHONE, m.SetTeleOp(0.4, 0.0, 1300)),
     ]
-    for number, (source, body) in enumerate(told, 1):
+    for number, (source, body) in enumerate(reports, 1):
         message = m.Message(ROBOT, number, source, "12:00:00", 7, body)
         now = 1.0 + number / 10
         if isinstance(body, m.Reply):
@@ -102,8 +102,8 @@ def test_a_trace_taken_over_sockets_is_decided_the_same_again(tmp_path):
     path = tmp_path / "robot-1.trace.jsonl"
     decisions = over_sockets(pipelined, trace=path)
     replayed = list(replay(path))
-    told = [now for message, _, now in replayed if not isinstance(message.body, m.Reply)]
-    assert [(d.code, d.text) for d in decisions] == [(now.code, now.text) for now in told]
+    reports = [now for message, _, now in replayed if not isinstance(message.body, m.Reply)]
+    assert [(d.code, d.text) for d in decisions] == [(now.code, now.text) for now in reports]
     assert kinds(path)["SetTeleOp"] == 200 + 1 + 10
     assert differences(path) == 0
 
@@ -152,9 +152,9 @@ def _mission_lease_and_emergency(run: Run) -> None:
 def test_reply_contents_are_not_kept_but_what_leads_to_them_is(tmp_path):
     path = tmp_path / "robot-1.trace.jsonl"
     grant = m.PermissionGrant(DVA, "both", 5, sensors=("heat_flux",))
-    told = ((10.0, grant), (11.0, m.GetSensorInfo()), (12.0, m.DevSub("heat_flux", 1)))
+    reported = ((10.0, grant), (11.0, m.GetSensorInfo()), (12.0, m.DevSub("heat_flux", 1)))
     with traced(path, **LATER) as run:
-        for time, body in told:
+        for time, body in reported:
             run.clock.call_at(time, say, run, body, 5)
         run.clock.run(20.0)
     assert kinds(path) == {"PermissionGrant": 1, "Reply": 1, "GetSensorInfo": 1, "DevSub": 1}

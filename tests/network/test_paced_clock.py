@@ -69,13 +69,13 @@ def test_halted_time_stands_while_pulses_go_on_and_goes_on_from_where_it_was():
 
 
 def test_a_callback_that_takes_long_is_told_of_before_what_is_late_because_of_it():
-    clock, told = PacedClock(), []
-    clock.on_late = lambda behind: told.append((behind, list(happened)))
+    clock, reports = PacedClock(), []
+    clock.on_late = lambda behind: reports.append((behind, list(happened)))
     happened = []
     clock.call_at(0.05, time.sleep, 0.4)
     clock.call_at(0.1, happened.append, "late")
     clock.run(0.6)
-    behind, before = max(told)
+    behind, before = max(reports)
     assert behind >= 0.3
     assert before == []
     assert happened == ["late"]

@@ -100,5 +100,5 @@ def test_knowing_the_patterns_needs_neither_sockets_nor_arrays():
     """Labels, lists and completion look there before anything runs."""
     heavy = "{'zmq', 'numpy', 'matplotlib', 'lxml', 'pydantic'}"
     code = f"import sys, dva_sim.network.patterns; print(sorted({heavy} & sys.modules.keys()))"
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert told.stdout == "[]\n"
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ended.stdout == "[]\n"

@@ -189,8 +189,8 @@ def test_who_has_no_keys_is_told_at_both_ends(ring, make, binds, connects, reaso
     rings = (ring, None) if reason is Reason.PLAIN_CLIENT else (None, ring)
     server, client = (make(*each) for each in zip(rings, (ROBOT, OPERATOR), strict=True))
     open_both(server, client, binds, connects)
-    said = zip(both_say(server, client, reason), words, strict=True)
-    assert [unnamed(*each) for each in said] == [[], []]
+    reported = zip(both_say(server, client, reason), words, strict=True)
+    assert [unnamed(*each) for each in reported] == [[], []]
 
 
 @pytest.mark.parametrize("connects", [zmq.REQ, zmq.DEALER])

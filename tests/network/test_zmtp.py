@@ -248,12 +248,12 @@ def test_a_full_pipe_has_room_again_when_half_of_it_has_been_read(mark, low):
 
 
 def test_who_was_refused_is_told_once_when_there_is_room():
-    pipe, told = Pipe[int](4), list[int]()
-    pipe.on_room = lambda: told.append(len(pipe))
+    pipe, reported = Pipe[int](4), list[int]()
+    pipe.on_room = lambda: reported.append(len(pipe))
     for number in range(5):
         pipe.put(number)
     assert [pipe.take() for _ in range(4)] == [0, 1, 2, 3]
-    assert told == [2]
+    assert reported == [2]
 
 
 def test_what_conflates_keeps_the_newest_and_is_never_full():

@@ -105,8 +105,8 @@ def test_a_client_of_another_make_drives_with_keys_and_not_without(tmp_path, is_
     code = programs_of_the_specification()
     me = re.search(r'ME, DVA, sent = "(.*?)"', code[0])[1]
     scenario, folder = scenario_of(), tmp_path / "keys"
-    told = call("keys", folder, "dva", "robot-1", *team_of(scenario), *([me] if is_known else []))
-    assert told.returncode == 0, told.stderr
+    ended = call("keys", folder, "dva", "robot-1", *team_of(scenario), *([me] if is_known else []))
+    assert ended.returncode == 0, ended.stderr
     network = SocketNetwork(LiveClock(), KeyRing(folder))
     own = folder
     if not is_known:
@@ -171,11 +171,11 @@ def test_two_lives_of_the_client_within_a_second_differ_in_their_bytes(monkeypat
     lives = []
     for now in (1000.25, 1000.5):
         monkeypatch.setattr("time.time", lambda now=now: now)
-        said = []
+        reported = []
         life = {}
         exec(code.partition("dva, robot =")[0], life)
-        socket = SimpleNamespace(send_string=said.append, recv_string=lambda: "")
+        socket = SimpleNamespace(send_string=reported.append, recv_string=lambda: "")
         life["ask"](socket, "02:00:00:00:00:01", "<Access><GetDeviceList/></Access>")
-        lives += said
+        lives += reported
     assert lives[0] != lives[1]
-    assert [decode(said.encode()).message_id for said in lives] == [1, 1]
+    assert [decode(reported.encode()).message_id for reported in lives] == [1, 1]

@@ -83,8 +83,8 @@ def test_the_usual_task_of_an_order_is_left_out_and_understood_when_it_is_said()
     data = encode(message(order))
     assert order.task == "confirm"
     assert b"Task" not in data
-    said = data.replace(b"</Order>", b"<Task>confirm</Task></Order>")
-    assert decode(said) == decode(data) == message(order)
+    text = data.replace(b"</Order>", b"<Task>confirm</Task></Order>")
+    assert decode(text) == decode(data) == message(order)
 
 
 @pytest.mark.parametrize("device", [None, ROBOT])

@@ -199,11 +199,11 @@ def test_a_process_that_is_killed_has_written_all_that_it_said_was_done(tmp_path
         for _ in range(25):
             writer.stdout.readline()
         os.kill(writer.pid, signal.SIGKILL)
-        said = 25 + len(writer.stdout.read().splitlines())
+        output = 25 + len(writer.stdout.read().splitlines())
 
     found = verify(path)
     assert found.problem is None
-    assert found.rows >= said
+    assert found.rows >= output
 
 
 def test_rows_that_were_kept_elsewhere_are_followed_from_wherever_they_begin(log):

@@ -14,10 +14,10 @@ def story(text):
 def test_an_episode_is_kept_and_told_again_word_for_word(tmp_path):
     path = tmp_path / "run.mcap"
     one = ["episode", "drive-to-event", "--seed", 2, "--set", "horizon_s=30"]
-    told = call(*one, "--record", path).stdout
+    done = call(*one, "--record", path).stdout
     again = call("replay", path).stdout
-    assert f"Recording: {path}" in told.replace("\n", "")
-    assert story(again) == story(told)
+    assert f"Recording: {path}" in done.replace("\n", "")
+    assert story(again) == story(done)
     assert len(story(again)) > 4
     assert "30 s simulated" in again
 

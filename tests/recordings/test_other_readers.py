@@ -37,9 +37,9 @@ def test_another_implementation_counts_the_same_messages(folder, monkeypatch):
         pytest.skip("node with @mcap/core and fzstd is missing (make tools)")
     monkeypatch.setenv("NODE_PATH", str(packages))
     command = [node, "-e", READ, str(folder / "drill.mcap")]
-    told = json.loads(patience.run(command, capture_output=True, check=True).stdout)
+    output = json.loads(patience.run(command, capture_output=True, check=True).stdout)
     with (folder / "drill.mcap").open("rb") as file:
         summary = make_reader(file).get_summary()
-        assert told["attached"] == [a.name for a in make_reader(file).iter_attachments()]
+        assert output["attached"] == [a.name for a in make_reader(file).iter_attachments()]
     counts = summary.statistics.channel_message_counts
-    assert told["counts"] == {summary.channels[n].topic: count for n, count in counts.items()}
+    assert output["counts"] == {summary.channels[n].topic: count for n, count in counts.items()}

@@ -36,8 +36,8 @@ def test_it_breaks_out_is_noticed_and_is_told_of_as_what_messages_know(run):
     (incident,) = run.incidents
     assert (incident.kind, incident.hazard.title) == ("gas_leak", "steam leak")
     assert incident.detector.name == "Chemistry lab smoke"
-    told = [moment.what for moment in run.recorder.timeline]
-    assert {"steam leak breaks out", "reports gas leak"} <= set(told)
+    story = [moment.what for moment in run.recorder.timeline]
+    assert {"steam leak breaks out", "reports gas leak"} <= set(story)
     assert [event.kind for event in run.events] == ["gas_leak"]
 
 

@@ -172,9 +172,9 @@ def test_a_film_stands_long_enough_at_its_end_to_be_read(film):
 
 def test_below_each_map_stands_how_its_run_ended_from_then_on_and_not_before(films):
     film = films[False]
-    told = [scene_lines(ax) for ax in film.figure.axes[:2]]
+    reports = [scene_lines(ax) for ax in film.figure.axes[:2]]
     film.at(11.9)
-    assert [ended.get_text()[-4:] for _, ended in told] == ["20 s", "12 s"]
+    assert [ended.get_text()[-4:] for _, ended in reports] == ["20 s", "12 s"]
     before, after = film.at(11.9), film.at(12.0)
     assert pixels_of(halves(before)[1], style.FAILED) == 0
     assert pixels_of(halves(after)[1], style.FAILED) > 1000
@@ -378,9 +378,11 @@ def test_a_still_of_two_runs_shows_the_moment_when_the_first_one_is_done(race):
     assert best_time([late, early]) == 11.25
     assert best_time([late]) == 20.0
     figure = still([late, early], best_time([late, early]))
-    told = [line.get_text() for ax in figure.axes for line in scene_lines(ax) if line.get_visible()]
-    assert unnamed(told[0], "still under way", "19.5 s") == []
-    assert unnamed(told[1], "11.2 s", "8.2 s ahead") == []
+    reports = [
+        line.get_text() for ax in figure.axes for line in scene_lines(ax) if line.get_visible()
+    ]
+    assert unnamed(reports[0], "still under way", "19.5 s") == []
+    assert unnamed(reports[1], "11.2 s", "8.2 s ahead") == []
     assert [ax.get_title(loc="right") for ax in figure.axes] == ["11.2 s", "11.2 s"]
 
 

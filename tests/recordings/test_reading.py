@@ -229,8 +229,8 @@ def test_of_a_file_cut_short_all_that_is_there_is_read(folder, tmp_path, share):
     assert not opened.is_whole
     assert opened.playback.endings == []  # nobody knows
     assert 0 < until < opened.lasted == 60.0
-    told = [m[1:] for m in evacuation().recorder.timeline if m.time < until]
-    assert [m[1:] for m in opened.playback.recorder.timeline][: len(told)] == told
+    story = [m[1:] for m in evacuation().recorder.timeline if m.time < until]
+    assert [m[1:] for m in opened.playback.recorder.timeline][: len(story)] == story
     there = {n for n, t in evacuation().recorder.tracks.items() if t[-1].time >= until}
     ends = {n: t[-1].time for n, t in opened.playback.recorder.tracks.items()}
     assert there
@@ -242,7 +242,7 @@ def test_a_damaged_file_ends_in_one_line(folder, opened, tmp_path):
     """Whatever byte is wrong, nothing is read that was not written."""
     whole, rng = (folder / "drive.mcap").read_bytes(), random.Random(1)
     right = opened["drive"].playback.recorder.timeline
-    told = []
+    reports = []
     for _ in range(12):
         damaged = bytearray(whole)
         damaged[rng.randrange(len(whole))] ^= 1 << rng.randrange(8)
@@ -250,11 +250,11 @@ def test_a_damaged_file_ends_in_one_line(folder, opened, tmp_path):
         try:
             read = read_recording(tmp_path / "bad.mcap").playback.recorder.timeline
         except ConfigError as error:
-            told.append(str(error))
+            reports.append(str(error))
         else:
             assert read == right[: len(read)]
-    assert len(told) > 6
-    assert all("\n" not in line and "bad.mcap: " in line for line in told)
+    assert len(reports) > 6
+    assert all("\n" not in line and "bad.mcap: " in line for line in reports)
 
 
 def test_a_file_that_is_none_another_or_cut_before_the_run_begins_is_told(folder, tmp_path):

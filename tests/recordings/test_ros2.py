@@ -75,8 +75,8 @@ def test_the_map_is_the_floor_of_the_site(bag):
 
 
 def test_the_story_is_in_the_log(bag):
-    told = [(m.name, m.msg) for _, m in bag["/rosout"]]
-    assert told == [(m.who, m.what) for m in drill().recorder.timeline]
+    reports = [(m.name, m.msg) for _, m in bag["/rosout"]]
+    assert reports == [(m.who, m.what) for m in drill().recorder.timeline]
 
 
 def test_a_bag_that_is_there_is_kept(tmp_path):

@@ -63,8 +63,8 @@ def test_a_broken_rule_is_told_with_when_by_whom_and_how_and_makes_it_invalid(
     code, rules, lines = checked(path)
     assert code == 1
     assert rules == dict.fromkeys(RULES, "held") | {"S3": "broken"}
-    (told,) = [line for line in lines if line.startswith("S3")]
-    assert re.match(r"S3 broken: robot-1, at 13\.\d s, .*\d+ times", told)
+    (text,) = [line for line in lines if line.startswith("S3")]
+    assert re.match(r"S3 broken: robot-1, at 13\.\d s, .*\d+ times", text)
     assert lines[-1] == "1 file: 1 invalid"
 
 

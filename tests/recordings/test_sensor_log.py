@@ -92,9 +92,9 @@ def test_what_a_log_lacks_is_told_at_its_line(tmp_path, head, lines, names):
 
 def test_the_command_tells_a_log_and_makes_a_part_of_it_but_no_commands(tmp_path):
     file = log_of(tmp_path, ["t", "x", "y", "z"], rows(axes=1 / GRAVITY))
-    told = json.loads(call("phone-log", file, "--json").stdout)
-    assert told["rate_hz"] == pytest.approx(RATE)
-    assert told["late_ms"] is None
+    output = json.loads(call("phone-log", file, "--json").stdout)
+    assert output["rate_hz"] == pytest.approx(RATE)
+    assert output["late_ms"] is None
     assert call("phone-log", file, "--part", tmp_path / "part.yaml", "--unit", "g").returncode == 0
     assert call("check", tmp_path / "part.yaml").returncode == 0
     refused = call("phone-log", file, "--commands")

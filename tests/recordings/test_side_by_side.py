@@ -19,27 +19,27 @@ SHORT = ["horizon_s=12", "link.delay_s=0.1"]
 
 
 def told(pictures: Wanted | None = None, patterns: str = "req-rep,latest-wins") -> str:
-    said = StringIO()
-    where = Console(file=said, width=120)
+    reported = StringIO()
+    where = Console(file=reported, width=120)
     episode(EpisodeRequest("drive-to-event", 2, SHORT, patterns, pictures or Wanted()), where)
-    return said.getvalue()
+    return reported.getvalue()
 
 
 def test_without_any_picture_both_stories_are_told_and_how_they_ended_beside_each_other():
-    said = told()
-    assert said.count("robot-1 to event 1") == 2
+    reported = told()
+    assert reported.count("robot-1 to event 1") == 2
     headings = ("req-rep, 100 ms each way", "latest-wins, 100 ms each way", "side by side")
-    places = [said.index(f" {heading}") for heading in headings]
+    places = [reported.index(f" {heading}") for heading in headings]
     assert places == sorted(places)
-    ends = [line.partition("  ") for line in said[places[-1] :].splitlines()[1:]]
+    ends = [line.partition("  ") for line in reported[places[-1] :].splitlines()[1:]]
     assert [name for name, _, _ in ends] == ["REQ/REP", "latest-wins PUB/SUB"]
     assert all(unnamed(end, "not confirmed", "12 s") == [] for _, _, end in ends)
 
 
 def test_a_still_and_a_strip_show_both(tmp_path):
-    said = told(Wanted(still=tmp_path / "one.png", strip=tmp_path / "more.png", panels=2))
-    assert "Still: " in said
-    assert "Strip: " in said
+    reported = told(Wanted(still=tmp_path / "one.png", strip=tmp_path / "more.png", panels=2))
+    assert "Still: " in reported
+    assert "Strip: " in reported
     with Image.open(tmp_path / "one.png") as one, Image.open(tmp_path / "more.png") as more:
         assert one.width == more.width == 1680
         assert more.height > 1.5 * one.height  # a row for each moment

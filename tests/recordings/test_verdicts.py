@@ -53,8 +53,8 @@ def test_of_two_runs_the_one_that_was_ahead_says_by_how_much():
 
 
 def test_a_lead_of_a_moment_is_told_in_tenths_and_one_too_short_to_tell_not_at_all():
-    told = [verdicts([LATE, run(("confirmed", t))])[1].told for t in (233.0, 234.38)]
-    assert [line.split(", ")[1:] for line in told] == [["1.4 s ahead"], []]
+    reports = [verdicts([LATE, run(("confirmed", t))])[1].told for t in (233.0, 234.38)]
+    assert [line.split(", ")[1:] for line in reports] == [["1.4 s ahead"], []]
 
 
 def test_who_is_alone_in_coming_to_an_end_says_so():
@@ -72,5 +72,7 @@ def test_two_runs_differ_most_when_the_first_is_done():
 
 def test_two_runs_are_told_beside_each_other_by_the_names_that_reports_use():
     names = ["REQ/REP".ljust(21), "latest-wins PUB/SUB  "]
-    told = [verdict.told for verdict in verdicts([LATE, EARLY])]
-    assert story([LATE, EARLY]) == [f"{name}{line}" for name, line in zip(names, told, strict=True)]
+    reports = [verdict.told for verdict in verdicts([LATE, EARLY])]
+    assert story([LATE, EARLY]) == [
+        f"{name}{line}" for name, line in zip(names, reports, strict=True)
+    ]

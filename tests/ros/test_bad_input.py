@@ -122,16 +122,16 @@ OPERATIONS = [
 def test_a_damaged_operation_is_done_or_refused_in_one_line(operation):
     connection = Deaf()
     RosPeer("a client", connection, Host()).take(json.dumps(operation).encode())
-    for told in connection.sent:
-        assert told["op"] in ("status", "service_response")
-        assert "\n" not in str(told.get("msg", ""))
+    for entry in connection.sent:
+        assert entry["op"] in ("status", "service_response")
+        assert "\n" not in str(entry.get("msg", ""))
 
 
 @given(st.binary(max_size=60))
 def test_bytes_that_are_nothing_are_refused(data):
     connection = Deaf()
     RosPeer("a client", connection, Host()).take(data)
-    assert all(told["op"] == "status" for told in connection.sent)
+    assert all(entry["op"] == "status" for entry in connection.sent)
 
 
 @given(damaged(fixture("odometry-ros2")), st.binary(max_size=40))
@@ -147,7 +147,7 @@ def test_a_client_of_a_bridge_that_says_anything_goes_on(message, data):
     )
     client._take(json.dumps(message).encode())
     client._take(data)
-    assert all("\n" not in str(told) for told in refused)
+    assert all("\n" not in str(entry) for entry in refused)
 
 
 @given(st.lists(st.binary(max_size=40), max_size=5), st.integers(0, 30))

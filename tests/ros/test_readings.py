@@ -51,13 +51,13 @@ def test_tf_gives_the_pose_and_speeds_follow_from_two_of_them():
 
 
 def test_a_battery_says_its_share_and_percent_only_where_the_profile_says_so():
-    said = fixture("battery")["msg"]
-    assert reader().charge(said) == 0.625
+    message = fixture("battery")["msg"]
+    assert reader().charge(message) == 0.625
     with pytest.raises(BadReading):
-        reader().charge(said | {"percentage": 62.5})
-    assert reader(units={"charge": "percent"}).charge(said | {"percentage": 62.5}) == 0.625
+        reader().charge(message | {"percentage": 62.5})
+    assert reader(units={"charge": "percent"}).charge(message | {"percentage": 62.5}) == 0.625
     with pytest.raises(BadReading):
-        reader().charge(said | {"percentage": None})  # as NaN comes, where it is not measured
+        reader().charge(message | {"percentage": None})  # as NaN comes, where it is not measured
 
 
 def test_a_scan_is_the_nearest_range_of_each_sector_and_none_where_nothing_answered():
@@ -69,12 +69,12 @@ def test_a_scan_is_the_nearest_range_of_each_sector_and_none_where_nothing_answe
 
 
 def test_a_picture_is_jpeg_and_nothing_else():
-    said = fixture("picture")["msg"]
-    assert reader().picture(said) == JPEG
+    message = fixture("picture")["msg"]
+    assert reader().picture(message) == JPEG
     png = base64.b64encode(b"\x89PNG\r\n").decode()
     for bad in (png, "no base64!", [255, 216], None):
         with pytest.raises(BadReading):
-            reader().picture(said | {"data": bad})
+            reader().picture(message | {"data": bad})
 
 
 def test_a_picture_larger_than_the_profile_allows_is_refused_with_both_sizes():
@@ -100,13 +100,13 @@ def test_a_picture_larger_than_the_profile_allows_is_refused_with_both_sizes():
     ],
 )
 def test_odometry_that_is_not_as_it_should_be_is_refused_by_name(path, value, named):
-    said = fixture("odometry-ros2")["msg"]
-    place = said
+    message = fixture("odometry-ros2")["msg"]
+    place = message
     for key in path[:-1]:
         place = place[key]
     place[path[-1]] = value
     with pytest.raises(BadReading) as refused:
-        reader().odometry(said)
+        reader().odometry(message)
     assert unnamed(refused.value, named) == []
 
 

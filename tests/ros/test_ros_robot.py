@@ -124,9 +124,9 @@ def test_a_lost_bridge_stops_the_drive_is_told_and_comes_back(robot):
     assert (
         len([line for line in robot.story if "cannot be driven: the bridge is lost" in line]) == 1
     )
-    told = len(robot.statuses)
+    reported = len(robot.statuses)
     robot.pause(1.5)
-    assert len(robot.statuses) == told  # silent, so that the DVA counts it as gone
+    assert len(robot.statuses) == reported  # silent, so that the DVA counts it as gone
     robot.machine.heard.clear()
     robot.machine.obeys = True
     robot.machine.start()
@@ -164,9 +164,9 @@ def test_a_robot_that_does_not_stop_is_told_of_and_told_to_stand_on_and_on(robot
     robot.until(lambda: robot.agent.unfit)
     assert unnamed(robot.agent.unfit, "stop", "0.5 s") == []
     assert robot.ask(m.StartTeleOp()).code == m.BUSY
-    told = len(robot.machine.commands)
-    robot.until(lambda: len(robot.machine.commands) > told + 20)
-    assert set(robot.machine.commands[told:]) == {(0.0, 0.0)}
+    reported = len(robot.machine.commands)
+    robot.until(lambda: len(robot.machine.commands) > reported + 20)
+    assert set(robot.machine.commands[reported:]) == {(0.0, 0.0)}
     robot.machine.obeys = True
     robot.until(lambda: not robot.agent.unfit)
 
@@ -272,9 +272,9 @@ def test_bad_messages_are_dropped_in_one_line_and_the_drive_goes_on(robot, bad):
     for thread in saying:
         thread.start()
     robot.until(lambda: counted(robot.recorder.counters, "refused from the robot") >= lines)
-    told = [moment.what for moment in robot.recorder.timeline[before:]]
-    assert len([line for line in told if "refused" in line]) == 1
-    assert "\n" not in "".join(told)
+    story = [moment.what for moment in robot.recorder.timeline[before:]]
+    assert len([line for line in story if "refused" in line]) == 1
+    assert "\n" not in "".join(story)
     for thread in saying:
         thread.join()
     assert robot.machine.connections == 1

@@ -46,8 +46,8 @@ def drive(world, client, speed=0.3, turn_rate=0.0, topic=CMD):
 
 def test_topics_and_services_are_listed_with_the_types_of_ros(world):
     client = world.client()
-    told = client.call(world, "/rosapi/topics")
-    types = dict(zip(told["topics"], told["types"], strict=True))
+    reported = client.call(world, "/rosapi/topics")
+    types = dict(zip(reported["topics"], reported["types"], strict=True))
     assert types["/robot_2/odom"] == "nav_msgs/Odometry"
     assert types["/map"] == "nav_msgs/OccupancyGrid"
     assert client.call(world, "/rosapi/topic_type", topic=CMD)["type"] == "geometry_msgs/Twist"
@@ -69,13 +69,17 @@ def test_odometry_tf_scan_clock_and_map_come_as_long_as_they_are_wanted(world):
     pose = client.of("/robot_1/odom")[0]["pose"]["pose"]["position"]
     assert (pose["x"], pose["y"]) == pytest.approx((robot.body.x, robot.body.y))
     assert all(0.0 <= value <= 8.0 for value in client.of("/robot_1/scan")[0]["ranges"])
-    stage, told = world.world.run.stage, client.of("/map")[0]
-    assert len(told["data"]) == told["info"]["width"] * told["info"]["height"]
-    row = int((pose["y"] - told["info"]["origin"]["position"]["y"]) / told["info"]["resolution"])
-    column = int((pose["x"] - told["info"]["origin"]["position"]["x"]) / told["info"]["resolution"])
-    assert told["data"][row * told["info"]["width"] + column] == 0
-    assert set(told["data"]) <= {-1, 0, 100}
-    assert stage.site.grid.cells.size >= len(told["data"])
+    stage, reported = world.world.run.stage, client.of("/map")[0]
+    assert len(reported["data"]) == reported["info"]["width"] * reported["info"]["height"]
+    row = int(
+        (pose["y"] - reported["info"]["origin"]["position"]["y"]) / reported["info"]["resolution"]
+    )
+    column = int(
+        (pose["x"] - reported["info"]["origin"]["position"]["x"]) / reported["info"]["resolution"]
+    )
+    assert reported["data"][row * reported["info"]["width"] + column] == 0
+    assert set(reported["data"]) <= {-1, 0, 100}
+    assert stage.site.grid.cells.size >= len(reported["data"])
     clock = client.of("/clock")[-1]["clock"]
     assert clock["sec"] + clock["nanosec"] * 1e-9 == pytest.approx(world.clock.now, abs=5.0)
     client.say({"op": "unsubscribe", "topic": "/robot_1/odom"})
@@ -89,7 +93,9 @@ def test_a_throttled_topic_comes_no_more_often_than_asked(world):
     client = world.client()
     client.subscribe("/clock", throttle_rate=1000)
     world.until(lambda: len(client.of("/clock")) == 3)
-    times = [told["clock"]["sec"] + told["clock"]["nanosec"] * 1e-9 for told in client.of("/clock")]
+    times = [
+        entry["clock"]["sec"] + entry["clock"]["nanosec"] * 1e-9 for entry in client.of("/clock")
+    ]
     assert all(b - a >= 1.0 - 1e-3 for a, b in itertools.pairwise(times))
 
 
@@ -160,10 +166,10 @@ def test_commands_and_readings_take_as_long_as_the_link_of_the_run(delay):
         robot.body.drive = lambda *asked: (taken.append(world.clock.now), usual(*asked))
         world.pause(1.0)  # what was under way has arrived
         taken.clear()
-        said = world.clock.now
+        reported = world.clock.now
         client.twist(CMD, 0.25)
         world.until(lambda: taken)
-        assert taken[0] - said >= delay
+        assert taken[0] - reported >= delay
         stamp = client.of("/robot_1/odom")[-1]["header"]["stamp"]
         assert world.clock.now - stamp["sec"] - stamp["nanosec"] * 1e-9 >= delay
     finally:

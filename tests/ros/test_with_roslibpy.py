@@ -39,8 +39,8 @@ def test_it_lists_topics_types_and_services(ros_and_world):
     assert "/robot_1/odom" in ask(world, ros.get_topics)
     assert ask(world, lambda: ros.get_topic_type("/robot_1/scan")) == "sensor_msgs/LaserScan"
     assert "/robot_2/take_control" in ask(world, ros.get_services)
-    told = ask(world, lambda: ros.get_service_type("/robot_2/take_control"))
-    assert told == "std_srvs/Trigger"
+    reported = ask(world, lambda: ros.get_service_type("/robot_2/take_control"))
+    assert reported == "std_srvs/Trigger"
     assert "/dva_sim" in ask(world, ros.get_nodes)
 
 

@@ -28,10 +28,10 @@ def test_a_full_outbox_loses_the_oldest_that_may_be_lost_and_counts_it():
     for number in range(MOST_WAITING + 20):
         outbox.put({"k": "story", "n": number})
         outbox.put({"k": "done", "id": number}) if number < 5 else None
-    told = [json.loads(outbox.next()) for _ in range(len(outbox))]
-    assert told[0] == {"k": "scene"}
-    assert [line["id"] for line in told if line["k"] == "done"] == [0, 1, 2, 3, 4]
-    assert [line["n"] for line in told if line["k"] == "story"][-1] == MOST_WAITING + 19
+    reports = [json.loads(outbox.next()) for _ in range(len(outbox))]
+    assert reports[0] == {"k": "scene"}
+    assert [line["id"] for line in reports if line["k"] == "done"] == [0, 1, 2, 3, 4]
+    assert [line["n"] for line in reports if line["k"] == "story"][-1] == MOST_WAITING + 19
     assert outbox.dropped > 20
 
 
@@ -41,11 +41,11 @@ def test_a_pipe_that_nobody_reads_takes_no_time_and_says_all_later():
     for _ in range(200):
         pipe.put({"k": "hazards", "cells": "x" * 10_000})
     assert pipe.outbox.dropped > 100
-    said = b""
+    reported = b""
     theirs.settimeout(5.0)
-    while not pipe.flush() or not said.endswith(b"\n"):
-        said += theirs.recv(1 << 20)
-    assert all(json.loads(line)["k"] == "hazards" for line in said.splitlines())
+    while not pipe.flush() or not reported.endswith(b"\n"):
+        reported += theirs.recv(1 << 20)
+    assert all(json.loads(line)["k"] == "hazards" for line in reported.splitlines())
     theirs.close()
     assert pipe.lines() == []
     assert not pipe.is_open
@@ -82,11 +82,11 @@ def test_what_is_offered_is_written_whole_or_not_at_all():
     taken = 0
     while pipe.offer(line):
         taken += 1
-    said = b""
-    while len(said) < taken * len(line):
-        said += os.read(reads, 1 << 20)
+    reported = b""
+    while len(reported) < taken * len(line):
+        reported += os.read(reads, 1 << 20)
         pipe.flush()
-    assert said == line * taken
+    assert reported == line * taken
     os.close(reads)
     # The first offer finds that nobody reads any longer.
     assert [pipe.offer(line), pipe.offer(line)] == [
@@ -113,10 +113,10 @@ def test_in_an_event_loop_what_waits_is_written_when_there_is_room_and_the_end_i
 
         pipe = WatchedEnd(loop, ours.detach(), taken.append, lambda: ended.append(1), following)
         assert not pipe.flush()
-        said = b""
-        while len(said) < len(all_of_it):
-            said += await loop.sock_recv(theirs, 1 << 20)
-        assert said == all_of_it
+        reported = b""
+        while len(reported) < len(all_of_it):
+            reported += await loop.sock_recv(theirs, 1 << 20)
+        assert reported == all_of_it
         theirs.send(b"bye")
         theirs.close()
         while not ended:

@@ -66,8 +66,8 @@ def test_words_are_listed_as_people_do():
     assert listing([]) == ""
     assert listing(["a"]) == "a"
     assert listing(["a", "b", "c"]) == "a, b and c"
-    told = setting({"profile": "default", "link.loss": 0.1})
-    assert unnamed(told, "profile default", "loss 10\N{NO-BREAK SPACE}%") == []
+    reported = setting({"profile": "default", "link.loss": 0.1})
+    assert unnamed(reported, "profile default", "loss 10\N{NO-BREAK SPACE}%") == []
 
 
 @pytest.mark.parametrize(
@@ -85,14 +85,14 @@ def test_briefly_told_levels_leave_out_what_goes_without_saying(levels, text):
 
 def test_a_law_that_a_treatment_sets_is_told_key_by_key():
     law = {"law": "gamma", "mean_s": 0.05, "cv": 0.5}
-    told = level_name("robot.processing_s", law)
-    assert told.split(", ") == ["law gamma", "mean_s 50\N{NO-BREAK SPACE}ms", "cv 0.5"]
+    reported = level_name("robot.processing_s", law)
+    assert reported.split(", ") == ["law gamma", "mean_s 50\N{NO-BREAK SPACE}ms", "cv 0.5"]
 
 
 def test_a_list_that_a_treatment_sets_is_told_one_by_one():
     outages = [{"from_s": 7, "for_s": 2}, {"from_s": 20, "for_s": 1}]
-    told = level_name("link.outages", outages).replace("\N{NO-BREAK SPACE}", " ")
-    assert told.split("; ") == ["from_s 7 s, for_s 2 s", "from_s 20 s, for_s 1 s"]
+    text = level_name("link.outages", outages).replace("\N{NO-BREAK SPACE}", " ")
+    assert text.split("; ") == ["from_s 7 s, for_s 2 s", "from_s 20 s, for_s 1 s"]
     assert level_name("link.outages", []) == "none"
 
 

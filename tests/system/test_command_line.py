@@ -166,14 +166,14 @@ def test_a_mistake_ends_in_one_line_and_exit_code_2(tmp_path, words, said):
 def test_an_episode_tells_its_story_and_shows_it(tmp_path):
     from PIL import Image
 
-    told = call(
+    ended = call(
         *("episode", "drive-to-event", "--seed", "8", "--set", "horizon_s=6"),
         *("--still", "both.png", "--side-by-side", "req-rep,latest-wins"),
         cwd=tmp_path,
     )
-    assert told.returncode == 0, told.stderr
+    assert ended.returncode == 0, ended.stderr
     story = ("breaks out", "assigned to operator-1", "Teleoperation", "safety rules")
-    assert unnamed(told.stdout, *story) == []
+    assert unnamed(ended.stdout, *story) == []
     with Image.open(tmp_path / "both.png") as picture:
         assert len(picture.convert("RGB").getcolors(1 << 24) or []) > 100
 

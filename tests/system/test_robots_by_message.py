@@ -60,9 +60,9 @@ def say(
 
 def heard(run: Run, topic: str) -> list[Any]:
     """Messages that a robot publishes on a topic from now on."""
-    told: list[Any] = []
-    run.network.subscribe(DVA, ROBOT, topic, lambda data: told.append(decode(data).body))
-    return told
+    reports: list[Any] = []
+    run.network.subscribe(DVA, ROBOT, topic, lambda data: reports.append(decode(data).body))
+    return reports
 
 
 def place(run: Run, x: float, y: float) -> m.Position:
@@ -75,9 +75,9 @@ def test_a_robot_drives_a_mission_by_itself_and_is_idle_again():
     start = robot.body.pose()
     corner, goal = (12.0, 12.0), (20.0, 12.0)
     send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
-    told = send(run, 12.0, m.GoTo((place(run, *corner), place(run, *goal))))
+    messages = send(run, 12.0, m.GoTo((place(run, *corner), place(run, *goal))))
     run.clock.run(14.0)
-    assert [r.code for r in told] == [m.OK]
+    assert [r.code for r in messages] == [m.OK]
     assert robot.controller.mode == "Mission"
     run.clock.run(120.0)
     assert robot.controller.mode == "Idle"
@@ -95,10 +95,10 @@ def test_an_emergency_stops_a_moving_robot_within_its_braking_distance():
     run.field.world.advance_to(45.0)
     assert robot.body.speed > 0.4
     before = robot.body.distance
-    told = send(run, 45.0, m.Emergency(), session=0)
+    messages = send(run, 45.0, m.Emergency(), session=0)
     run.clock.run(60.0)
     run.field.world.advance_to(60.0)
-    assert [r.code for r in told] == [m.OK]
+    assert [r.code for r in messages] == [m.OK]
     assert robot.controller.mode == "Idle"
     processing, lag, brake = 0.05 * 0.5, 0.15 * 0.5, 0.5**2 / 2
     assert robot.body.distance - before < processing + lag + brake + 0.02
@@ -145,14 +145,14 @@ def test_bad_bytes_are_answered_and_change_nothing():
 def test_a_sensor_is_read_at_the_frequency_asked_for_while_it_is_permitted():
     run = staged(events=[{"kind": "fire", "at_s": 5, "room": "Chemistry lab"}])
     values = heard(run, sensor_topic("heat_flux", DVA))
-    told = send(run, 1.0, m.GetSensorInfo(), session=0)
+    messages = send(run, 1.0, m.GetSensorInfo(), session=0)
     by_id = send(run, 1.2, m.GetSensorInfo(ROBOT), session=0)
     early = send(run, 1.5, m.DevSub("heat_flux", 2.0))
     send(run, 2.0, m.PermissionGrant(DVA, "sensors", 5, None, ("heat_flux",)))
     late = send(run, 3.0, m.DevSub("heat_flux", 2.0))
     over = send(run, 23.0, m.PermissionRevocation(ROBOT, DVA, 5))
     run.clock.run(40.0)
-    for reply in (*told, *by_id):
+    for reply in (*messages, *by_id):
         assert isinstance(reply.content, m.SensorInfo)
         assert m.Sensor("heat_flux", "kW/m2") in reply.content.sensors
     assert [r.code for r in (*early, *late, *over)] == [m.NOT_PERMITTED, m.OK, m.OK]
@@ -224,7 +224,7 @@ def test_a_patrol_is_cancelled_and_the_robot_goes_home():
     run = staged()
     robot = run.field.robots[ROBOT]
     base = robot.body.pose()
-    told = heard(run, MISSION)
+    messages = heard(run, MISSION)
     beat = (place(run, 12.0, 12.0), place(run, 18.0, 12.0))
     send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
     began = send(run, 12.0, m.Patrol(beat, 0))
@@ -241,9 +241,9 @@ def test_a_patrol_is_cancelled_and_the_robot_goes_home():
     run.clock.run(200.0)
     assert [r.code for r in (*began, *second, *over, *home)] == [m.OK, m.BUSY, m.OK, m.OK]
     assert math.dist(robot.body.pose()[:2], base[:2]) < 0.5
-    assert [status.mission_state for status in told][-3:] == ["failed", "under_way", "done"]
-    assert told[-3].reason == "cancelled"
-    patrol, way_home = told[0].mission_id, told[-1].mission_id
+    assert [status.mission_state for status in messages][-3:] == ["failed", "under_way", "done"]
+    assert messages[-3].reason == "cancelled"
+    patrol, way_home = messages[0].mission_id, messages[-1].mission_id
     assert way_home > patrol > 0
     (status,) = (reply.content for reply in asked)
     assert isinstance(status, m.MissionStatus)
@@ -254,14 +254,14 @@ def test_a_patrol_is_cancelled_and_the_robot_goes_home():
 
 def test_an_emergency_during_a_patrol_ends_it_and_says_so():
     run = staged()
-    told = heard(run, MISSION)
+    messages = heard(run, MISSION)
     send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
     send(run, 12.0, m.Patrol((place(run, 12.0, 12.0), place(run, 18.0, 12.0)), 0))
     send(run, 40.0, m.Emergency(), session=0)
     run.clock.run(60.0)
     robot = run.field.robots[ROBOT]
     assert robot.controller.mode == "Idle"
-    assert (told[-1].mission_state, told[-1].reason) == ("failed", "emergency")
+    assert (messages[-1].mission_state, messages[-1].reason) == ("failed", "emergency")
     before = robot.body.distance
     run.clock.run(90.0)
     assert robot.body.distance == before
@@ -272,11 +272,11 @@ def test_a_robot_inspects_an_event_and_waits_before_it():
     run = staged(events=[{"kind": "fire", "at_s": 5, "room": "Workshop"}], access=nobody_drives)
     robot = run.field.robots[ROBOT]
     fire = run.field.incidents[0].hazard.position
-    told = heard(run, MISSION)
+    messages = heard(run, MISSION)
     send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
     send(run, 12.0, m.Inspect(3, "fire", place(run, *fire)))
     run.clock.run(110.0)
-    assert (told[-1].mission_state, told[-1].reason) == ("waiting", "fire in view")
+    assert (messages[-1].mission_state, messages[-1].reason) == ("waiting", "fire in view")
     assert any(seen.kind == "fire" for seen in robot.observe().hazards)
     assert robot.controller.mode == "Mission"
     assert robot.body.contacts == 0
@@ -288,9 +288,9 @@ def test_a_lidar_is_subscribed_to_and_sees_the_walls_of_its_bay():
     scans = heard(run, sensor_topic("lidar", DVA))
     send(run, 2.0, m.PermissionGrant(DVA, "sensors", 5, None, ("lidar",)))
     too_often = send(run, 3.0, m.DevSub("lidar", 20.0))
-    told = send(run, 4.0, m.DevSub("lidar", 5.0))
+    messages = send(run, 4.0, m.DevSub("lidar", 5.0))
     run.clock.run(24.0)
-    assert [r.code for r in (*too_often, *told)] == [m.NOT_SUPPORTED, m.OK]
+    assert [r.code for r in (*too_often, *messages)] == [m.NOT_SUPPORTED, m.OK]
     assert len(scans) == 100 or abs(len(scans) - 100) <= 2
     assert {len(scan.values) for scan in scans} == {36}
     assert {scan.unit for scan in scans} == {"m"}
@@ -490,15 +490,15 @@ def test_no_flood_holds_up_an_emergency_and_none_outlasts_it(body):
 
 
 def test_more_than_a_few_waiting_messages_of_a_connection_are_answered_busy():
-    driven, told = Driven("req-rep"), list[m.Body]()
+    driven, reported = Driven("req-rep"), list[m.Body]()
     service = driven.run.network.service(ROBOT)
     assert service is not None
     outbox = Outbox("02:00:00:0F:00:01")
     for _ in range(200):
         data = outbox.encode(ROBOT, m.GetSensorInfo(), driven.clock.now)
-        service(Request(data, lambda reply: told.append(decode(reply).body), peer="one"))
+        service(Request(data, lambda reply: reported.append(decode(reply).body), peer="one"))
     driven.clock.run(driven.clock.now + 5.0)
-    codes = Counter(reply.code for reply in told if isinstance(reply, m.Reply))
+    codes = Counter(reply.code for reply in reported if isinstance(reply, m.Reply))
     assert codes[m.OK] in (EACH, EACH + 1)
     assert codes[m.BUSY] == Nuisances.UNANSWERED + 1
     counted = driven.run.recorder.counters

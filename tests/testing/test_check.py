@@ -45,8 +45,8 @@ def check(here, capsys):
         for name, text in texts.items():
             (here / name.replace("__", ".")).write_text(text)
         code = checks.check(files or [name.replace("__", ".") for name in texts])
-        said = capsys.readouterr()
-        return code, [*said.err.splitlines(), *said.out.splitlines()]
+        captured = capsys.readouterr()
+        return code, [*captured.err.splitlines(), *captured.out.splitlines()]
 
     return run
 
@@ -208,10 +208,10 @@ def test_a_huge_file_is_not_read(check, here):
     tracemalloc.stop()
     assert peak < 20e6
     assert code == 1
-    told = [line for line in lines if line.startswith("huge.") and ":1:" in line]
-    assert not unnamed(told[0], "huge.xml:1:8193: ", "8192 bytes")
-    assert told[1].startswith("huge.yaml:1:1: ")
-    assert told[2].startswith("huge.geojson:1:1: ")
+    reports = [line for line in lines if line.startswith("huge.") and ":1:" in line]
+    assert not unnamed(reports[0], "huge.xml:1:8193: ", "8192 bytes")
+    assert reports[1].startswith("huge.yaml:1:1: ")
+    assert reports[2].startswith("huge.geojson:1:1: ")
 
 
 def test_what_is_no_file_gives_exit_code_2_and_the_rest_is_still_checked(check, here):

@@ -39,10 +39,10 @@ def ros_map(folder, image="map.pgm", maxval=255, shades=None, **keys):
     else:
         head = f"P5\n# as some editors write it\n{shades.shape[1]} {shades.shape[0]}\n{maxval}\n"
         (folder / image).write_bytes(head.encode() + shades.tobytes())
-    told = {"image": image, "resolution": 0.1, "origin": "[0, 0, 0]", "negate": 0}
-    told |= {"occupied_thresh": 0.65, "free_thresh": 0.25, **keys}
+    values = {"image": image, "resolution": 0.1, "origin": "[0, 0, 0]", "negate": 0}
+    values |= {"occupied_thresh": 0.65, "free_thresh": 0.25, **keys}
     file = folder / "map.yaml"
-    file.write_text("".join(f"{key}: {value}\n" for key, value in told.items()))
+    file.write_text("".join(f"{key}: {value}\n" for key, value in values.items()))
     return file
 
 
@@ -139,8 +139,8 @@ def test_a_trace_that_carries_nothing_for_longer_than_a_run_is_told_with_the_tim
     (doubt,) = check_file(file).doubts
     assert "1,596,042,000 s" in doubt
     scenario = scenarios.build(scenarios.load("drive-to-event"), {"link.trace_up": str(file)})
-    told = [doubt for doubt in contradictions(scenario) if "trace_up" in doubt]
-    assert unnamed(*told, "1,596,042,000 s", "horizon_s 600") == []
+    reports = [doubt for doubt in contradictions(scenario) if "trace_up" in doubt]
+    assert unnamed(*reports, "1,596,042,000 s", "horizon_s 600") == []
 
 
 def test_a_gap_that_is_shorter_than_a_run_is_not_told(tmp_path):
@@ -170,11 +170,11 @@ def filtered(recorded, out, *, metadata=True, attachments=True, without=()):
             if channel.topic in without:
                 continue
             if schema.id not in schemas:
-                told = schema.name, schema.encoding, schema.data
-                schemas[schema.id] = writer.register_schema(*told)
+                reported = schema.name, schema.encoding, schema.data
+                schemas[schema.id] = writer.register_schema(*reported)
             if channel.id not in channels:
-                told = channel.topic, channel.message_encoding, schemas[schema.id]
-                channels[channel.id] = writer.register_channel(*told, channel.metadata)
+                reported = channel.topic, channel.message_encoding, schemas[schema.id]
+                channels[channel.id] = writer.register_channel(*reported, channel.metadata)
             when = message.log_time, message.data, message.publish_time, message.sequence
             writer.add_message(channels[channel.id], *when)
         for each in reader.iter_metadata() if metadata else ():

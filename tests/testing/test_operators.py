@@ -99,8 +99,8 @@ REMEMBERS = "remembers what another one did, or draws random numbers"
     ],
 )
 def test_a_broken_promise_is_found(fewer, kind, promise):
-    told = [text.partition(":")[0] for text in tried(check_operator, kind, slow=60.0).broken]
-    assert promise in told
+    reports = [text.partition(":")[0] for text in tried(check_operator, kind, slow=60.0).broken]
+    assert promise in reports
 
 
 Crawling = steers(lambda wanted, _: Intent(0.1 * wanted.speed, 0.1 * wanted.turn_rate))

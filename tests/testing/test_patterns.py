@@ -143,7 +143,7 @@ FAULTS = {
 @pytest.mark.parametrize(("kind", "promise"), FAULTS.items())
 def test_a_pattern_that_breaks_a_promise_is_found_out(kind, promise):
     broken = tried(check_pattern, kind, slow=60.0).broken
-    assert any(told.startswith(promise) for told in broken), broken
+    assert any(entry.startswith(promise) for entry in broken), broken
 
 
 class Sleepy(LatestWins):

@@ -122,8 +122,8 @@ def test_a_mistake_there_follows_neither_the_schema_nor_the_program(tmp_path, ol
 
 def test_the_schema_tells_what_each_key_of_a_study_means():
     schema = json.loads(schema_text("study"))
-    told = "Contrast", "Design", "Hypothesis", "StudyPart", "ValueRange", "StopRule", "Tuning"
-    for name in told:
+    expected = "Contrast", "Design", "Hypothesis", "StudyPart", "ValueRange", "StopRule", "Tuning"
+    for name in expected:
         model = schema["$defs"][name]
         assert "Attributes" not in model["description"]
         assert all(key.get("description") for key in model["properties"].values()), name

@@ -123,8 +123,8 @@ def test_of_several_parts_walls_zones_and_coverage_take_all_and_rooms_none(tmp_p
     site = site_of(tmp_path, hall, shelves)
     assert not site.is_free(1.5, 1.5, 0.0)
     assert not site.is_free(5.5, 5.5, 0.0)
-    told = mistake(tmp_path, multiple(hall, feature("room", "Polygon", square(20, 0, 4))))
-    assert unnamed(str(told), "feature 1", "room", "2 parts") == []
+    problem = mistake(tmp_path, multiple(hall, feature("room", "Polygon", square(20, 0, 4))))
+    assert unnamed(str(problem), "feature 1", "room", "2 parts") == []
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
@@ -139,8 +139,8 @@ def test_a_position_that_is_no_degrees_is_named_with_the_system_of_its_file(tmp_
     room = feature("room", "Polygon", square(0, 0, 4), name="hall")
     room["geometry"]["coordinates"][0][2] = [1_224_514.0, 6_106_854.0]
     crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3857"}}
-    told = mistake(tmp_path, room, crs=crs)
-    assert unnamed(str(told), "feature 1", "1.22451e+06", "3857", "EPSG:4326") == []
+    problem = mistake(tmp_path, room, crs=crs)
+    assert unnamed(str(problem), "feature 1", "1.22451e+06", "3857", "EPSG:4326") == []
 
 
 @pytest.mark.parametrize(
@@ -161,8 +161,8 @@ def test_a_plan_far_from_its_origin_is_refused_with_the_distance(tmp_path, turn,
 
 def test_a_plan_of_too_many_cells_is_refused_before_they_are_made(tmp_path):
     room = feature("room", "Polygon", square(0, 0, 6_000), name="field")
-    told = mistake(tmp_path, room)
-    assert unnamed(str(told), "6,000 by 6,000 m", "0.05 m", "tiny.yaml") == []
+    problem = mistake(tmp_path, room)
+    assert unnamed(str(problem), "6,000 by 6,000 m", "0.05 m", "tiny.yaml") == []
 
 
 @pytest.mark.parametrize(
@@ -181,15 +181,15 @@ def test_a_plan_of_too_many_cells_is_refused_before_they_are_made(tmp_path):
 )
 def test_what_a_feature_lacks_is_told_in_words_of_geojson(tmp_path, member, value, names):
     room = feature("room", "Polygon", square(0, 0, 4), name="hall")
-    told = str(mistake(tmp_path, *TWO_ROOMS, room | {member: value}))
-    assert unnamed(told, f"feature {len(TWO_ROOMS) + 1}", *names) == []
-    assert not any(word in told for word in ("None", "NoneType", "KeyError", "Traceback"))
+    problem = str(mistake(tmp_path, *TWO_ROOMS, room | {member: value}))
+    assert unnamed(problem, f"feature {len(TWO_ROOMS) + 1}", *names) == []
+    assert not any(word in problem for word in ("None", "NoneType", "KeyError", "Traceback"))
 
 
 def test_a_mistake_among_thousands_of_features_is_told_at_its_line(tmp_path):
     wall = feature("wall", "LineString", [(0, 0), (4, 0)])
     typo = feature("gaurd_post", "Point", [(1, 1)])
-    told = mistake(tmp_path, *TWO_ROOMS, *[wall] * 3_000, typo, *[wall] * 1_000)
-    assert unnamed(str(told), f"feature {len(TWO_ROOMS) + 3_001}", "'guard_post'") == []
+    problem = mistake(tmp_path, *TWO_ROOMS, *[wall] * 3_000, typo, *[wall] * 1_000)
+    assert unnamed(str(problem), f"feature {len(TWO_ROOMS) + 3_001}", "'guard_post'") == []
     lines = (tmp_path / "mistaken/tiny.geojson").read_text().splitlines()
-    assert '"gaurd_post"' in "".join(lines[told.line - 1 : told.line + 8])
+    assert '"gaurd_post"' in "".join(lines[problem.line - 1 : problem.line + 8])

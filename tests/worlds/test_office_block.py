@@ -109,8 +109,10 @@ def test_no_two_rooms_of_any_block_have_one_name_and_the_number_tells_the_corrid
     rooms = assign(layout, bases=4)
     assert len({name for _, _, name in rooms}) == len(rooms) == len(layout.cells)
     numbered = [(cell, int(name.split()[-1])) for cell, _, name in rooms if name[-3:].isdigit()]
-    told = (all(n // hundred == cell.wing + 1 for cell, n in numbered) for hundred in (100, 1000))
-    assert any(told)
+    reported = (
+        all(n // hundred == cell.wing + 1 for cell, n in numbered) for hundred in (100, 1000)
+    )
+    assert any(reported)
 
 
 def test_the_largest_block_there_is_names_each_of_its_1800_rooms_otherwise():

@@ -54,8 +54,8 @@ def test_asked_first_it_acknowledges_after_8_s_and_sends_as_proposed_12_s_later(
 
 def test_what_it_says_are_messages_of_the_protocol():
     traffic = played("ask_first").recorder.traffic or []
-    said = [decode(sent.payload).body for sent in traffic if sent.source == ROOM]
-    kinds = [type(body) for body in said if not isinstance(body, m.Heartbeat)]
+    reports = [decode(sent.payload).body for sent in traffic if sent.source == ROOM]
+    kinds = [type(body) for body in reports if not isinstance(body, m.Heartbeat)]
     wanted = [m.Registration, m.Acknowledge, m.GetProposal, m.Assign]
     assert list(dict.fromkeys(kind for kind in kinds if kind in wanted)) == wanted
     heard = [decode(sent.payload).body for sent in traffic if sent.destination == ROOM]

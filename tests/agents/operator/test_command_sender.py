@@ -133,7 +133,7 @@ def test_once_a_drive_is_over_its_pattern_sends_nothing():
 
 @pytest.mark.parametrize("off", [0, 1])
 def test_a_reply_counts_only_if_it_answers_the_command(off):
-    network, told = small_network(), list[str]()
+    network, reported = small_network(), list[str]()
     says = Outbox(ROBOT)
 
     def answer(request: Request) -> None:
@@ -141,11 +141,11 @@ def test_a_reply_counts_only_if_it_answers_the_command(off):
         request.answer(says.encode(PHONE, Reply(number + off, OK, ""), network.clock.now, 7))
 
     network.serve(ROBOT, answer)
-    sender = small_sender(network, ReqRep(), [1], told)
+    sender = small_sender(network, ReqRep(), [1], reported)
     sender.start()
     network.clock.run(1.0)
     assert sender.drive.refused[BAD_MESSAGE] == off * sender.drive.sent
-    assert ["no answer" in line for line in told[:1]] == [True] * off
+    assert ["no answer" in line for line in reported[:1]] == [True] * off
 
 
 class Ages(Recorder):

@@ -64,9 +64,9 @@ def test_the_story_says_what_an_operator_believes_of_the_link_and_not_that_it_is
     dva, log = driving("latest-wins")
     dva.field.robots[ROBOT].inbox._put = lambda *_: None  # type: ignore[method-assign]
     lost_after(dva, log)
-    told = [moment.what for moment in dva.stage.recorder.timeline]
-    assert any("does not move" in what for what in told)
-    assert not any("lost link" in what for what in told)
+    story = [moment.what for moment in dva.stage.recorder.timeline]
+    assert any("does not move" in what for what in story)
+    assert not any("lost link" in what for what in story)
 
 
 @pytest.mark.parametrize("pattern", ASKED)

@@ -57,9 +57,9 @@ def test_all_ways_of_steering_have_names():
     ],
 )
 def test_a_mistake_is_told_by_its_names(name, options, names):
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(ConfigError) as error:
         load_strategy(name, options)(person(), ROBOT)
-    assert unnamed(told.value, *names.split()) == []
+    assert unnamed(error.value, *names.split()) == []
 
 
 def test_a_scenario_refuses_a_strategy_that_there_is_not():
@@ -190,9 +190,9 @@ def test_in_a_run_failures_are_counted_and_told_once_a_drive(tmp_path):
         ),
         1,
     )
-    told = [moment.what for moment in run.recorder.timeline if "strategy fails" in moment.what]
-    assert len(told) == len(run.recorder.drives) > 0
-    assert unnamed(told[0], "ZeroDivisionError: division by zero") == []
+    story = [moment.what for moment in run.recorder.timeline if "strategy fails" in moment.what]
+    assert len(story) == len(run.recorder.drives) > 0
+    assert unnamed(story[0], "ZeroDivisionError: division by zero") == []
     assert counted(run.recorder.counters, "failed", "operator") > 100
 
 

@@ -262,8 +262,8 @@ class Told(Strategy):
 
 def test_the_oracle_steers_from_where_what_it_asks_for_takes_effect():
     without = drive(Pursuit(person(), ROBOT), way(*CORNER), 0.0, 40.0)
-    told = drive(Told(person(), ROBOT), way(*CORNER), 2.0, 40.0)
-    for ideal, at in zip(without, told, strict=True):
+    reported = drive(Told(person(), ROBOT), way(*CORNER), 2.0, 40.0)
+    for ideal, at in zip(without, reported, strict=True):
         assert at.wanted == pytest.approx(ideal.wanted, abs=1e-6)
 
 
@@ -272,12 +272,12 @@ def test_the_oracle_steers_from_where_what_it_asks_for_takes_effect():
 
 def test_who_adapts_changes_once_as_the_delay_grows_and_says_for_how_long():
     strategy = Adaptive(person(), ROBOT)
-    told = lambda now: 0.05 * now  # noqa: E731
-    track = drive(strategy, way((0, 0), (400, 0)), 0.5, 100.0, told=told)
+    reported = lambda now: 0.05 * now  # noqa: E731
+    track = drive(strategy, way((0, 0), (400, 0)), 0.5, 100.0, told=reported)
     assert strategy.using == "move_and_wait"
     assert strategy.switches == 1
     since = next(at.time for at in track[10:] if at.wanted == (0.0, 0.0))
-    assert 1.0 < told(since) < 3.0
+    assert 1.0 < reported(since) < 3.0
     share = strategy.workload()["move_and_wait_share"]
     assert share == pytest.approx((100.0 - since) / 100.0, abs=0.01)
 

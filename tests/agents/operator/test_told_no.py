@@ -40,17 +40,17 @@ def test_commands_that_come_late_are_counted_and_no_more(refusals):
 @pytest.mark.parametrize("code", PASSES)
 def test_commands_of_which_all_come_late_end_it_after_the_stated_time(refusals, code):
     refusals.answered(m.OK, 0.0)
-    said = [refusals.answered(code, 1.0 + 0.1 * n) for n in range(102)]
-    assert [bool(why) for why in said].index(True) == LATE_FOR / 0.1
-    assert said[100].endswith(f": {m.CODE_NAMES[code]} for 10 s")
+    reports = [refusals.answered(code, 1.0 + 0.1 * n) for n in range(102)]
+    assert [bool(why) for why in reports].index(True) == LATE_FOR / 0.1
+    assert reports[100].endswith(f": {m.CODE_NAMES[code]} for 10 s")
     assert refusals.last == code
 
 
 def test_word_that_all_come_late_counts_only_while_commands_are_sent(refusals):
     assert not any(refusals.held(ME, m.STALE, float(now), sent=1) for now in range(60))
     assert not refusals.held(ME, None, 60.0, sent=2)
-    said = [bool(refusals.held(ME, m.STALE, 61.0 + n, sent=3 + n)) for n in range(41)]
-    assert said == [False] * 40 + [True]
+    reports = [bool(refusals.held(ME, m.STALE, 61.0 + n, sent=3 + n)) for n in range(41)]
+    assert reports == [False] * 40 + [True]
     assert refusals.late
     assert SAYS_LATE_FOR > LEASE_S
     assert refusals.codes == {m.STALE: 1}
@@ -71,8 +71,8 @@ def test_word_of_a_holder_counts_once_the_robot_was_ours(refusals):
 
 
 def test_word_that_never_says_it_is_ours_counts_the_third_time(refusals):
-    said = [bool(refusals.held(ME, m.WRONG_MODE, float(n), n)) for n in range(3)]
-    assert said == [False, False, True]
+    reports = [bool(refusals.held(ME, m.WRONG_MODE, float(n), n)) for n in range(3)]
+    assert reports == [False, False, True]
 
 
 # --- a drive -----------------------------------------------------------------------------
@@ -93,8 +93,8 @@ def test_a_robot_that_refuses_every_command_is_given_up_with_an_alert(pattern):
     dva.field.robots[ROBOT].refuses = m.NOT_PERMITTED
     ends(dva, log, within=1.3)
     assert log.refused[m.NOT_PERMITTED] >= 1
-    told = [moment.what for moment in dva.stage.recorder.timeline]
-    assert any(what.startswith("is refused: ") and "not permitted" in what for what in told)
+    story = [moment.what for moment in dva.stage.recorder.timeline]
+    assert any(what.startswith("is refused: ") and "not permitted" in what for what in story)
 
 
 @pytest.mark.parametrize("code", PASSES)

@@ -118,6 +118,6 @@ def test_every_part_says_where_its_numbers_are_from(name):
     ],
 )
 def test_a_part_that_cannot_be_is_refused_by_its_keys(keys, names):
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(ConfigError) as error:
         validate(AccelerometerPart, keys)
-    assert unnamed(told.value, *names.split()) == []
+    assert unnamed(error.value, *names.split()) == []

@@ -148,9 +148,9 @@ def test_every_filter_answers_before_any_sample_has_come():
     ],
 )
 def test_what_cannot_be_is_told_by_its_names(name, options, names):
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(ConfigError) as error:
         made(name, **options)
-    assert unnamed(told.value, "filter", *names.split()) == []
+    assert unnamed(error.value, "filter", *names.split()) == []
 
 
 def test_a_filter_of_a_users_file_is_found(tmp_path):

@@ -113,6 +113,6 @@ def test_a_new_drive_forgets_what_was_integrated():
     ],
 )
 def test_what_cannot_be_is_told_by_its_names(name, options, names):
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(ConfigError) as error:
         made(name, **options)
-    assert unnamed(told.value, "mapping", *names.split()) == []
+    assert unnamed(error.value, "mapping", *names.split()) == []

@@ -38,15 +38,15 @@ class Recorded(Phone):
 
 def commands(app, feed, ask):
     """Commands of an app in ten seconds, read whenever it asks to be."""
-    now, said = 0.0, []
+    now, reports = 0.0, []
     while now < 10.0:
         feed(now)
         ask(now)
         command = app.look(now)
         if command is not None:
-            said.append((now, command.speed, command.turn_rate))
+            reports.append((now, command.speed, command.turn_rate))
         now = round(app.next_look(now, 10.0), 6)
-    return said
+    return reports
 
 
 @pytest.mark.parametrize("pipeline", ["default", "one_pole", "dissertation"])
@@ -72,17 +72,17 @@ def test_a_recorded_stream_gives_the_commands_of_the_simulated_phone(pipeline, m
             real.sample(*waiting.pop())
 
     looks = iter(wanted)
-    said = []
+    reported = []
     if profile.send == "on_change":
         # When it is looked at is for whoever sends: the same moments here.
         for now, *_ in looks:
             feed(now)
             command = real.look(now)
-            said.append((now, command.speed, command.turn_rate))
+            reported.append((now, command.speed, command.turn_rate))
     else:
-        said = commands(real, feed, lambda now: None)
+        reported = commands(real, feed, lambda now: None)
     assert len(wanted) > 10
-    assert said == wanted
+    assert reported == wanted
 
 
 def test_a_batch_that_is_late_does_not_make_it_look_without_end():

@@ -23,7 +23,7 @@ def stream(seconds, *, hz=60.0, fast=0.0, jitter=0.02, least=0.003, seed=1):
 def errors(samples):
     """Lateness of each converted time [s]."""
     clock = PhoneClock()
-    return [clock.times_of([told], came)[0] - true for true, told, came in samples]
+    return [clock.times_of([entry], came)[0] - true for true, entry, came in samples]
 
 
 def test_with_jitter_the_soonest_sample_sets_the_clock():
@@ -40,8 +40,8 @@ def test_a_clock_that_goes_wrong_by_100_ppm_is_followed_for_an_hour(fast):
 
 def test_a_late_burst_moves_nothing():
     clock = PhoneClock()
-    for _, told, came in stream(10.0, jitter=0.001):
-        clock.times_of([told], came)
+    for _, entry, came in stream(10.0, jitter=0.001):
+        clock.times_of([entry], came)
     before = clock.offset
     late = [1000.0 + 10.0 + n / 60 for n in range(30)]
     times = clock.times_of(late, 11.0)  # half a second of samples, half a second late
@@ -69,8 +69,8 @@ def test_who_begins_to_count_anew_is_believed_and_what_is_a_little_old_is_not():
 @given(st.lists(st.tuples(st.floats(0, 1e10), st.floats(0, 10.0)), min_size=1, max_size=50))
 def test_times_never_run_back_and_are_never_in_the_future(steps):
     clock, now, last = PhoneClock(), 0.0, float("-inf")
-    for told, passed in steps:
+    for entry, passed in steps:
         now += passed
-        (time,) = clock.times_of([told], now)
+        (time,) = clock.times_of([entry], now)
         assert last <= time <= now
         last = time

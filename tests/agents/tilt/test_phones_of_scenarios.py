@@ -29,9 +29,9 @@ class Mine(Filter):
     ],
 )
 def test_a_wrong_stage_is_refused_before_the_run(key, value, names):
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(ConfigError) as error:
         scenarios.build(scenarios.load("drive-to-event"), {key: value})
-    assert unnamed(told.value, *names.split()) == []
+    assert unnamed(error.value, *names.split()) == []
 
 
 @pytest.mark.parametrize(
@@ -92,12 +92,12 @@ def test_a_stage_that_fails_is_told_at_once_and_counted_in_the_row_of_its_run(
     )
     own = {f"phone.{stage.lower()}": f"{file}:Mine", "horizon_s": 60}
     run = simulate(scenarios.build(scenarios.load("drive-to-event"), own), 1)
-    told = [moment for moment in run.recorder.timeline if "holds a phone" in moment.what]
-    assert len(told) == sum(d.started is not None for d in run.recorder.drives)
-    assert unnamed(told[0].what, "ZeroDivisionError: division by zero") == []
+    story = [moment for moment in run.recorder.timeline if "holds a phone" in moment.what]
+    assert len(story) == sum(d.started is not None for d in run.recorder.drives)
+    assert unnamed(story[0].what, "ZeroDivisionError: division by zero") == []
     begun = run.recorder.drives[0].started
     assert begun is not None
-    assert begun <= told[0].time < begun + 3.0
+    assert begun <= story[0].time < begun + 3.0
     assert episode_measures.run_row(run)["plugin_failures"] > 100
 
 

@@ -6,26 +6,26 @@ from dva_sim.kernel.errors import ConfigError, DvaSimError
 
 
 def test_an_action_is_done_once_and_answered_as_often_as_it_is_said():
-    answers, done, told = Answers(), [], []
+    answers, done, reports = Answers(), [], []
 
     def do(said):
         done.append(1)
         said(True, "done", more=3)
 
     for _ in range(3):
-        answers.once("1", do, told.append)
+        answers.once("1", do, reports.append)
     assert done == [1]
-    assert told == [{"k": "done", "id": "1", "ok": True, "text": "done", "more": 3}] * 3
+    assert reports == [{"k": "done", "id": "1", "ok": True, "text": "done", "more": 3}] * 3
 
 
 def test_who_asks_again_before_there_is_an_answer_is_told_with_it():
-    answers, waiting, told = Answers(), [], []
-    answers.once("1", waiting.append, told.append)
-    answers.once("1", waiting.append, told.append)
-    assert told == []
-    (said,) = waiting
-    said(True, "at last")
-    assert [answer["text"] for answer in told] == ["at last"]
+    answers, waiting, reports = Answers(), [], []
+    answers.once("1", waiting.append, reports.append)
+    answers.once("1", waiting.append, reports.append)
+    assert reports == []
+    (text,) = waiting
+    text(True, "at last")
+    assert [answer["text"] for answer in reports] == ["at last"]
 
 
 @pytest.mark.parametrize("error", [Refused("no"), ConfigError("no"), DvaSimError("no")])
@@ -33,9 +33,9 @@ def test_what_is_refused_is_the_answer(error):
     def do(said):
         raise error
 
-    answers, told = Answers(), []
-    answers.once("1", do, told.append)
-    assert told == [{"k": "done", "id": "1", "ok": False, "text": "no"}]
+    answers, reports = Answers(), []
+    answers.once("1", do, reports.append)
+    assert reports == [{"k": "done", "id": "1", "ok": False, "text": "no"}]
 
 
 def test_answers_are_forgotten_in_time():

@@ -25,7 +25,8 @@ def page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[AttachedPa
 def lists(page: AttachedPage) -> list[list[str]]:
     """All lists that the page was told, as their texts and states."""
     return [
-        [f"{row['text']}: {row['state']}" for row in told["alarms"]] for told in page.told("alarms")
+        [f"{row['text']}: {row['state']}" for row in entry["alarms"]]
+        for entry in page.told("alarms")
     ]
 
 
@@ -53,7 +54,7 @@ def test_an_alarm_is_shelved_by_name_and_comes_back(page):
 
 def test_while_the_dva_does_not_answer_alarms_stay_and_none_comes(page):
     page.alarms()
-    told = len(lists(page))
+    reported = len(lists(page))
     assert page.world.do("server_stop")[0]
     page.let(UNHEARD + 30.0)  # by now its list counts as old, and names nobody to be sent
     assert not page.system.answers
@@ -61,12 +62,12 @@ def test_while_the_dva_does_not_answer_alarms_stay_and_none_comes(page):
     page.until(lambda: page.system.answers and page.system.is_told)
     page.let(1.0)
 
-    assert {tuple(each) for each in lists(page)[told:]} <= {(f"{FIRE}: unacknowledged",)}
+    assert {tuple(each) for each in lists(page)[reported:]} <= {(f"{FIRE}: unacknowledged",)}
 
 
 def test_after_a_restart_of_the_dva_alarms_neither_vanish_nor_come_back(page):
     page.alarms()
-    told = len(lists(page))
+    reported = len(lists(page))
     listed, page.system.agent.on_list = page.system.agent.on_list, lambda: None
     page.world.world.run.dva.dismiss(OWN)  # it knows nothing of this console any more
     page.until(lambda: not page.system.is_told)
@@ -75,7 +76,7 @@ def test_after_a_restart_of_the_dva_alarms_neither_vanish_nor_come_back(page):
     page.until(lambda: page.system.is_told)
     page.let(2.0)
 
-    assert {tuple(each) for each in lists(page)[told:]} <= {(f"{FIRE}: unacknowledged",)}
+    assert {tuple(each) for each in lists(page)[reported:]} <= {(f"{FIRE}: unacknowledged",)}
     assert all(line["events"] for line in page.told("events")[1:])
 
 

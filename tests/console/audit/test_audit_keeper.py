@@ -24,10 +24,10 @@ def keeper(tmp_path: Path) -> Iterator[AuditKeeper]:
 
 def told(keeper: AuditKeeper, action: str) -> list[str]:
     """Result of keeping an action: an empty text once it is on disk."""
-    said: list[str] = []
-    keeper.put(keeper.entry(action, "ana"), said.append)
-    assert becomes(lambda: keeper.take() or said)
-    return said
+    reports: list[str] = []
+    keeper.put(keeper.entry(action, "ana"), reports.append)
+    assert becomes(lambda: keeper.take() or reports)
+    return reports
 
 
 def test_who_waits_for_a_row_is_told_when_it_is_in_the_file(keeper):
@@ -58,10 +58,10 @@ def test_on_a_full_disk_nobody_is_told_that_it_is_done_and_nothing_is_lost(keepe
     assert told(keeper, "before") == [""]
     keeper._log._file.execute("PRAGMA max_page_count = 1")
     big: dict[str, Any] = {"text": "x" * 100_000}
-    said: list[str] = []
-    keeper.put(keeper.entry("assign", **big), said.append)
-    assert becomes(lambda: keeper.take() or said)
-    assert "full" in said[0]
+    reports: list[str] = []
+    keeper.put(keeper.entry("assign", **big), reports.append)
+    assert becomes(lambda: keeper.take() or reports)
+    assert "full" in reports[0]
     assert "full" in keeper.problem
 
     keeper._log._file.execute("PRAGMA max_page_count = 100000")
@@ -71,12 +71,12 @@ def test_on_a_full_disk_nobody_is_told_that_it_is_done_and_nothing_is_lost(keepe
 
 def test_what_waits_for_a_full_disk_is_bounded_and_what_was_lost_is_told(keeper, monkeypatch):
     monkeypatch.setattr(audit_keeper, "MOST_WAITING", 0)
-    said: list[str] = []
-    keeper.put(keeper.entry("one too many"), said.append)
+    reports: list[str] = []
+    keeper.put(keeper.entry("one too many"), reports.append)
     monkeypatch.undo()
     keeper.close()
 
-    assert "too much waits" in said[0]
+    assert "too much waits" in reports[0]
     assert re.search(r"\b1\b", read_rows(keeper.path)[-1].text)
 
 

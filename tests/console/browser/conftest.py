@@ -57,11 +57,11 @@ def running(folder: Path, command: list[str]) -> Iterator[World]:
     with out.open("wb") as file:
         process = subprocess.Popen([sys.executable, *command], stdout=file, stderr=file)
     try:
-        told = re.compile(r"^(Console|Look only|Phone): +(https?:\S+)", re.MULTILINE)
+        reported = re.compile(r"^(Console|Look only|Phone): +(https?:\S+)", re.MULTILINE)
         becomes(lambda: "Console:" in out.read_text() or process.poll() is not None)
         becomes(lambda: "Phone:" in out.read_text() or process.poll() is not None)
         becomes(lambda: out.read_text().endswith("\n"))
-        found = dict(told.findall(out.read_text()))
+        found = dict(reported.findall(out.read_text()))
         assert "Console" in found, out.read_text()
         look = found.get("Look only", found["Console"])
         yield World(found["Console"], look, found.get("Phone", ""))

@@ -95,9 +95,9 @@ def test_a_fire_is_acknowledged_sent_to_taken_over_reached_over_250_ms_and_confi
         assert checked.ends() == 0, checked.said + checked.complained
     in_order(ROWS, [row.action for row in read_rows(audit)])
     sent = list(read_recording(record).playback.recorder.traffic or ())
-    said = [one.payload for one in sent if isinstance(one.payload, bytes)]
-    in_order(MESSAGES, said)
-    assert [found for data in said for found in check_message(data)] == []
+    reports = [one.payload for one in sent if isinstance(one.payload, bytes)]
+    in_order(MESSAGES, reports)
+    assert [found for data in reports for found in check_message(data)] == []
     assert all(one.time <= later.time for one, later in pairwise(sent))
 
 

@@ -45,12 +45,12 @@ def new_in_hand(page: Page) -> Iterator[Callable[[], int]]:
 
     Until the answer is here, another event may be in hand, even one of the same kind.
     """
-    told = page.get_by_role("status", name="Raised")
-    before = told.inner_text()
+    reported = page.get_by_role("status", name="Raised")
+    before = reported.inner_text()
     number = 0
     yield lambda: number
-    expect(told).to_have_text(re.compile(rf"^(?!{before}$)event \d+ is raised$"))
-    number = int(told.inner_text().split()[1])
+    expect(reported).to_have_text(re.compile(rf"^(?!{before}$)event \d+ is raised$"))
+    number = int(reported.inner_text().split()[1])
     heading = page.get_by_role("region", name="Event in hand").get_by_role("heading", level=2)
     expect(heading).to_contain_text(f"{number} ")
 

@@ -153,13 +153,13 @@ def test_two_people_see_the_same_moment(drilled):
 
 def test_a_line_of_the_story_leads_to_its_moment(drilled):
     page = drilled("story")
-    told = page.get_by_role("list", name="Told so far")
-    expect(told).to_have_count(0)  # the time in the bar may be ahead of the lists
+    reported = page.get_by_role("list", name="Told so far")
+    expect(reported).to_have_count(0)  # the time in the bar may be ahead of the lists
     later = page.get_by_role("list", name="Still to come").get_by_role("button")
     text = later.nth(2).inner_text()
     later.nth(2).click()
 
-    expect(told.get_by_role("button").last).to_have_text("".join(text.split("\n")))
+    expect(reported.get_by_role("button").last).to_have_text("".join(text.split("\n")))
     minutes, seconds = map(int, re.search(r"0:(\d\d):(\d\d)", text).groups())
     assert becomes(lambda: shown(page) == 60 * minutes + seconds)
 

@@ -70,10 +70,10 @@ def test_a_robot_is_registered_opened_driven_by_a_strange_client_and_switched_of
     expect(station).to_contain_text(f"listening on {address}")
     expect(page.locator(".picture-age")).to_contain_text("old")
 
-    said = subprocess.run(
+    ended = subprocess.run(
         [sys.executable, client(tmp_path), dva], capture_output=True, text=True, timeout=PATIENCE_S
     )
-    assert "code 0" in said.stdout, said.stderr
+    assert "code 0" in ended.stdout, ended.stderr
     log = page.get_by_role("table", name="Messages")
     expect(log).to_contain_text("StopTeleOp")
     kinds = [row.split()[0] for row in log.locator("td.payload").all_inner_texts()]
@@ -114,8 +114,8 @@ def test_a_robot_that_registers_at_once_is_driven_by_hand_and_busy_for_a_client_
     expect(log).to_contain_text("busy: driven by hand", timeout=1000 * PATIENCE_S)
     page.get_by_role("button", name="Emergency stop").click()
     expect(page.get_by_role("status", name="Reason")).to_contain_text("by its own button")
-    said, _ = other.communicate(timeout=2 * PATIENCE_S)
-    assert b"code 0" in said
+    text, _ = other.communicate(timeout=2 * PATIENCE_S)
+    assert b"code 0" in text
 
 
 def test_a_dva_that_is_not_there_is_told_and_the_robot_stays_off(visit, programs):
@@ -126,8 +126,8 @@ def test_a_dva_that_is_not_there_is_told_and_the_robot_stays_off(visit, programs
     expect(page.get_by_text("should be HOST:PORT").first).to_be_visible()
     page.get_by_label("DVA").fill(nobody)
     page.get_by_role("button", name="Register").click()
-    told = page.get_by_role("status", name="Station")
-    expect(told).to_contain_text(f"no DVA answers at {nobody} within 1.5 s")
+    reported = page.get_by_role("status", name="Station")
+    expect(reported).to_contain_text(f"no DVA answers at {nobody} within 1.5 s")
     assert state(page) == "off"
     assert [link.inner_text() for link in page.locator(".rail a").all()] == [
         "Map",

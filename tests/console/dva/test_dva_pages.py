@@ -93,9 +93,9 @@ def test_a_person_is_told_for_how_long_the_server_has_been_silent(page):
     page.do("server_stop")
     page.let(15.0)
     alerts = [line["alert"] for line in page.told("seat") if line["seat"] == page.client]
-    told = dict.fromkeys(alert for alert in alerts if alert)
-    assert len(told) > 2
-    assert all(re.search(r"DVA.* 1[1-6] s", alert) for alert in told)
+    reported = dict.fromkeys(alert for alert in alerts if alert)
+    assert len(reported) > 2
+    assert all(re.search(r"DVA.* 1[1-6] s", alert) for alert in reported)
     page.do("server_start", port=5555)
     page.let(5.0)
     assert page.seat()["alert"] == ""
@@ -105,11 +105,11 @@ def test_a_person_is_told_for_how_long_the_server_has_been_silent(page):
 
 def test_a_stopped_server_decides_and_says_nothing(page):
     page.do("server_stop")
-    sent, told = [], page.world.recorder.message_sent
+    sent, reported = [], page.world.recorder.message_sent
 
     def note(time, source, *about):
         sent.extend([source] if source == DVA else [])
-        told(time, source, *about)
+        reported(time, source, *about)
 
     page.world.recorder.message_sent = note
     page.let(90.0)  # in which fire and gas would have been reported, and guards sent
@@ -141,8 +141,8 @@ def test_over_sockets_the_port_is_closed_and_another_one_opened(real):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    ok, told = real.do("server_start", port=min(port, 60_000))
-    assert (ok, unnamed(told, f"127.0.0.1:{min(port, 60_000)}")) == (True, [])
+    ok, text = real.do("server_start", port=min(port, 60_000))
+    assert (ok, unnamed(text, f"127.0.0.1:{min(port, 60_000)}")) == (True, [])
     assert asked_of(real, someone(real), DVA, m.GetDeviceList()).code == m.OK
 
 
@@ -151,9 +151,9 @@ def test_over_sockets_a_port_that_is_taken_is_told_and_the_server_stays_stopped(
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
-        ok, told = real.do("server_start", port=taken.getsockname()[1])
+        ok, text = real.do("server_start", port=taken.getsockname()[1])
     assert not ok
-    assert "cannot listen" in told
+    assert "cannot listen" in text
     assert real.world.dva.port.listens is False
 
 
@@ -183,9 +183,9 @@ def test_a_phone_that_chooses_a_fake_robot_is_told_that_nobody_answers(page):
     page.do("fake_add", label="ghost", type="Robot")
     page.do("phone_register", server="192.168.0.2", port=5555, label="p", type="Teleoperation")
     assert page.do("phone_permission", device=GHOST, level="both")[0]
-    ok, told = page.do("start", within=PATIENCE_S)
+    ok, text = page.do("start", within=PATIENCE_S)
     assert not ok
-    assert told.startswith("ghost")
+    assert text.startswith("ghost")
 
 
 def test_a_fake_device_speaks_as_others_do(page):

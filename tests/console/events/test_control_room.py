@@ -39,8 +39,8 @@ def fire(one: PhonePage) -> None:
 
 def events(one: PhonePage) -> list[dict[str, Any]]:
     """Events as a page receives them."""
-    told = one.told("events")
-    return list(told[-1]["events"]) if told else []
+    shown = one.told("events")
+    return list(shown[-1]["events"]) if shown else []
 
 
 def event(one: PhonePage, number: int = 1) -> dict[str, Any]:
@@ -205,8 +205,8 @@ def test_the_policy_acts_by_itself_once_it_is_let(room):
 
     room.let(1.0)
     assert event(room)["assigned"]
-    told = room.told("control")[-1]["dispatch"]
-    assert (told["mode"], told["switched"]["label"]) == ("automatic", "ana")
+    shown = room.told("control")[-1]["dispatch"]
+    assert (shown["mode"], shown["switched"]["label"]) == ("automatic", "ana")
 
 
 def test_a_robot_that_another_drives_is_taken_over_with_what_it_was_sent_to(room):
@@ -279,10 +279,10 @@ def test_every_message_of_a_control_room_keeps_the_schema(room):
     room.do("event_acknowledge", event=1)
     room.do("event_assign", event=1, device="guard-1", reason='<b>why & "how"</b>')
     room.do("event_note", event=1, text="<script>alert(1)</script>")
-    said = sent_by(room, "ana")
+    messages = sent_by(room, "ana")
 
-    assert len(said) > 5
-    assert [found for data in said for found in check_message(data)] == []
+    assert len(messages) > 5
+    assert [found for data in messages for found in check_message(data)] == []
 
 
 # --- the audit log ----------------------------------------------------------------------------

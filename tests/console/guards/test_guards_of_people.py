@@ -97,11 +97,11 @@ def test_a_person_answers_goes_and_confirms_by_the_protocol_of_all_guards(page):
     done, text = page.do("guard_say", what="confirmed")
     assert done, text
     page.let(1.0)
-    told = event(page).times
-    assert told["departed"] <= told["arrived"] <= told["confirmed"]
-    said = b"".join(x[2] for x in page.heard if x[0] == guard(page).device.id_tag)
+    reported = event(page).times
+    assert reported["departed"] <= reported["arrived"] <= reported["confirmed"]
+    words = b"".join(x[2] for x in page.heard if x[0] == guard(page).device.id_tag)
     for word in (b"accepted", b"departed", b"arrived", b"confirmed", b"done"):
-        assert word in said
+        assert word in words
 
 
 def test_a_refuted_event_is_over(page):

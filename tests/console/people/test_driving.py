@@ -128,14 +128,14 @@ def test_an_emergency_with_an_id_that_was_used_before_stops_all_the_same(driving
     driving.actions.take(line)  # by another path, at the same time: the same one
     driving.let(2.0)
     assert driving.robot().controller.mode is Mode.IDLE
-    answers = [told for told in driving.told("done") if told["id"] == "x"]
+    answers = [entry for entry in driving.told("done") if entry["id"] == "x"]
     assert driving.do("start")[0]
     driving.let(2.0)
     assert driving.robot().controller.mode is Mode.TELEOPERATION
     driving.actions.take(line)
     driving.let(1.0)
     assert driving.robot().controller.mode is Mode.IDLE
-    assert len([told for told in driving.told("done") if told["id"] == "x"]) == len(answers) + 1
+    assert len([entry for entry in driving.told("done") if entry["id"] == "x"]) == len(answers) + 1
 
 
 def test_an_action_said_twice_is_done_once_and_answered_twice(page):
@@ -143,7 +143,7 @@ def test_an_action_said_twice_is_done_once_and_answered_twice(page):
     page.actions.take(line)
     page.let(2.0)
     page.actions.take(line)
-    answers = [told for told in page.told("done") if told["id"] == "once"]
+    answers = [entry for entry in page.told("done") if entry["id"] == "once"]
     assert len(answers) == 2
     assert answers[0]["text"] == answers[1]["text"] == "robot-1 is yours"
 
@@ -261,9 +261,9 @@ def test_a_robot_that_pushes_against_something_says_so_while_it_creeps(driving):
         if robot.body.in_contact and robot.body.speed < 0.05:
             break
     driving.let(0.6)
-    told = driving.told("rows")[-1]["robots"][0]["stands"]
+    shown = driving.told("rows")[-1]["robots"][0]["stands"]
     assert not before
-    assert any(word in told for word in ("way", "stuck"))
+    assert any(word in shown for word in ("way", "stuck"))
 
 
 def test_the_age_of_an_event_is_that_of_its_state(page):

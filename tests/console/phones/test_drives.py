@@ -22,12 +22,12 @@ def driving(page):
 
 def kinds(page, to):
     """Kinds of the messages from a phone to one receiver, in order, without repeats."""
-    said = [
+    reports = [
         data
         for source, there, data in page.heard
         if source.startswith("02:00:00:06") and there == to
     ]
-    names = [name for data in said if (name := _kind(data))]
+    names = [name for data in reports if (name := _kind(data))]
     return [name for n, name in enumerate(names) if n == 0 or names[n - 1] != name]
 
 
@@ -73,8 +73,8 @@ def test_the_messages_come_in_the_order_of_the_document(driving):
     at_dva = kinds(driving, dva)
     assert [n for n in at_dva if n != "RegMsg"] == ["PermissionRequest", "GetDeviceList"]
     assert at_dva[0] == "RegMsg"
-    said = kinds(driving, robot)
-    assert said == ["GetSensorInfo", "StartTeleOp", "SetTeleOp", "StopTeleOp"]
+    messages = kinds(driving, robot)
+    assert messages == ["GetSensorInfo", "StartTeleOp", "SetTeleOp", "StopTeleOp"]
 
 
 def test_the_device_list_names_the_phone_and_the_robots(page):

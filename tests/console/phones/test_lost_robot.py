@@ -45,12 +45,12 @@ def test_a_fake_device_ends_in_a_message_and_not_in_a_hang(page):
     fake = listed["fake/<b>robot</b>"]
     assert page.ask("phone_permission", device=fake["id"], level="teleoperation")["ok"]
     page.let(9.5)
-    told = f"fake/<b>robot</b>: link lost: no answer at {fake['address']}"
-    assert page.seat()["alert"] == told
+    words = f"fake/<b>robot</b>: link lost: no answer at {fake['address']}"
+    assert page.seat()["alert"] == words
     done, text = page.do("start")
     assert not done
     assert "fake/<b>robot</b>" in text
-    assert told.partition(": ")[2] in page.seat()["alert"]
+    assert words.partition(": ")[2] in page.seat()["alert"]
     assert page.permit()["ok"]  # and another robot can be chosen
 
 

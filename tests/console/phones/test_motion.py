@@ -128,8 +128,8 @@ def test_the_command_tells_figures_and_writes_a_part_that_can_be_named(at_rest, 
 
 def test_the_command_prints_commands(drive, tmp_path):
     drive(tmp_path)
-    told = call("phone-log", tmp_path / "motion-1.csv", "--commands", "--rate", "20")
-    first, *rows = told.stdout.splitlines()
+    ended = call("phone-log", tmp_path / "motion-1.csv", "--commands", "--rate", "20")
+    first, *rows = ended.stdout.splitlines()
     assert first.startswith("t_s,speed_mps")
     assert len(rows) > 20
 

@@ -189,9 +189,9 @@ SOUND = TIMES.flatmap(
 @given(MESSAGES)
 def test_any_message_is_samples_or_nothing(message):
     with suppress(BadMessage):
-        said = samples_of(ACTIONS["samples"].read(message))
-        assert len(said.at) == len(said.xyz) <= 64
-        assert all(math.isfinite(x) for one in said.xyz for x in one)
+        reported = samples_of(ACTIONS["samples"].read(message))
+        assert len(reported.at) == len(reported.xyz) <= 64
+        assert all(math.isfinite(x) for one in reported.xyz for x in one)
 
 
 @given(st.dictionaries(st.sampled_from(["reference_mps2", "speed_step_mps2", "pipeline"]), NUMBERS))

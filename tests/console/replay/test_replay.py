@@ -78,8 +78,8 @@ def playing():
         return made[-1]
 
     yield play
-    for told in made:
-        told.player.close()
+    for entry in made:
+        entry.player.close()
 
 
 @pytest.mark.system
@@ -165,65 +165,65 @@ def test_a_driver_sees_the_picture_that_had_come_by_then(recorded):
 
 
 def test_a_jump_back_tells_the_moment_it_leads_to(recorded, playing):
-    told = playing(recorded)
-    assert told.ask("seek", "1", t_ms=80_000)["ok"]
-    late = told.lines["told"]["lines"]
-    assert told.lines["rows"]["t"] == 80_000
-    assert told.ask("seek", "2", t_ms=20_000)["ok"]
-    early = told.lines["told"]["lines"]
-    assert told.lines["rows"]["t"] == 20_000
+    lines = playing(recorded)
+    assert lines.ask("seek", "1", t_ms=80_000)["ok"]
+    late = lines.lines["told"]["lines"]
+    assert lines.lines["rows"]["t"] == 80_000
+    assert lines.ask("seek", "2", t_ms=20_000)["ok"]
+    early = lines.lines["told"]["lines"]
+    assert lines.lines["rows"]["t"] == 20_000
     assert len(early) < len(late)
     assert all(line["t"] <= 20_000 for line in early)
-    assert told.lines["rows"]["clock"]["jumps"] == 2
+    assert lines.lines["rows"]["clock"]["jumps"] == 2
 
 
 def test_the_same_question_is_answered_once_and_done_once(recorded, playing):
-    told = playing(recorded)
-    told.ask("seek", "1", t_ms=50_000)
-    told.ask("seek", "2", t_ms=10_000)
-    told.ask("seek", "1", t_ms=50_000)
-    assert round(told.player.now) == 10
+    lines = playing(recorded)
+    lines.ask("seek", "1", t_ms=50_000)
+    lines.ask("seek", "2", t_ms=10_000)
+    lines.ask("seek", "1", t_ms=50_000)
+    assert round(lines.player.now) == 10
 
 
 def test_what_would_tell_somebody_something_is_refused(recorded, playing):
-    told = playing(recorded)
+    lines = playing(recorded)
     for what in ("take", "start", "emergency", "link", "phone_register", "guard_join"):
-        answer = told.ask(what, what)
+        answer = lines.ask(what, what)
         assert (answer["ok"], answer["text"]) == (False, NOBODY)
 
 
 @pytest.mark.parametrize("factor", [0.01, 25.0])
 def test_it_is_played_within_bounds(recorded, factor, playing):
-    told = playing(recorded)
-    assert not told.ask("pace", factor=factor)["ok"]
+    lines = playing(recorded)
+    assert not lines.ask("pace", factor=factor)["ok"]
 
 
 def test_at_its_end_it_stands_and_play_begins_anew(recorded, playing):
-    told = playing(recorded)
-    told.ask("seek", "1", t_ms=10**9)
-    assert told.player.now == recorded.duration
-    assert told.lines["rows"]["clock"]["paused"]
-    told.ask("pace", "2", paused=False)
-    assert told.player.now < 1.0
+    lines = playing(recorded)
+    lines.ask("seek", "1", t_ms=10**9)
+    assert lines.player.now == recorded.duration
+    assert lines.lines["rows"]["clock"]["paused"]
+    lines.ask("pace", "2", paused=False)
+    assert lines.player.now < 1.0
 
 
 def test_pictures_are_drawn_of_the_site_in_the_file_which_is_gone_afterwards(recorded, playing):
-    told = playing(recorded)
-    (scene,) = [line for line in told.shown if line["k"] == "scene"]
+    lines = playing(recorded)
+    (scene,) = [line for line in lines.shown if line["k"] == "scene"]
     site = Path(scene["scenario"]["site"]["name"])
     assert site.exists()
-    told.player.close()
+    lines.player.close()
     assert not site.exists()
 
 
 def test_frames_are_told_of_robots_that_somebody_looks_at_alone(recorded, playing):
-    told = playing(recorded)
-    told.shown.clear()
-    told.player._show_frames()
-    assert told.shown == []
-    told.player.take({"do": "watch", "robots": [0]})
-    told.player._show_frames()
-    assert [line["robot"] for line in told.shown] == [0]
+    lines = playing(recorded)
+    lines.shown.clear()
+    lines.player._show_frames()
+    assert lines.shown == []
+    lines.player.take({"do": "watch", "robots": [0]})
+    lines.player._show_frames()
+    assert [line["robot"] for line in lines.shown] == [0]
 
 
 # --- recordings of a folder ---------------------------------------------------------------
@@ -242,49 +242,49 @@ def test_a_folder_without_recordings_is_told(tmp_path):
 
 @pytest.mark.parametrize("name", ["../drill.mcap", "other.mcap", "drill.mcap/"])
 def test_only_what_is_on_the_list_is_opened(files, name, playing):
-    told = playing(None, Shelf(files))
-    answer = told.ask("open_recording", name=name)
+    lines = playing(None, Shelf(files))
+    answer = lines.ask("open_recording", name=name)
     assert not answer["ok"]
     assert "there is no recording" in answer["text"]
 
 
 def test_one_of_the_list_is_played_from_its_beginning(files, playing):
-    told = playing(None, Shelf(files))
-    assert told.lines["scene"]["replay"] is None
-    assert told.ask("open_recording", name="drill.mcap")["ok"]
-    assert told.lines["scene"]["replay"]["name"] == "drill.mcap"
-    assert told.lines["rows"]["t"] < 1000
+    lines = playing(None, Shelf(files))
+    assert lines.lines["scene"]["replay"] is None
+    assert lines.ask("open_recording", name="drill.mcap")["ok"]
+    assert lines.lines["scene"]["replay"]["name"] == "drill.mcap"
+    assert lines.lines["rows"]["t"] < 1000
 
 
 def test_a_recording_that_is_damaged_is_told_and_the_one_before_goes_on(files, tmp_path, playing):
     shutil.copy(files / "drill.mcap", tmp_path / "good.mcap")
     (tmp_path / "bad.mcap").write_bytes(b"no recording at all")
-    told = playing(None, Shelf(tmp_path))
-    assert told.ask("open_recording", "1", name="good.mcap")["ok"]
-    answer = told.ask("open_recording", "2", name="bad.mcap")
+    lines = playing(None, Shelf(tmp_path))
+    assert lines.ask("open_recording", "1", name="good.mcap")["ok"]
+    answer = lines.ask("open_recording", "2", name="bad.mcap")
     assert not answer["ok"]
     assert "is not a recording" in answer["text"]
-    assert told.player.run.name == "good.mcap"
+    assert lines.player.run.name == "good.mcap"
 
 
 # --- logs and windows ----------------------------------------------------------------------
 
 
 def test_a_log_is_told_up_to_the_moment_and_anew_after_a_jump(recorded, playing):
-    told = playing(recorded)
-    told.ask("seek", "1", t_ms=80_000)
-    told.logs.clear()
-    told.player.take({"do": "look", "logs": {"dva": False}, "tables": []})
-    late = [row for line in told.logs for row in line["lines"]]
-    assert told.logs[0]["anew"]
+    lines = playing(recorded)
+    lines.ask("seek", "1", t_ms=80_000)
+    lines.logs.clear()
+    lines.player.take({"do": "look", "logs": {"dva": False}, "tables": []})
+    late = [row for line in lines.logs for row in line["lines"]]
+    assert lines.logs[0]["anew"]
     assert late[-1][1] <= 80_000
     assert [row[0] for row in late] == list(range(1, len(late) + 1))
 
-    told.logs.clear()
-    told.ask("seek", "2", t_ms=10_000)
-    told.player._tell_logs()
-    early = [row for line in told.logs for row in line["lines"]]
-    assert told.logs[0]["anew"]
+    lines.logs.clear()
+    lines.ask("seek", "2", t_ms=10_000)
+    lines.player._tell_logs()
+    early = [row for line in lines.logs for row in line["lines"]]
+    assert lines.logs[0]["anew"]
     assert early == late[: len(early)]
     assert 0 < len(early) < len(late)
 
@@ -345,19 +345,19 @@ def test_the_rows_of_an_audit_log_are_those_of_the_recording_that_is_played(tmp_
     log.close()
     write_recording(drill(), tmp_path / "a.mcap", audit=[(1.0, plain_row(row)) for row in rows])
     write_recording(drill(), tmp_path / "b.mcap")
-    told = playing(None, Shelf(tmp_path))
-    told.ask("open_recording", "1", name="a.mcap")
+    lines = playing(None, Shelf(tmp_path))
+    lines.ask("open_recording", "1", name="a.mcap")
 
-    path = told.player.audit.path
+    path = lines.player.audit.path
     assert rows_of(path) == rows
     assert rows_of(path, after=1) == rows[1:]
-    assert told.lines["scene"]["replay"]["audit"]
-    stands = told.lines["audit"]
+    assert lines.lines["scene"]["replay"]["audit"]
+    stands = lines.lines["audit"]
     assert (stands["rows"], stands["hash"], stands["file"]) == (2, rows[1].hash, "a.mcap")
 
-    told.ask("open_recording", "2", name="b.mcap")
+    lines.ask("open_recording", "2", name="b.mcap")
     assert rows_of(path) == []
-    assert not told.lines["scene"]["replay"]["audit"]
+    assert not lines.lines["scene"]["replay"]["audit"]
 
 
 def test_what_a_page_gets_of_a_recording_is_as_declared(playing, recorded):
@@ -367,5 +367,5 @@ def test_what_a_page_gets_of_a_recording_is_as_declared(playing, recorded):
     for t_ms in (20_000, 40_000):
         played.ask("seek", str(t_ms), t_ms=t_ms)
         played.player.take({"do": "look", "client": "c"} | looked)
-    told = {message["k"] for message in at_page(played.told, "c")}
-    assert told >= {"snap", "d", "rows", "robot", "log", "devices", "events", "told", "hazards"}
+    kinds = {message["k"] for message in at_page(played.told, "c")}
+    assert kinds >= {"snap", "d", "rows", "robot", "log", "devices", "events", "told", "hazards"}

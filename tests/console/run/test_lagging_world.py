@@ -54,8 +54,8 @@ def test_a_slow_callback_stops_who_is_driven_and_nothing_begins_again_by_itself(
     world.lines.clear()
     world.clock.call_after(0.1, time.sleep, 0.6)
     assert lets_time_pass(world, lambda: robot.controller.mode is Mode.IDLE)
-    told = lambda: any("behind real" in line.get("what", "") for line in world.lines)  # noqa: E731
-    assert lets_time_pass(world, told)
+    reported = lambda: any("behind real" in line.get("what", "") for line in world.lines)  # noqa: E731
+    assert lets_time_pass(world, reported)
     assert lets_time_pass(world, lambda: not world.lag.held)
     world.clock.run(world.clock.now + 1.0)
     assert robot.controller.mode is Mode.IDLE

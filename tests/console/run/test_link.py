@@ -24,9 +24,9 @@ def test_jitter_takes_the_place_of_a_law_and_loss_that_of_bursts():
 
 def test_a_delay_that_a_law_cannot_have_is_refused_in_a_line():
     law = {"law": "normal", "sd_s": 0.05}
-    with pytest.raises(ConfigError) as told:
+    with pytest.raises(ConfigError) as error:
         changed(LinkConfig(delay_s=0.2, delay_law=law), {"delay_s": 0.01})
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("given", [{"delay_s": 5.1}, {"loss": "much"}, {"rate_bps": True}])

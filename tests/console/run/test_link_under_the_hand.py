@@ -110,8 +110,8 @@ def test_over_a_long_link_a_robot_is_still_taken_and_says_why_it_stands(monkeypa
     assert done, text
     page.want(0.3)
     page.let(20.0)
-    told = page.told("rows")[-1]["robots"][0]["stands"]
-    assert "3 s" in told
+    shown = page.told("rows")[-1]["robots"][0]["stands"]
+    assert "3 s" in shown
 
 
 def test_the_rate_of_a_recorded_link_is_the_recordings(monkeypatch, tmp_path):
@@ -148,8 +148,8 @@ def test_until_the_first_command_comes_the_robot_says_what_it_waits_for(monkeypa
     assert page.do("link", delay_s=0.5)[0]
     page.let(10.0)
     page.sets_out(then=0.6)
-    told = page.told("rows")[-1]["robots"][0]["stands"]
-    assert "connection" in told
+    shown = page.told("rows")[-1]["robots"][0]["stands"]
+    assert "connection" in shown
 
 
 @pytest.mark.parametrize("pattern", ["latest-wins", "req-rep"])

@@ -62,8 +62,8 @@ def test_nothing_taps_a_device_that_nobody_looks_at(desk):
 def test_a_batch_holds_what_came_since_the_last_one(desk):
     desk.ask(b"one")
     desk.ask(b"two")
-    (told,) = desk.logs.batches()
-    found = [(one[0], one[2], one[3]) for one in told["lines"]]
+    (reported,) = desk.logs.batches()
+    found = [(one[0], one[2], one[3]) for one in reported["lines"]]
     assert found == [(1, "one", "re"), (2, "two", "re")]
     assert desk.logs.batches() == []
 
@@ -71,13 +71,13 @@ def test_a_batch_holds_what_came_since_the_last_one(desk):
 def test_of_a_flood_the_newest_are_told_and_numbers_say_how_many_are_not(desk):
     for n in range(1, 1405):
         desk.ask(b"%d" % n)
-    (told,) = desk.logs.batches()
-    assert [one[0] for one in told["lines"]] == list(range(1405 - LOG_BATCH, 1405))
+    (reported,) = desk.logs.batches()
+    assert [one[0] for one in reported["lines"]] == list(range(1405 - LOG_BATCH, 1405))
     logs = KeptLogs()
     looks = looking(logs)
     logs.take(batch(*asks(1, 1)))
     assert looks.next()["missed"] == 0
-    logs.take(told | {"lines": [line(n, b"x", None) for n in range(1205, 1405)]})
+    logs.take(reported | {"lines": [line(n, b"x", None) for n in range(1205, 1405)]})
     assert (line_ := looks.next())["missed"] == 1203
     assert len(line_["lines"]) == AT_ONCE
 
@@ -85,8 +85,8 @@ def test_of_a_flood_the_newest_are_told_and_numbers_say_how_many_are_not(desk):
 def test_large_messages_make_a_batch_short_and_are_cut(desk):
     for _ in range(60):
         desk.ask(b"x" * 60_000)
-    (told,) = desk.logs.batches()
-    sizes = [len(one[2]) for one in told["lines"]]
+    (reported,) = desk.logs.batches()
+    sizes = [len(one[2]) for one in reported["lines"]]
     assert set(sizes) == {CUT}
     assert sum(sizes) < LOG_BYTES + CUT
 

@@ -43,8 +43,8 @@ def test_served_on_all_addresses_it_answers_to_addresses_and_given_names_only():
 )
 @pytest.mark.parametrize("changes", [False, True])
 def test_a_page_of_another_origin_may_not_ask(origin, changes):
-    told = HERE.refusal(Asked("127.0.0.1:8123", origin, changes=changes))
-    assert told[0] == 403
+    reported = HERE.refusal(Asked("127.0.0.1:8123", origin, changes=changes))
+    assert reported[0] == 403
 
 
 def test_its_own_page_and_a_program_may_ask():
@@ -110,7 +110,7 @@ def test_names_in_host_headers():
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
 def test_an_address_for_all_is_told_as_one_that_leads_here(host):
-    told = ipaddress.ip_address(own_address(host))
-    assert not told.is_unspecified
-    with socket.socket(socket.AF_INET if told.version == 4 else socket.AF_INET6) as here:
-        here.bind((str(told), 0))
+    reported = ipaddress.ip_address(own_address(host))
+    assert not reported.is_unspecified
+    with socket.socket(socket.AF_INET if reported.version == 4 else socket.AF_INET6) as here:
+        here.bind((str(reported), 0))

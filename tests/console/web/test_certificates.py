@@ -142,9 +142,9 @@ def test_a_key_of_another_certificate_is_broken(tmp_path):
 
 def test_a_folder_that_cannot_be_written_is_told_in_a_line(tmp_path):
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(NoCertificate, match="file") as told:
+    with pytest.raises(NoCertificate, match="file") as error:
         certificates(tmp_path / "file" / "phones", HOSTS, NOW)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(error.value)
 
 
 def test_the_data_folder_is_where_the_system_wants_it(monkeypatch, tmp_path):

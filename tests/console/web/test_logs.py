@@ -40,34 +40,34 @@ def get(console, path, token=None):
 
 
 def test_an_exchange_is_told_whole_with_its_header(console):
-    told = get(console, "/api/logs/dva/2").json
-    assert told["header"] == {
+    shown = get(console, "/api/logs/dva/2").json
+    assert shown["header"] == {
         "DestinationID": DVA,
         "MessageID": "2",
         "SourceID": PHONE,
         "Timestamp": "12:00:00",
         "SessionID": "77",
     }
-    assert told["labels"]["SourceID"] == "BQ <Curie> 2"
-    assert (told["kind"], told["code"], told["word"]) == ("PermissionRequest", m.BUSY, "busy")
-    assert "        <Level>missions</Level>" in told["request"].split("\n")
-    assert check_message(told["request"].encode()) == []
-    assert check_message(told["reply"].encode()) == []
+    assert shown["labels"]["SourceID"] == "BQ <Curie> 2"
+    assert (shown["kind"], shown["code"], shown["word"]) == ("PermissionRequest", m.BUSY, "busy")
+    assert "        <Level>missions</Level>" in shown["request"].split("\n")
+    assert check_message(shown["request"].encode()) == []
+    assert check_message(shown["reply"].encode()) == []
 
 
 def test_what_is_wrong_has_a_line_and_a_column_of_what_is_shown(console):
-    told = get(console, "/api/logs/dva/3").json
-    (problem,) = told["problems"]
-    wrong = told["request"].split("\n")[problem["line"] - 1]
+    shown = get(console, "/api/logs/dva/3").json
+    (problem,) = shown["problems"]
+    wrong = shown["request"].split("\n")[problem["line"] - 1]
     assert wrong[problem["column"] - 1 :].startswith("<MessageID>three<")
     assert unnamed(problem["text"], "MessageID", "'three'") == []
 
 
 def test_what_is_no_xml_at_all_is_told_as_it_came(console):
-    told = get(console, "/api/logs/dva/4").json
-    assert (told["kind"], told["header"]) == ("?", {})
-    assert told["request"] == "\\xff\x00 no message"
-    assert told["problems"]
+    shown = get(console, "/api/logs/dva/4").json
+    assert (shown["kind"], shown["header"]) == ("?", {})
+    assert shown["request"] == "\\xff\x00 no message"
+    assert shown["problems"]
 
 
 def test_older_lines_and_filters(console):
@@ -111,8 +111,8 @@ def test_the_file_of_a_log_holds_messages_that_pass_the_check(console, tmp_path)
         "000002-PermissionRequest-request.xml",
         "000005-GetDeviceList-request.xml",
     ]
-    told = call("check", *good)
-    assert (told.returncode, told.stdout.splitlines()[-1]) == (0, "7 files: 7 valid")
+    ended = call("check", *good)
+    assert (ended.returncode, ended.stdout.splitlines()[-1]) == (0, "7 files: 7 valid")
     assert (tmp_path / "refused" / "000003-GetDeviceList-request.xml").read_bytes() == BROKEN
     assert len((tmp_path / "log.csv").read_text().splitlines()) == 6
 

@@ -172,8 +172,8 @@ def test_samples_go_on_in_their_order_and_are_not_answered(console, phone):
     for n in range(0, 12, 2):
         xyz = [[0.1, 0.2, 9.8], [0.1, 0.2, 9.7]]
         at = [100.0 + n, 100.5 + n]
-        told = {"do": "samples", "n": n, "at": at, "xyz": xyz, "hand": True, "orientation": 90}
-        drive.send(json.dumps(told))
+        values = {"do": "samples", "n": n, "at": at, "xyz": xyz, "hand": True, "orientation": 90}
+        drive.send(json.dumps(values))
     heard = [console.next_asked("samples") for _ in range(6)]
     assert [line["n"] for line in heard] == [0, 2, 4, 6, 8, 10]
     assert heard[0]["client"] == you["client"]
@@ -249,8 +249,8 @@ def test_an_expired_certificate_is_renewed_at_the_start_and_a_phone_gets_in(tmp_
     certificates(tmp_path, hosts, long_ago)
     words = ("--phones-host", "127.0.0.1", "--phones-port", "0", "--certificates", str(tmp_path))
     with serving(*words) as served:
-        told = " ".join(served.serving["told"])
-        assert "certificate" in told
+        text = " ".join(served.serving["told"])
+        assert "certificate" in text
         assert ask(served, "/phone", token=served.phone).status == 200  # verified
 
 

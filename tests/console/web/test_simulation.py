@@ -97,13 +97,13 @@ def test_who_waits_in_vain_is_told_after_a_while_and_longer_for_what_crosses_the
     monkeypatch.setattr(declared, "LONG", 0.002)
 
     async def story(simulation, clock, end):
-        told = []
+        reports = []
         for action in ("emergency", "pattern"):
-            simulation.ask({"id": action, "do": action, "client": "c1"}, told.append)
-        await until(lambda: len(told) == 2)
-        assert [line["id"] for line in told] == ["pattern", "emergency"]
-        assert [line["late"] for line in told] == [True, True]
-        assert ["0.001 s" in told[0]["text"], "0.002 s" in told[1]["text"]] == [True, True]
+            simulation.ask({"id": action, "do": action, "client": "c1"}, reports.append)
+        await until(lambda: len(reports) == 2)
+        assert [line["id"] for line in reports] == ["pattern", "emergency"]
+        assert [line["late"] for line in reports] == [True, True]
+        assert ["0.001 s" in reports[0]["text"], "0.002 s" in reports[1]["text"]] == [True, True]
 
     play(story)
 
@@ -126,34 +126,34 @@ def test_an_emergency_asked_for_again_and_again_is_answered_by_the_world_alone()
     """A busy refusal would look as if the stop had been refused."""
 
     async def story(simulation, clock, end):
-        told = []
+        reports = []
         asked = {"id": "e", "do": "emergency", "robots": "all", "client": "c1"}
         for _ in range(20):
-            simulation.ask(asked, told.append)
-        assert told == []
+            simulation.ask(asked, reports.append)
+        assert reports == []
         end.setblocking(False)
         assert end.recv(1000).count(b"\n") == 1
         say(end, {"k": "done", "id": "c1/e", "ok": True, "text": "stopped"})
-        await until(lambda: told)
-        assert {line["text"] for line in told} == {"stopped"}
+        await until(lambda: reports)
+        assert {line["text"] for line in reports} == {"stopped"}
 
     play(story)
 
 
 def test_questions_without_an_answer_are_bounded_and_end_with_the_simulation():
     async def story(simulation, clock, end):
-        told = []
+        reports = []
         for number in range(MOST_PENDING):
-            simulation.ask({"id": f"{number}", "do": "start", "client": "c1"}, told.append)
+            simulation.ask({"id": f"{number}", "do": "start", "client": "c1"}, reports.append)
             end.recv(1000)
-        simulation.ask({"id": f"{MOST_PENDING}", "do": "start", "client": "c1"}, told.append)
-        assert [line["id"] for line in told] == [f"{MOST_PENDING}"]
-        assert "too many" in told[0]["text"]
+        simulation.ask({"id": f"{MOST_PENDING}", "do": "start", "client": "c1"}, reports.append)
+        assert [line["id"] for line in reports] == [f"{MOST_PENDING}"]
+        assert "too many" in reports[0]["text"]
         say(end, {"k": "bye", "why": "over"})
         await simulation.ended.wait()
-        assert [line["text"] for line in told[1:]] == ["over"] * MOST_PENDING
-        simulation.ask({"id": "after", "do": "start", "client": "c1"}, told.append)
-        assert (told[-1]["id"], told[-1]["text"]) == ("after", "over")
+        assert [line["text"] for line in reports[1:]] == ["over"] * MOST_PENDING
+        simulation.ask({"id": "after", "do": "start", "client": "c1"}, reports.append)
+        assert (reports[-1]["id"], reports[-1]["text"]) == ("after", "over")
 
     play(story)
 
@@ -183,6 +183,6 @@ def test_after_the_end_no_page_is_let_in_that_would_take_the_world_for_lost():
         await hub.drive(drives, Role.DRIVE)
         return [sees.told, drives.told]
 
-    for told in asyncio.run(story()):
-        assert told is not None
-        assert (told.status_code, told.body) == (503, b"the console was ended")
+    for entry in asyncio.run(story()):
+        assert entry is not None
+        assert (entry.status_code, entry.body) == (503, b"the console was ended")

@@ -86,9 +86,9 @@ def test_optional_arguments_say_what_would_be_right(action):
     for name, hint in hints_of(action.arguments).items():
         good = action.read(arguments_of(action) | {name: example(hint)}, LABELS)
         assert name in good
-        with pytest.raises(BadMessage, match=f"{name} should be") as told:
+        with pytest.raises(BadMessage, match=f"{name} should be") as error:
             action.read(arguments_of(action) | {name: object()}, LABELS)
-        assert "object" not in str(told.value)
+        assert "object" not in str(error.value)
 
 
 @pytest.fixture(scope="module")
@@ -134,8 +134,8 @@ def test_a_mark_stands_in_the_story_under_the_name_of_its_author(monkeypatch):
     assert page.do("take", robots=[0])[0]
     assert page.do("mark", text="the participant sighs")[0]
     page.let(0.2)
-    told = [(line["who"], line["what"], line["kind"]) for line in page.told("story")]
-    assert ("console-1", "marks: the participant sighs", "event") in told
+    shown = [(line["who"], line["what"], line["kind"]) for line in page.told("story")]
+    assert ("console-1", "marks: the participant sighs", "event") in shown
     assert not page.do("mark", text="two\nlines")[0]
 
 

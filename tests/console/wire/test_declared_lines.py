@@ -61,10 +61,10 @@ def test_what_a_page_gets_of_a_world_is_as_declared(monkeypatch):
     assert page.do("fault", robot=0, what="processing", on=True, seconds=0.5)[0]
     assert page.ask("tour")["tour"]["robots"] == [0, 1]
     page.let(1.0)
-    told = at_page(page.lines, "p1")
+    reported = at_page(page.lines, "p1")
     others = at_page(page.lines, "g1")
     usual = {"snap", "d", "rows", "seat", "robot", "log", "devices", "events", "control", "story"}
-    assert usual | {"alarms", "hazards"} <= kinds(told)
+    assert usual | {"alarms", "hazards"} <= kinds(reported)
     assert {"snap", "guard", "seat"} <= kinds(others)
     assert [one["robots"] for one in others if one.get("short")][-1] == [0]
 
@@ -75,5 +75,5 @@ def test_what_a_page_gets_of_a_dva_elsewhere_is_as_declared(monkeypatch, tmp_pat
         page.actions.take({"client": "c1", "do": "look", "logs": {}, "tables": ["devices"]})
         page.ask("event_acknowledge", event=1)
         page.let(2.0)
-        told = kinds(at_page(page.lines, "c1"))
-    assert told >= {"snap", "rows", "devices", "events", "control", "alarms", "audit", "story"}
+        messages = kinds(at_page(page.lines, "c1"))
+    assert messages >= {"snap", "rows", "devices", "events", "control", "alarms", "audit", "story"}

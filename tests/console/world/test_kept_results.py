@@ -140,8 +140,8 @@ def test_each_command_that_took_effect_is_a_row(whole):
 
 def test_its_report_shows_the_drives_of_people_by_pattern_and_link_and_compares_nothing(whole):
     reading = Reading(whole)
-    told = [reading.answer.lead, size_of(reading)]
-    assert unnamed(" ".join(told), "1 person", "4 drives", "2 robots", "people drove") == []
+    reports = [reading.answer.lead, size_of(reading)]
+    assert unnamed(" ".join(reports), "1 person", "4 drives", "2 robots", "people drove") == []
     (table,) = reading.cells
     assert [row[:4] for row in table.rows] == [
         ["person-1", "latest-wins PUB/SUB", "0.10\N{NO-BREAK SPACE}s", "3"],

@@ -75,8 +75,8 @@ def test_other_persons_are_compared_as_such_by_welch(made, results):
         for runs in (results.runs, other.runs)
     ]
     means = [values.reshape(3, 2).mean(axis=1) for values in cell]
-    told = stats.ttest_ind(means[1], means[0], equal_var=False).confidence_interval(0.95)
-    assert (row.interval.low, row.interval.high) == pytest.approx((told.low, told.high))
+    reported = stats.ttest_ind(means[1], means[0], equal_var=False).confidence_interval(0.95)
+    assert (row.interval.low, row.interval.high) == pytest.approx((reported.low, reported.high))
 
 
 def test_cells_that_one_folder_alone_has_are_told(made, results):

@@ -123,10 +123,10 @@ def test_the_difference_is_taken_within_persons():
 
 def test_the_contrast_is_told_with_intervals_and_in_points():
     found, view = three_of_four_lost()
-    (told,) = sentences(found, view, finding_of(view))
-    told = told.replace("\N{NO-BREAK SPACE}", " ")
+    (text,) = sentences(found, view, finding_of(view))
+    text = text.replace("\N{NO-BREAK SPACE}", " ")
     shares = ("In part drive", "by 100 s", "short: confirmed 25 % (", "link lost 75 % (")
-    assert unnamed(told, *shares, "short lies 50.0", "points below long (") == []
+    assert unnamed(text, *shares, "short lies 50.0", "points below long (") == []
 
 
 def test_the_table_has_a_row_for_each_level():

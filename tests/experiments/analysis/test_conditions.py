@@ -69,8 +69,8 @@ def test_in_a_range_the_farthest_end_counts():
     ranges = {"link.delay_s": {"low": 0.0, "high": 0.3}, "link.loss": {"low": 0.0, "high": 0.1}}
     ranges["robot.processing_s"] = {"low": 0.02, "high": 0.2}
     study = {"factors": {"point": list(range(8))}, "design": {"sobol": 8, "ranges": ranges}}
-    told = timeout_remark({"drive": SCENARIO}, study)
-    assert told.endswith("(2.6\N{NO-BREAK SPACE}s at most).")
+    reported = timeout_remark({"drive": SCENARIO}, study)
+    assert reported.endswith("(2.6\N{NO-BREAK SPACE}s at most).")
 
 
 def test_what_lies_in_a_range_is_said_to_vary():
@@ -81,11 +81,11 @@ def test_what_lies_in_a_range_is_said_to_vary():
 
 def special(**link: Any) -> list[str]:
     """Remarks on a link beyond those on a plain one."""
-    told = []
+    reports = []
     for changes in ({}, {f"link.{key}": value for key, value in link.items()}):
         scenario = scenarios.build(scenarios.load("drive-to-event"), changes)
-        told.append(dict(conditions({"drive": scenario.model_dump(mode="json")}, [])))
-    plain, found = told
+        reports.append(dict(conditions({"drive": scenario.model_dump(mode="json")}, [])))
+    plain, found = reports
     return sorted(value for name, (value,) in found.items() if name not in plain)
 
 

@@ -52,8 +52,8 @@ def test_a_covariate_whose_mean_cannot_be_zero_is_left_out_and_told(tmp_path):
     view = view_of(study("caution_off"), runs)
     assert view.covariates == ()
     assert covariates_of(study("caution_off"), view.part) == ([], ["caution_off"])
-    told = reading(tmp_path, rows(shift=3.0)).warnings
-    assert any("not adjusted for caution_off" in warning for warning in told)
+    reported = reading(tmp_path, rows(shift=3.0)).warnings
+    assert any("not adjusted for caution_off" in warning for warning in reported)
 
 
 def reading(tmp_path: Path, table: list[dict[str, Any]]) -> Reading:
@@ -63,8 +63,8 @@ def reading(tmp_path: Path, table: list[dict[str, Any]]) -> Reading:
 
 
 def remark(found: Reading) -> str:
-    (told,) = (text for text in remarks(found) if "control variates" in text)
-    return told
+    (reported,) = (text for text in remarks(found) if "control variates" in text)
+    return reported
 
 
 def test_the_report_says_what_it_is_adjusted_for_and_what_that_was_worth(tmp_path):

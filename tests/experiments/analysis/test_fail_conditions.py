@@ -108,10 +108,10 @@ def test_a_share_can_be_of_a_word(word):
     ],
 )
 def test_a_mistake_is_told_in_a_line_with_its_place_and_what_was_expected(text, column, names):
-    with pytest.raises(ConfigError, match=f", column {column}: ") as told:
+    with pytest.raises(ConfigError, match=f", column {column}: ") as error:
         parse(text)
-    assert unnamed(told.value, f"--fail-if {text!r}", *names) == []
-    assert "\n" not in str(told.value)
+    assert unnamed(error.value, f"--fail-if {text!r}", *names) == []
+    assert "\n" not in str(error.value)
 
 
 # --- judging -----------------------------------------------------------------------------------

@@ -81,8 +81,8 @@ def test_repeats_at_delays_at_which_nobody_was_watched_are_told_and_drawn_hollow
         ("pursuit", True),
         ("adaptive", False),
     }
-    told = sentences(found)[-1].replace("\N{NO-BREAK SPACE}", " ")
-    assert unnamed(told, "1 of 3", "(33 %) are extrapolated") == []
+    text = sentences(found)[-1].replace("\N{NO-BREAK SPACE}", " ")
+    assert unnamed(text, "1 of 3", "(33 %) are extrapolated") == []
     with styled():
         assert "Hollow: extrapolated" in drawn(view, found).caption
         assert "Hollow" not in drawn(*read(EFFECTS)).caption
@@ -90,11 +90,11 @@ def test_repeats_at_delays_at_which_nobody_was_watched_are_told_and_drawn_hollow
 
 def test_the_sentences_give_shares_and_reach():
     _, found = read(EFFECTS)
-    what, told = (s.replace("\N{NO-BREAK SPACE}", " ") for s in sentences(found))
+    what, text = (s.replace("\N{NO-BREAK SPACE}", " ") for s in sentences(found))
     assert unnamed(what, "4 persons", "2 trials") == []
     signs = ("delay 1 s the sign holds in 2 of 3 (67 %)", "in 2 of them", "−3.8 to 5.1 s")
     sizes = ("in 1 of 3 (33 %) the effect exceeds", "in 1 it is below", "adaptive (1 of 2)")
-    assert unnamed(told, *signs, *sizes) == []
+    assert unnamed(text, *signs, *sizes) == []
 
 
 def test_a_study_without_repeats_has_none():

@@ -217,8 +217,8 @@ def test_a_mean_that_hangs_on_a_run_with_the_whole_horizon_is_told_with_the_medi
     rows["confirmed"] = np.ones(24)
     rows["confirmed"][0], rows["drive_time_s"][0] = 0.0, 600.0
     view = view_of(study(), rows)
-    told = few_that_weigh(finding_of(view), view).replace("\N{NO-BREAK SPACE}", " ")
-    assert unnamed(told, "600 s", "1 of 24 runs", "median 2.0 s", "2.0 to 2.0 s") == []
+    text = few_that_weigh(finding_of(view), view).replace("\N{NO-BREAK SPACE}", " ")
+    assert unnamed(text, "600 s", "1 of 24 runs", "median 2.0 s", "2.0 to 2.0 s") == []
 
 
 def test_where_all_were_confirmed_no_run_weighs_more_than_another():

@@ -83,8 +83,8 @@ def test_what_moves_the_answer_is_found_drawn_and_written(tmp_path):
     assert (first.key, second.key) == (f"{WAITING}shortest_s", f"{WAITING}patience")
     assert most.mean.mean > 0 > less.mean.mean
     assert less.size == pytest.approx(2.0 * np.ptp([1.5, 6.0]), rel=0.6)
-    told = " ".join(draw_screening(asked, found, folder))
-    assert unnamed(told, "3 of the numbers do not", first.key, second.key, FIGURE) == []
+    text = " ".join(draw_screening(asked, found, folder))
+    assert unnamed(text, "3 of the numbers do not", first.key, second.key, FIGURE) == []
     assert (folder / FIGURE).read_bytes().startswith(b"\x89PNG")
     rows = list(csv.DictReader(found.write(folder / TABLE).read_text().splitlines()))
     assert [row["key"] for row in rows[:2]] == [first.key, second.key]

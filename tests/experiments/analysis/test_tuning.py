@@ -187,8 +187,8 @@ def test_the_command_tries_chooses_tells_and_keeps(tmp_path, capsys):
     path = kit.write_study(tmp_path, text)
     (tmp_path / "one.yaml").write_text("description: no time to arrive\nhorizon_s: 1\n")
     assert study_runs.tune(str(path), tmp_path / "trials", 1) == 0
-    said = capsys.readouterr().out
-    assert unnamed(said, "command.rate_hz", "pattern", tmp_path / "tuned" / "study.yaml") == []
+    output = capsys.readouterr().out
+    assert unnamed(output, "command.rate_hz", "pattern", tmp_path / "tuned" / "study.yaml") == []
     assert [c.value for c in load_tuned(load_study(path)).chosen] == [5.0, 5.0]
 
 

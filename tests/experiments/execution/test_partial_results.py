@@ -49,8 +49,12 @@ def test_runs_are_made_person_by_person_so_that_all_cells_of_some_persons_are_kn
     before = sorted(path.name for path in out.rglob("*"))
     results = load_so_far(out)
     assert sorted(path.name for path in out.rglob("*")) == before  # looking changes nothing
-    told = shown(results)
-    assert told["partial"] == {"done": kit.RUNS - 5, "of": kit.RUNS, "persons": told["persons"]}
+    reported = shown(results)
+    assert reported["partial"] == {
+        "done": kit.RUNS - 5,
+        "of": kit.RUNS,
+        "persons": reported["persons"],
+    }
     runs = results.runs
     sizes = [np.sum((runs["part"] == "drive") & (runs["cell"] == c)) for c in set(runs["cell"])]
     assert len(set(sizes)) == 1

@@ -142,9 +142,9 @@ def test_a_runner_that_was_killed_goes_on_and_ends_with_the_same_bytes(tmp_path,
 def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path, plain, started):
     study, out = kit.write_study(tmp_path), tmp_path / "stopped"
     runner = started(study, out)
-    said = stopped(runner, 3, signal.SIGINT)
+    reported = stopped(runner, 3, signal.SIGINT)
     assert runner.returncode == 130
-    assert unnamed(said, "of 42 runs", "kept") == []
+    assert unnamed(reported, "of 42 runs", "kept") == []
     assert 3 <= dry_run(kit.study_in(tmp_path), out).done < kit.RUNS
     assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)) == plain
 

@@ -108,7 +108,7 @@ def test_names_of_lines_that_end_together_are_moved_apart_within_the_axes():
 
 
 def test_every_event_has_a_fate_even_one_nobody_foresaw():
-    told = {
+    values = {
         ("confirmed", "robot", True): "confirmed by a robot",
         ("confirmed", "guard", True): "confirmed by a guard",
         ("confirmed", "guard", False): "false alarm confirmed",
@@ -118,7 +118,7 @@ def test_every_event_has_a_fate_even_one_nobody_foresaw():
         ("open", "none", True): "open",
         ("stolen", "none", True): "other",
     }
-    assert fates(*map(np.array, zip(*told, strict=True))).tolist() == list(told.values())
+    assert fates(*map(np.array, zip(*values, strict=True))).tolist() == list(values.values())
 
 
 @blank
@@ -379,10 +379,10 @@ def test_panels_of_transports_that_are_logarithmic_say_so_in_their_titles(view):
     known = with_columns(view, round_trip_mean_s=times / 100, command_rate_hz=times / 10)
     with styled():
         axes = Brought().draw(known, NOTHING_ELSE).figure.axes
-    told = {ax.get_title("left"): ax.get_yscale() for ax in axes if ax.get_visible()}
-    assert set(told.values()) == {"log", "linear"}
+    values = {ax.get_title("left"): ax.get_yscale() for ax in axes if ax.get_visible()}
+    assert set(values.values()) == {"log", "linear"}
     assert [
-        title for title, scale in told.items() if ("log scale" in title) != (scale == "log")
+        title for title, scale in values.items() if ("log scale" in title) != (scale == "log")
     ] == []
 
 

@@ -29,14 +29,14 @@ def test_the_persons_are_those_that_were_run(tmp_path):
 )
 def test_what_decided_the_number_of_persons_is_told(tmp_path, key, why, names):
     stopped = {"rounds": 2, "of": 6, "why": why}
-    told = remarks(reading(tmp_path, {key: {"half_width": 1.0}}, stopped=stopped))[0]
-    assert unnamed(told, *names) == []
+    reported = remarks(reading(tmp_path, {key: {"half_width": 1.0}}, stopped=stopped))[0]
+    assert unnamed(reported, *names) == []
 
 
 def test_parts_with_trials_of_their_own_are_told_apart(tmp_path):
     parts = {"drive": {"replications": 5}, "story": {"replications": None}}
-    told = remarks(reading(tmp_path, {"parts": parts}))[0]
-    assert unnamed(told, "5 in drive", "2 in story") == []
+    reported = remarks(reading(tmp_path, {"parts": parts}))[0]
+    assert unnamed(reported, "5 in drive", "2 in story") == []
 
 
 @pytest.mark.parametrize(
@@ -48,21 +48,21 @@ def test_parts_with_trials_of_their_own_are_told_apart(tmp_path):
     ],
 )
 def test_the_program_is_told_and_what_is_not_known_of_it(tmp_path, versions, names):
-    told = remarks(reading(tmp_path, versions={"dva-sim": "0.7.0"} | versions))[-1]
-    assert unnamed(told, "dva-sim 0.7.0", *names) == []
+    reported = remarks(reading(tmp_path, versions={"dva-sim": "0.7.0"} | versions))[-1]
+    assert unnamed(reported, "dva-sim 0.7.0", *names) == []
 
 
 def test_tests_are_told_where_there_are_any(tmp_path):
     claims = {"hypotheses": {"h": {"direction": "above"}}}
     claims["comparisons"] = {"c": synthetic_results.manifest(6, 2)["study"]["answer"]}
-    told = " ".join(remarks(reading(tmp_path, claims)))
-    assert unnamed(told, "by a one-sided test", "two-sided by permutation") == []
+    text = " ".join(remarks(reading(tmp_path, claims)))
+    assert unnamed(text, "by a one-sided test", "two-sided by permutation") == []
 
 
 def test_without_claims_no_test_is_told(tmp_path):
-    told = " ".join(remarks(reading(tmp_path)))
-    assert "one-sided" not in told
-    assert "permutation" not in told
+    text = " ".join(remarks(reading(tmp_path)))
+    assert "one-sided" not in text
+    assert "permutation" not in text
 
 
 def test_with_fewer_than_six_persons_nothing_is_drawn_anew(tmp_path):

@@ -85,9 +85,9 @@ def test_earlier_registrations_are_told(runs):
 )
 def test_the_design_is_told_in_words(runs, design, names):
     plan = PLAN | {"factors": {"pattern": PATTERNS}, "design": design}
-    told = rows_of(runs, plan=plan)["design"][0]
-    assert unnamed(told, *names, "messaging pattern (2 levels)") == []
-    assert ("jitter" in told) == ("ranges" in design)
+    reported = rows_of(runs, plan=plan)["design"][0]
+    assert unnamed(reported, *names, "messaging pattern (2 levels)") == []
+    assert ("jitter" in reported) == ("ranges" in design)
 
 
 def test_without_any_run_no_hypothesis_came_out():

@@ -238,8 +238,12 @@ def test_what_a_treatment_changes_is_said_and_counts_as_varied(tmp_path):
     factors |= {"profile": ["default"]}
     facts["study"] |= {"treatments": treatments, "factors": factors, "answer": None}
     text = words_of(synthetic_results.write(tmp_path / "r", {"runs": runs}, facts))
-    said = ("near: nothing far: one-way delay 1 s", "delay varied varied", "above four round trips")
-    assert unnamed(text, *said) == []
+    expected = (
+        "near: nothing far: one-way delay 1 s",
+        "delay varied varied",
+        "above four round trips",
+    )
+    assert unnamed(text, *expected) == []
 
 
 def test_conditions_name_what_a_study_changed_and_a_class_with_its_file():
@@ -274,8 +278,8 @@ def test_a_word_is_explained_once_where_it_first_stands(page):
     links = re.findall(r'<dfn><a href="#(word-[^"]+)" title="([^"]+)">([^<]+)</a></dfn>', page)
     explained = re.findall(r'<dt id="(word-[^"]+)">', page)
     assert sorted(key for key, _, _ in links) == sorted(explained)
-    said = [text for _, _, text in links]
-    assert unnamed(said, "REQ/REP", "latest-wins PUB/SUB", "95 % band", "part", "config") == []
+    reports = [text for _, _, text in links]
+    assert unnamed(reports, "REQ/REP", "latest-wins PUB/SUB", "95 % band", "part", "config") == []
     first = page[: page.index("95 % band")]
     assert first.endswith('">')  # the very first time it stands is in a link
 
@@ -309,9 +313,9 @@ def test_the_version_that_was_run_is_told_beside_the_usual_size(tmp_path, person
     facts["study"]["factors"] |= factors
     kept = facts["study"]["factors"]["link.delay_s"]
     rows = [r for r in synthetic_results.drive_rows(persons, 2) if r["link.delay_s"] in kept]
-    said = size_of(synthetic_results.reading(tmp_path / "r", rows, facts))
-    assert said.startswith(told)
+    reported = size_of(synthetic_results.reading(tmp_path / "r", rows, facts))
+    assert reported.startswith(told)
     if persons != 6:
-        assert "6 persons × 2 trials" in said[len(told) + 10 :]
+        assert "6 persons × 2 trials" in reported[len(told) + 10 :]
     if factors:
-        assert unnamed(said, "6 levels of one-way", "(here 2)") == []
+        assert unnamed(reported, "6 levels of one-way", "(here 2)") == []

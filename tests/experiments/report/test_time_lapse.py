@@ -63,10 +63,10 @@ def test_the_last_moment_is_that_of_the_title_and_the_robot_is_where_it_was_then
 
 
 def test_an_event_is_named_by_its_kind_in_its_room_once_it_has_begun(drawn):
-    told = [
+    reports = [
         [t.get_text() for t in ax.texts if "fire" in t.get_text()] for ax in drawn[0].figure.axes
     ]
-    assert [len(words) for words in told] == [0, 0, 1, 1, 1, 1]  # from 20 s on
+    assert [len(words) for words in reports] == [0, 0, 1, 1, 1, 1]  # from 20 s on
 
 
 @pytest.mark.parametrize("drawn", [{"latest-wins": np.nan}], indirect=True)

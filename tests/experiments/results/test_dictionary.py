@@ -49,8 +49,8 @@ def test_every_column_that_a_run_fills_is_in_the_dictionary(model):
     filled = columns_of(model)
     assert set(filled) == set(MODELS[model].columns) - OF_PEOPLE.get(model, set())
     for table, columns in filled.items():
-        told = describe(table, sorted(columns), [model], [])
-        assert [column.name for column in told if not column.meaning] == []
+        reported = describe(table, sorted(columns), [model], [])
+        assert [column.name for column in reported if not column.meaning] == []
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -94,9 +94,9 @@ def test_every_unit_can_be_found_by_its_ending():
 
 
 def test_a_factor_and_a_column_with_two_meanings_are_told_as_such():
-    told = {c.name: c.meaning for c in describe(
+    values = {c.name: c.meaning for c in describe(
         "runs", ["pattern", "messages", "mine_s"], ["full", "timed"], ["pattern"]
     )}  # fmt: skip
-    assert told["pattern"].startswith("factor of the study")
-    assert re.match(r"full: .*; timed: ", told["messages"])
-    assert told["mine_s"] == ""
+    assert values["pattern"].startswith("factor of the study")
+    assert re.match(r"full: .*; timed: ", values["messages"])
+    assert values["mine_s"] == ""

@@ -43,9 +43,9 @@ def holder(tmp_path):
 def test_the_second_process_is_refused_in_one_line_that_names_the_first(tmp_path, holder):
     with pytest.raises(FolderInUse) as refused:
         FolderLock(tmp_path / "out")
-    told = str(refused.value)
-    assert unnamed(told, tmp_path / "out", f"process {holder.pid} on ") == []
-    assert "\n" not in told
+    reported = str(refused.value)
+    assert unnamed(reported, tmp_path / "out", f"process {holder.pid} on ") == []
+    assert "\n" not in reported
     assert refused.value.exit_code == ExitCode.MISTAKE == 2
 
 

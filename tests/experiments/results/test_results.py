@@ -37,10 +37,10 @@ def test_rows_are_chosen_by_a_mask(results):
 
 
 def test_the_columns_are_explained_with_their_units(results):
-    told = {c.name: (c.unit, c.meaning) for c in results.columns("tracks")}
-    assert told["t_s"] == ("s", "time of the run")
-    assert told["pattern"][1].startswith("factor of the study")
-    assert told["link.delay_s"][0] == "s"
+    values = {c.name: (c.unit, c.meaning) for c in results.columns("tracks")}
+    assert values["t_s"] == ("s", "time of the run")
+    assert values["pattern"][1].startswith("factor of the study")
+    assert values["link.delay_s"][0] == "s"
 
 
 def test_a_table_that_is_not_there_is_told_with_those_that_are(results):

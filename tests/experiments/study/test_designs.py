@@ -117,15 +117,15 @@ def test_a_row_may_name_treatments(tmp_path):
 )
 def test_a_mistake_in_a_file_of_rows_is_told_with_line_and_column(tmp_path, csv, place, names):
     (tmp_path / "rows.csv").write_bytes(csv.encode("latin-1"))
-    told = complaint(tmp_path, ONLY_PATTERN + "design: {csv: rows.csv}\n")
-    assert told.startswith(f"rows.csv:{place}: ")
-    assert unnamed(told, *names) == []
+    problem = complaint(tmp_path, ONLY_PATTERN + "design: {csv: rows.csv}\n")
+    assert problem.startswith(f"rows.csv:{place}: ")
+    assert unnamed(problem, *names) == []
 
 
 def test_a_factor_of_a_file_of_rows_is_not_varied_a_second_time(tmp_path):
     (tmp_path / "rows.csv").write_text("pattern\npub-sub\n")
-    told = complaint(tmp_path, ONLY_PATTERN + "design: {csv: rows.csv}\n")
-    assert told.startswith("study.yaml:6:3: 'pattern'")
+    problem = complaint(tmp_path, ONLY_PATTERN + "design: {csv: rows.csv}\n")
+    assert problem.startswith("study.yaml:6:3: 'pattern'")
 
 
 @pytest.mark.parametrize(
@@ -152,9 +152,9 @@ def test_a_factor_of_a_file_of_rows_is_not_varied_a_second_time(tmp_path):
     ],
 )
 def test_a_design_that_makes_no_sense_is_refused_where_it_stands(tmp_path, asked, place, names):
-    told = complaint(tmp_path, ONLY_PATTERN + f"design: {asked}\n")
-    assert told.startswith(f"study.yaml:{place}: ")
-    assert unnamed(told, *names) == []
+    problem = complaint(tmp_path, ONLY_PATTERN + f"design: {asked}\n")
+    assert problem.startswith(f"study.yaml:{place}: ")
+    assert unnamed(problem, *names) == []
 
 
 def test_zipped_factors_need_equally_many_levels(tmp_path):
@@ -248,8 +248,8 @@ def test_rows_with_too_many_levels_for_a_grid_are_points(tmp_path):
 
 
 def test_what_the_design_varies_cannot_be_set_beside_it(tmp_path):
-    told = complaint(tmp_path, ONLY_PATTERN + ROWS, "link.loss=0.2")
-    assert unnamed(told, "--set link.loss=0.2: ", "'link.loss'", "change 'design'") == []
+    problem = complaint(tmp_path, ONLY_PATTERN + ROWS, "link.loss=0.2")
+    assert unnamed(problem, "--set link.loss=0.2: ", "'link.loss'", "change 'design'") == []
 
 
 def test_the_size_of_a_design_can_be_set(tmp_path):
@@ -323,14 +323,14 @@ def test_a_grid_of_ten_thousand_cells_is_taken_and_a_larger_one_is_refused(tmp_p
     delays = [i / 1000 for i in range(51)]
     taken = study_in(tmp_path, text=grid.replace("{delays}", str(delays[:50])))
     assert size(taken) == 10_000
-    told = complaint(tmp_path, grid.replace("{delays}", str(delays)))
-    assert unnamed(told, "study.yaml:5:1: ", "10,200 cells", "10,000") == []
+    problem = complaint(tmp_path, grid.replace("{delays}", str(delays)))
+    assert unnamed(problem, "study.yaml:5:1: ", "10,200 cells", "10,000") == []
 
 
 def test_too_many_points_with_too_many_levels_are_refused(tmp_path):
     text = PLAIN + "design: {sobol: 65536, ranges: {link.loss: [0, 0.1]}}\n"
-    told = complaint(tmp_path, text)
-    assert unnamed(told, "study.yaml:15:1: ", "262,144 cells", "65,536") == []
+    problem = complaint(tmp_path, text)
+    assert unnamed(problem, "study.yaml:15:1: ", "262,144 cells", "65,536") == []
 
 
 def test_an_item_of_a_list_can_be_a_factor(tmp_path):

@@ -27,9 +27,9 @@ def test_levels_that_are_merely_near_are_two(mine):
 
 
 def test_a_contrast_that_settings_take_half_of_is_told_before_any_run(mine, tmp_path):
-    told = call("run", mine, "--dry-run", "--set", "factors.pattern=req-rep", cwd=tmp_path)
-    assert told.returncode == 0
-    warned = [line for line in told.stderr.splitlines() + told.stdout.splitlines()
+    ended = call("run", mine, "--dry-run", "--set", "factors.pattern=req-rep", cwd=tmp_path)
+    assert ended.returncode == 0
+    warned = [line for line in ended.stderr.splitlines() + ended.stdout.splitlines()
               if line.startswith("warning: ")]  # fmt: skip
     assert unnamed(warned[0], "answer", "'latest-wins'", "'pattern'") == []
     assert unnamed(warned[1], "'waiting-costs'") == []

@@ -68,7 +68,7 @@ def test_it_answers_its_question(fresh, tmp_path):
     assert finding.low[1] > 0
     assert abs(finding.mean[0]) < 0.1
     assert [tested.verdict for tested in reading.judgement.tested] == ["held"]
-    assert [told.verdict for told in judge_all(reading.study, reading.view)] == ["held", "held"]
+    assert [entry.verdict for entry in judge_all(reading.study, reading.view)] == ["held", "held"]
     assert reading.plans == []  # nothing is open, so no more persons are needed
 
 

@@ -52,8 +52,11 @@ def test_a_study_measures_what_a_file_beside_it_says_in_every_process(tmp_path):
     run_study(study, tmp_path / "two", jobs=2)
     found = Results.load(tmp_path / "two")
     assert (found.runs["standing_s"] > 0).all()
-    told = {column.name: column for column in found.columns("runs")}
-    assert (told["standing_s"].unit, told["standing_s"].meaning) == ("s", "time that robots stood")
+    values = {column.name: column for column in found.columns("runs")}
+    assert (values["standing_s"].unit, values["standing_s"].meaning) == (
+        "s",
+        "time that robots stood",
+    )
 
 
 @pytest.mark.system
@@ -126,8 +129,8 @@ def test_a_model_in_a_file_beside_its_scenario_is_played_in_every_process(tmp_pa
     found = Results.load(tmp_path / "out")
     waits, guards = found.runs["wait_mean_s"], found.runs["guards"]
     assert waits[guards == 2].mean() > waits[guards == 3].mean()
-    told = {column.name: column.meaning for column in found.columns("alarms")}
-    assert told["service_s"] == "that the guard needed"
+    values = {column.name: column.meaning for column in found.columns("alarms")}
+    assert values["service_s"] == "that the guard needed"
     assert study.question in words_of(tmp_path / "out")
 
 

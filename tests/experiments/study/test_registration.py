@@ -209,9 +209,9 @@ def test_other_code_that_judges_is_told_whenever_verdicts_are(tmp_path, monkeypa
     monkeypatch.setattr(
         "dva_sim.experiments.results.manifest.fingerprint_of_judges", lambda: "another"
     )
-    told = status_of(manifest)
-    assert told.kind == "confirmatory"
-    assert unnamed(*told.why, "judges", "now another)") == []
+    reported = status_of(manifest)
+    assert reported.kind == "confirmatory"
+    assert unnamed(*reported.why, "judges", "now another)") == []
 
 
 def test_registering_anew_has_to_be_meant_and_is_told(tmp_path):

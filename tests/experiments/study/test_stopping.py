@@ -155,11 +155,11 @@ def test_failed_runs_are_left_out(tmp_path):
 )
 def test_a_rule_that_makes_no_sense_is_refused_where_it_stands(tmp_path, stop, place, names):
     rest = "batch_persons: 2, most_persons: 9"
-    told = complaint(tmp_path, STUDY + f"stop: {{{stop}, {rest}}}\n")
-    assert told.startswith(f"study.yaml:{place}: ")
-    assert unnamed(told, *names) == []
+    problem = complaint(tmp_path, STUDY + f"stop: {{{stop}, {rest}}}\n")
+    assert problem.startswith(f"study.yaml:{place}: ")
+    assert unnamed(problem, *names) == []
 
 
 def test_the_most_persons_are_not_fewer_than_the_first_batch(tmp_path):
-    told = complaint(tmp_path, STUDY + ON_ANSWER.replace("most_persons: 8", "most_persons: 2"))
-    assert unnamed(told, "study.yaml:22:63: most_persons", "persons: 3") == []
+    problem = complaint(tmp_path, STUDY + ON_ANSWER.replace("most_persons: 8", "most_persons: 2"))
+    assert unnamed(problem, "study.yaml:22:63: most_persons", "persons: 3") == []

@@ -19,8 +19,8 @@ def test_more_runs_than_anybody_can_wait_for_are_refused_without_being_listed(
     tmp_path, monkeypatch, setting
 ):
     monkeypatch.setattr(cell_grid, "jobs", pytest.fail)
-    told = rf"--set {setting}: there would be .* runs, more than 1,000,000; have fewer"
-    with pytest.raises(ConfigError, match=told):
+    text = rf"--set {setting}: there would be .* runs, more than 1,000,000; have fewer"
+    with pytest.raises(ConfigError, match=text):
         study_in(tmp_path, setting)
 
 

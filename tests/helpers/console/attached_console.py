@@ -79,8 +79,8 @@ class AttachedPage:
 
     def events(self) -> list[dict[str, Any]]:
         """Events as the page shows them now."""
-        told = self.told("events")
-        return list(told[-1]["events"]) if told else []
+        shown = self.told("events")
+        return list(shown[-1]["events"]) if shown else []
 
     def alarms(self) -> list[str]:
         """The texts of the list, the gravest first."""

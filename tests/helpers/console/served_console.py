@@ -138,10 +138,10 @@ class Served:
     def answering(self, kind: str, ask: Callable[..., Answer], *words: Any, **done: Any) -> Any:
         """Let somebody ask, and do it in the simulation: the answer, and what was asked there."""
         with ThreadPoolExecutor(1) as other:
-            told = other.submit(ask, *words)
+            reported = other.submit(ask, *words)
             asked = self.next_asked(kind)
             self.say({"k": "done", "id": asked["id"], "ok": True, "text": "done"} | done)
-            return told.result(PATIENCE_S), asked
+            return reported.result(PATIENCE_S), asked
 
     def show(self, robot: int, number: int, jpeg: bytes, captured: int = 0) -> None:
         """Draw a picture, as the process would that draws."""

@@ -12,8 +12,8 @@ RNG = np.random.default_rng(1)
 
 def look(event=1, kind="flood", severity=0.5, since=0.0, **more):
     """A task to confirm."""
-    told = {"severity": severity, "detected": since, "waiting_since": since, "confidence": 0.9}
-    return Task(**{"event": event, "kind": kind, "stage": "confirm", "due": True} | told | more)
+    values = {"severity": severity, "detected": since, "waiting_since": since, "confidence": 0.9}
+    return Task(**{"event": event, "kind": kind, "stage": "confirm", "due": True} | values | more)
 
 
 def act(event=1, kind="fire", due=True, severity=0.5):

@@ -10,8 +10,8 @@ def confirmation(grant: m.PermissionGrant | None) -> m.Reply:
     """Reply of the DVA to a robot's inquiry about its holder."""
     if grant is None:
         return m.Reply(1, m.NOT_PERMITTED, "nobody holds it")
-    told = m.Permission(grant.holder, grant.level, grant.session, grant.address, grant.sensors)
-    return m.Reply(1, m.OK, "", told)
+    reported = m.Permission(grant.holder, grant.level, grant.session, grant.address, grant.sensors)
+    return m.Reply(1, m.OK, "", reported)
 
 
 def hear(controller: RobotController, reply: m.Reply, now: float = 0.0) -> Decision:
@@ -23,11 +23,11 @@ def hear(controller: RobotController, reply: m.Reply, now: float = 0.0) -> Decis
 def give(controller: RobotController, grant: m.PermissionGrant, now: float = 0.0) -> Decision:
     """Let a robot have a permission that the DVA has given: what the confirmation does."""
     message = m.Message(controller.id_tag, 1, controller.dva, "12:00:00", 0, grant)
-    said = controller.handle(message, now, now, moving=False)
+    reported = controller.handle(message, now, now, moving=False)
     if grant.level == "sensors":
         controller.inquiry.about_reader(grant.holder)
     question = controller.inquiry.next(now)
-    return said if question is None else hear(controller, confirmation(grant), now)
+    return reported if question is None else hear(controller, confirmation(grant), now)
 
 
 def enter(desk: Dva, robot: str, body: m.Body) -> None:

@@ -177,23 +177,23 @@ class PretendedDva:
     def progress(self, event: int) -> list[str]:
         """States of the order and findings reported for an event, in order."""
         return [
-            told.body.state if isinstance(told.body, m.OrderProgress) else told.body.finding
-            for told in self.told
-            if isinstance(told.body, m.OrderProgress | m.EventReport)
-            and told.body.event_id == event
+            entry.body.state if isinstance(entry.body, m.OrderProgress) else entry.body.finding
+            for entry in self.told
+            if isinstance(entry.body, m.OrderProgress | m.EventReport)
+            and entry.body.event_id == event
         ]
 
     def when(self, event: int, word: str) -> float:
         """Time of the first report of a state or finding of an event [s]."""
         return next(
-            told.time
-            for told in self.told
-            if word in (getattr(told.body, "state", None), getattr(told.body, "finding", None))
-            and getattr(told.body, "event_id", None) == event
+            entry.time
+            for entry in self.told
+            if word in (getattr(entry.body, "state", None), getattr(entry.body, "finding", None))
+            and getattr(entry.body, "event_id", None) == event
         )
 
     def bids(self) -> list[m.TaskBid]:
-        return [told.body for told in self.told if isinstance(told.body, m.TaskBid)]
+        return [entry.body for entry in self.told if isinstance(entry.body, m.TaskBid)]
 
     # --- what it hears -----------------------------------------------------------------
 
@@ -207,8 +207,8 @@ class PretendedDva:
                 return m.Reply(message.message_id, m.BUSY, f"held by {held.holder}")
             return m.Reply(message.message_id, m.OK, "", self._permit(message.source, body))
         if isinstance(body, m.GetGrant):
-            told = confirmation(self.sessions.get(message.source))
-            return replace(told, answers=message.message_id)
+            reported = confirmation(self.sessions.get(message.source))
+            return replace(reported, answers=message.message_id)
         if isinstance(body, m.PermissionRevocation) and self.sessions.pop(body.device, None):
             self.device.ask(body.device, body)
         return m.Reply(message.message_id, m.OK, "")

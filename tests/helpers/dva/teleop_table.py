@@ -48,8 +48,8 @@ def robot_in(state: str) -> RobotController:
     if holder is not None:
         robot.inquiry.about_holder(holder)
         robot.inquiry.next(0.0)
-        told = m.Permission(holder, "teleoperation", HELD)
-        _say(robot, DVA, m.Reply(1, m.OK, "", told))
+        reported = m.Permission(holder, "teleoperation", HELD)
+        _say(robot, DVA, m.Reply(1, m.OK, "", reported))
     robot.mode, robot.owner = mode, None if mode is Mode.IDLE else holder
     robot.last_order_id = robot.last_set_id = LAST
     robot.last_valid, robot.emergency_at = NOW - 1.0, EMERGENCY_AT
@@ -89,8 +89,8 @@ def _deliver(robot: RobotController, kind: str, facts: Facts) -> tuple[int, bool
     if not facts["current"]:
         robot.inquiry.is_over(session)
     if facts["somebody"]:
-        told = m.Permission(SENDER, "teleoperation", session)
-        return _say(robot, DVA, m.Reply(1, m.OK, "", told))
+        reported = m.Permission(SENDER, "teleoperation", session)
+        return _say(robot, DVA, m.Reply(1, m.OK, "", reported))
     return _say(robot, DVA, m.Reply(1, m.NOT_PERMITTED, "nobody holds it"))
 
 

@@ -120,8 +120,8 @@ def _all_say(elements: list[etree._Element], expected: list[tuple[str, Any]]) ->
 def _one_says(element: etree._Element, value: Any) -> bool:
     if isinstance(value, m.Order) and value.task == "confirm":
         # The usual task may be left out, and may be said.
-        said = [child for child in element if (child.tag, child.text) != ("Task", "confirm")]
-        return _all_say(said, _children(value)[:-1])
+        reports = [child for child in element if (child.tag, child.text) != ("Task", "confirm")]
+        return _all_say(reports, _children(value)[:-1])
     if _has_parts(value):
         return _all_say(list(element), _children(value))
     return len(element) == 0 and same_value(element.text or "", value)

@@ -99,10 +99,10 @@ STRANGER = id_of("operator", 9)
 def forged(operator: ScriptedOperator, _: Witness) -> Script:
     """The drill, but somebody has told the robot in the DVA's name that another holds it."""
     device, steps, reply = operator.device, drill(operator), None
-    said = False
+    reported = False
     while (step := _next(steps, reply)) is not None:
-        if isinstance(step, Ask) and isinstance(step.body, m.StartTeleOp) and not said:
-            said, me = True, device.outbox.source
+        if isinstance(step, Ask) and isinstance(step.body, m.StartTeleOp) and not reported:
+            reported, me = True, device.outbox.source
             device.outbox.source = device.dva
             yield Ask(step.to, m.PermissionGrant(STRANGER, "both", step.session + (9 << 32)))
             device.outbox.source = me

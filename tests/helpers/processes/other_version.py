@@ -37,10 +37,10 @@ def output(words: Sequence[str], **options: Any) -> str:
     pipes = {"stdout": subprocess.PIPE, "text": True, "start_new_session": True}
     with subprocess.Popen(words, **pipes, **options) as program:
         RUNNING.append(program)
-        told, _ = program.communicate()
+        text, _ = program.communicate()
     if program.returncode:
         raise subprocess.CalledProcessError(program.returncode, list(words))
-    return str(told)
+    return str(text)
 
 
 def end_with_signals() -> None:

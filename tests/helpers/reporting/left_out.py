@@ -47,6 +47,6 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> Iterator[N
     skipped = len(reporter.stats.get("skipped", [])) if reporter else 0
     if skipped > MOST_SKIPPED and sys.platform == "linux" and exitstatus == pytest.ExitCode.OK:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
-        told = f"\n{skipped} tests were skipped; at most {MOST_SKIPPED} may be."
-        reporter.write_line(told, red=True)
+        text = f"\n{skipped} tests were skipped; at most {MOST_SKIPPED} may be."
+        reporter.write_line(text, red=True)
     yield

@@ -115,9 +115,9 @@ class RosMachine:
     def odometry(self) -> dict:
         """The newest odometry."""
         message = fixture("odometry-ros2")
-        said = message["msg"]
+        reported = message["msg"]
         when = time.time() - self.lag
-        said["header"] = {
+        reported["header"] = {
             "stamp": {"sec": int(when), "nanosec": int(when % 1 * 1e9)},
             "frame_id": self.frame,
         }
@@ -128,9 +128,9 @@ class RosMachine:
             "w": math.cos(self.heading / 2),
         }
         place = {"x": self.x, "y": self.y, "z": 0.0}
-        said["pose"]["pose"] = {"position": place, "orientation": turn}
-        said["twist"]["twist"]["linear"]["x"] = self.speed
-        said["twist"]["twist"]["angular"]["z"] = self.turn_rate
+        reported["pose"]["pose"] = {"position": place, "orientation": turn}
+        reported["twist"]["twist"]["linear"]["x"] = self.speed
+        reported["twist"]["twist"]["angular"]["z"] = self.turn_rate
         return message
 
 

@@ -216,7 +216,7 @@ def pairs(folder: Path, study: Any, whole: Any, calls: int, rng: random.Random) 
 
 def disk(folder: Path) -> dict[str, Any]:
     """Give the disk a little more each time that it was full."""
-    study, told = kit.study_in(folder), []
+    study, reports = kit.study_in(folder), []
     plain = folder / "plain"
     run(plain, study)
     small = folder / "small"
@@ -228,7 +228,7 @@ def disk(folder: Path) -> dict[str, Any]:
             run(small / "out", study)
             break
         except DvaSimError as error:
-            told.append(str(error))
+            reports.append(str(error))
         size += STEP_KB
         mount(small, size, "remount")
     equal = kit.files(small / "out") == kit.files(plain)
@@ -240,7 +240,7 @@ def disk(folder: Path) -> dict[str, Any]:
     write_report(plain)
     pages = {(folder / "report.html").read_bytes() for folder in (small / "out", plain)}
     return {
-        "told": told,
+        "told": reports,
         "equal": equal,
         "report": report,
         "report equal": len(pages) == 1,

@@ -114,8 +114,8 @@ def test_a_link_needs_no_root_where_user_namespaces_are_allowed():
     need_link(rootless=True)
     with LinkProcess(LinkConfig(), 1, rootless=True) as link:
         found = link.start("near", ["sh", "-c", "cat /proc/self/uid_map; id -u"], stdout=-1)
-        told = found.communicate()[0].decode().split()
-    assert told[-1] == str(os.getuid())
+        output = found.communicate()[0].decode().split()
+    assert output[-1] == str(os.getuid())
 
 
 def test_a_published_port_leads_to_the_near_end_past_the_link(programs, tmp_path):

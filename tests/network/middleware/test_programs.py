@@ -111,10 +111,10 @@ def test_notes_of_a_killed_program_are_read_as_far_as_they_are_whole(tmp_path):
 
 @pytest.mark.system
 def test_an_operator_whom_nobody_answers_says_so_and_ends(tmp_path):
-    told = plan(tmp_path, ready_by=time.monotonic() + 0.2, port=free_port())
+    reported = plan(tmp_path, ready_by=time.monotonic() + 0.2, port=free_port())
     words = [sys.executable, "-m", "dva_sim.network.middleware.programs"]
     ended = subprocess.run(
-        [*words, "near", told.model_dump_json()], capture_output=True, text=True, timeout=60
+        [*words, "near", reported.model_dump_json()], capture_output=True, text=True, timeout=60
     )
     assert ended.returncode == NOT_CONNECTED
     assert len(ended.stderr.splitlines()) == 1

@@ -74,11 +74,11 @@ def test_two_full_segments_are_acknowledged_at_once_though_nobody_reads():
 @pytest.mark.parametrize(("pushes", "waits"), [(False, 0.04), (True, 0.0)])
 def test_a_full_segment_with_more_to_come_waits_for_it_though_the_program_reads(pushes, waits):
     """Measured on Linux 6.18: only small segments or those with PSH are acknowledged on reading."""
-    clock, told = Clock(), []
+    clock, reports = Clock(), []
     receiver = Receiver(clock, options(), RoundTrip(options()), lambda: acknowledge())
 
     def acknowledge():
-        told.append(clock.now)
+        reports.append(clock.now)
         receiver.leaves(clock.now, False)
 
     def hears(length, has_push):
@@ -91,12 +91,12 @@ def test_a_full_segment_with_more_to_come_waits_for_it_though_the_program_reads(
     for number in range(QUICK + 1):
         clock.run(0.1 * number)
         hears(100, True)
-    assert len(told) == QUICK + 1
+    assert len(reports) == QUICK + 1
     since = 0.1 * (QUICK + 1)
     clock.run(since)
     hears(1448, pushes)
     clock.run(4.0)
-    assert told[-1] == pytest.approx(since + waits)
+    assert reports[-1] == pytest.approx(since + waits)
 
 
 def test_without_delayed_acknowledgements_each_segment_has_its_own_at_once():

@@ -25,9 +25,9 @@ def opened(delay=0.05, lose_out=(), lose_back=(), until=200.0, dead=False, opene
 
 def ends(pair, end):
     """Times at which an end learns that the connection is over."""
-    told = []
-    end.on_end = lambda: told.append(round(pair.clock.now, 6))
-    return told
+    reports = []
+    end.on_end = lambda: reports.append(round(pair.clock.now, 6))
+    return reports
 
 
 def test_the_opener_may_write_after_one_round_trip_and_the_peer_after_one_and_a_half():
@@ -125,14 +125,14 @@ def test_finishing_with_unread_bytes_resets_at_once():
 
 def test_a_closed_connection_sends_and_tells_nothing_more():
     pair = Pair()
-    told = []
-    pair.opener.on_end = pair.peer.on_end = lambda: told.append(1)
+    reports = []
+    pair.opener.on_end = pair.peer.on_end = lambda: reports.append(1)
     pair.out.dead = True
     pair.write_at([1.0])
     pair.at(1.1, pair.connection.close)
     pair.clock.run(60.0)
     assert pair.sent(1.05) == []
-    assert told == []
+    assert reports == []
     assert pair.opener.write(400) == 0
 
 

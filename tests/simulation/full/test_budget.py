@@ -99,8 +99,8 @@ def log(*applied: Applied, started: float = 0.0) -> DriveLog:
 def test_each_stage_is_the_time_between_two_records():
     command = Applied(2.0, 2.05, 2.25, 2.35, 9.0, sample_age=0.1, captured=1.0)
     row = delay_budget([driven(log(command), 2.75)], MOTOR)
-    told = {name: round(row[f"delay_{name}_s"], 9) for name in STAGES}
-    assert told == {
+    values = {name: round(row[f"delay_{name}_s"], 9) for name in STAGES}
+    assert values == {
         "frame": 0.2,  # wanted from 1.7 s, sampled at 1.9 s
         "downlink": 0.5,
         "human": 0.2,

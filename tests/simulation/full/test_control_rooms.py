@@ -66,10 +66,14 @@ def test_each_control_room_is_told_what_changes_and_of_each_decision(staffed):
     assert (first.dispatch.dispatch_mode, first.dispatch.role) == ("ask_first", "supervise")
     assert other.events[1].proposed is not None
     staffed.ask(0, m.Acknowledge(1), m.Assign(1, GUARD, decisions=0), m.AddNote(1, "mind the step"))
-    told = other.events[1]
-    assert told.acknowledged is not None
-    assert (told.acknowledged.label, told.responder) == ("control-room-1", GUARD)
-    assert (told.event_state, told.note, told.proposed) == ("assigned", "mind the step", None)
+    reported = other.events[1]
+    assert reported.acknowledged is not None
+    assert (reported.acknowledged.label, reported.responder) == ("control-room-1", GUARD)
+    assert (reported.event_state, reported.note, reported.proposed) == (
+        "assigned",
+        "mind the step",
+        None,
+    )
     assert [record.action for record in records] == ["acknowledge", "assign", "note"]
 
 
@@ -141,8 +145,8 @@ def test_a_dva_whose_control_rooms_decided_is_replayed_from_its_trace(tmp_path):
     again = list(replay_dva(lines, tmp_path / "dva.jsonl"))
     assert len(again) > 50
     assert [one for one in again if one.then != one.now] == []
-    said = {json.loads(line).get("do") for line in lines[1:]}
-    assert "handle" in said
+    kinds = {json.loads(line).get("do") for line in lines[1:]}
+    assert "handle" in kinds
 
 
 def test_after_a_lost_publication_the_list_tells(staffed):

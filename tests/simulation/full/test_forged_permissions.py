@@ -48,9 +48,9 @@ class Forger:
         data = outbox.encode(ROBOT, body, self.run.clock.now, session)
 
         def answered(reply: bytes) -> None:
-            said = decode(reply).body
-            assert isinstance(said, m.Reply)
-            self.codes.append(said.code)
+            body = decode(reply).body
+            assert isinstance(body, m.Reply)
+            self.codes.append(body.code)
 
         self.requester.request(data, answered)
 

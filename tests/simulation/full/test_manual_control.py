@@ -233,10 +233,10 @@ def test_every_fault_is_told_acts_and_leaves_no_trace_when_it_is_undone(bench):
     assert not faults.any
     assert robot.inbox.service is service
     assert frames
-    story = [told.what for told in bench.run.recorder.timeline if told.who == "robot-1"]
+    story = [reported.what for reported in bench.run.recorder.timeline if reported.who == "robot-1"]
     faulty = [what for what in story if what.startswith("fault: ")]
-    told = zip(faulty, ("2.5 s", "replies", "camera", "temperature", "usual"), strict=True)
-    assert all(word in what for what, word in told)
+    reported = zip(faulty, ("2.5 s", "replies", "camera", "temperature", "usual"), strict=True)
+    assert all(word in what for what, word in reported)
     assert bench.broken == set()
 
 

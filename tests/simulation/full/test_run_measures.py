@@ -84,6 +84,6 @@ def test_a_policy_that_raises_is_counted_and_told(tmp_path):
     policy = {"dispatch.policy": f"{tmp_path / 'mine.py'}:Mine"}
     recording = simulate(scenarios.build(scenarios.load("fire-drill"), policy), 3)
     assert episode_measures.run_row(recording)["plugin_failures"] > 0
-    told = [line.what for line in recording.recorder.timeline if "policy failed" in line.what]
-    assert len(told) == 1
-    assert not unnamed(told[0], "min_eta", "RuntimeError: no idea")
+    story = [line.what for line in recording.recorder.timeline if "policy failed" in line.what]
+    assert len(story) == 1
+    assert not unnamed(story[0], "min_eta", "RuntimeError: no idea")

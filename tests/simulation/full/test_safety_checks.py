@@ -96,13 +96,13 @@ def recorded(fact: Any) -> Any:
     """A fact as it comes back from JSON."""
     if isinstance(fact, Sent):
         return fact
-    word, time, told = as_plain(fact)
-    return of_plain(word, time, json.loads(json.dumps(told, allow_nan=False)))
+    word, time, text = as_plain(fact)
+    return of_plain(word, time, json.loads(json.dumps(text, allow_nan=False)))
 
 
 def test_what_the_audit_checks_is_said_of_every_rule_it_can_find_broken():
     assert list(CHECKED) == list(RULES) == [f"S{number}" for number in range(1, 8)]
-    assert all("slack" in said for said in CHECKED.values())
+    assert all("slack" in entry for entry in CHECKED.values())
 
 
 def test_an_honest_drive_breaks_no_rule():
@@ -682,8 +682,8 @@ def test_a_guard_that_says_from_its_post_that_it_has_arrived_is_replaced_after_a
     monkeypatch.setattr(GuardAgent, "_depart", lazy)
     alone = {"robot.count": 0, "operator.count": 0, "guard.count": 2}
     run = played(**alone, **{"dispatch.merge_distance_m": 0, "horizon_s": 150})
-    told = {moment.what: moment.time for moment in run.recorder.timeline}
-    (over,) = (time for what, time in told.items() if "order is over" in what)
+    story = {moment.what: moment.time for moment in run.recorder.timeline}
+    (over,) = (time for what, time in story.items() if "order is over" in what)
     assert over == pytest.approx(141.0, abs=2.0)
     assert counted(run.dva.desk.counters, "from afar") == 1
     assert run.dva.events[1].responder == id_of("guard", 2)

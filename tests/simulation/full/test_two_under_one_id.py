@@ -17,9 +17,9 @@ def test_the_second_robot_of_an_id_is_refused_and_that_is_told_once_at_each_side
     second.address = ELSEWHERE
     second.register()
     run.run()
-    said = [moment for moment in run.recorder.timeline if "regist" in moment.what]
-    assert [moment.who for moment in said] == ["dva", "robot-1"]
-    assert all(f"{ELSEWHERE}" in s.what or "under this id" in s.what for s in said)
+    story = [moment for moment in run.recorder.timeline if "regist" in moment.what]
+    assert [moment.who for moment in story] == ["dva", "robot-1"]
+    assert all(f"{ELSEWHERE}" in s.what or "under this id" in s.what for s in story)
     assert run.dva.desk.registry.entries[ROBOT].device.address != ELSEWHERE
     assert run.recorder.drives[0].outcome == "confirmed"
     assert counted(run.dva.desk.counters, "id in use") > 10

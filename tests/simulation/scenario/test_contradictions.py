@@ -97,9 +97,9 @@ def test_shipped_scenarios_do_not_contradict_themselves(name):
 
 def test_a_study_tells_each_kind_once_with_the_number_of_configurations():
     study = load_study("req-rep-vs-pub-sub", ["link.delay_s=[0, 3, 4]"], version="quick")
-    told = contradictions_in(cell_grid.cells(study))
-    assert [one.split()[0] for one in told].count("robot.max_age_s") == 1
-    assert any(not unnamed(one, "4 of 11") for one in told)
+    reported = contradictions_in(cell_grid.cells(study))
+    assert [one.split()[0] for one in reported].count("robot.max_age_s") == 1
+    assert any(not unnamed(one, "4 of 11") for one in reported)
 
 
 def test_an_episode_begins_with_the_warning():

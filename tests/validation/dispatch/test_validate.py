@@ -51,8 +51,8 @@ def only_one_identity(monkeypatch):
 
 def test_a_right_core_passes_and_says_what_is_too_rough(tmp_path, capsys, only_one_identity):
     assert validate("dispatch", case_file=a_file(tmp_path), quick=True, jobs=1, seed=1) == 0
-    told = capsys.readouterr().out
-    assert not unnamed(told, "agree", "quick run")
+    output = capsys.readouterr().out
+    assert not unnamed(output, "agree", "quick run")
 
 
 def test_a_full_run_that_is_too_rough_fails(tmp_path, only_one_identity):

@@ -67,10 +67,10 @@ def test_what_is_missing_is_counted(compared):
 
 def test_a_row_of_the_table_shows_measured_and_predicted(compared):
     [row] = result_page.table(compared, "lossless")
-    told = dict(zip(result_page.HEADS, row, strict=True))
-    assert told["depth"] == "message"
-    assert told["age [ms]"].startswith("105.3 → 105.1 |")
-    assert told["verdict"] == "passes"
+    reported = dict(zip(result_page.HEADS, row, strict=True))
+    assert reported["depth"] == "message"
+    assert reported["age [ms]"].startswith("105.3 → 105.1 |")
+    assert reported["verdict"] == "passes"
 
 
 @pytest.mark.parametrize("again", [False, pytest.param(True, marks=pytest.mark.soak)])

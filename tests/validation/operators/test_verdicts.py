@@ -140,8 +140,8 @@ def test_fires_and_people_on_foot_stand_under_a_heading_of_their_own():
 def test_how_they_steered_is_told_cell_by_cell_where_it_differs():
     lag = {name: trials(move_and_wait_share=(0, 0)) for name in ("8.3", "25")}
     reach = {"0": lag["25"], "1.5": trials(move_and_wait_share=(0.5, 1.0))}
-    told = result_page.steered({"steering": lag, "excavator": reach})
-    assert [(name, re.findall(r"[\d.]+", shares)) for name, shares in told] == [
+    reported = result_page.steered({"steering": lag, "excavator": reach})
+    assert [(name, re.findall(r"[\d.]+", shares)) for name, shares in reported] == [
         ("steering", ["0"]),
         ("excavator, by delay [s]", ["0", "0", "1.5", "75"]),
     ]

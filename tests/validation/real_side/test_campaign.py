@@ -57,11 +57,11 @@ def test_a_row_says_what_it_is_of(tmp_path, played):
 
 def test_what_is_there_is_not_measured_again(tmp_path, played):
     measure_all([SLOW], [1, 2], tmp_path / "own.csv")
-    told: list[Progress] = []
-    measure_all([SLOW, FAST], [1, 2], tmp_path / "own.csv", told.append)
+    reports: list[Progress] = []
+    measure_all([SLOW, FAST], [1, 2], tmp_path / "own.csv", reports.append)
     assert played[2:] == [(FAST.label, 1), (FAST.label, 2)]
-    assert [(progress.done, progress.total) for progress in told] == [(2, 4), (3, 4), (4, 4)]
-    assert told[0].left_s > told[1].left_s > told[2].left_s == 0
+    assert [(progress.done, progress.total) for progress in reports] == [(2, 4), (3, 4), (4, 4)]
+    assert reports[0].left_s > reports[1].left_s > reports[2].left_s == 0
 
 
 def test_a_campaign_that_is_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
@@ -84,11 +84,11 @@ def test_a_run_that_fails_is_told_and_the_others_go_on(tmp_path, monkeypatch):
             raise EmulatorError("there was no handshake within 60 s")
 
     pretend(monkeypatch, fail_once)
-    told: list[Progress] = []
-    failures = measure_all([SLOW], [1, 2], tmp_path / "own.csv", told.append)
+    reports: list[Progress] = []
+    failures = measure_all([SLOW], [1, 2], tmp_path / "own.csv", reports.append)
     (failure,) = failures
     assert not unnamed(failure, f"own_{SLOW.label}_s1: ", "60 s")
-    assert (told[-1].done, told[-1].total) == (1, 2)
+    assert (reports[-1].done, reports[-1].total) == (1, 2)
 
 
 def test_a_campaign_stops_when_nothing_works(tmp_path, monkeypatch):
@@ -96,10 +96,10 @@ def test_a_campaign_stops_when_nothing_works(tmp_path, monkeypatch):
         raise EmulatorError("the robot failed")
 
     pretend(monkeypatch, fail)
-    told: list[Progress] = []
+    reports: list[Progress] = []
     with pytest.raises(EmulatorError, match="the robot failed"):
-        measure_all([SLOW], range(100), tmp_path / "own.csv", told.append)
-    assert len(told) == 3
+        measure_all([SLOW], range(100), tmp_path / "own.csv", reports.append)
+    assert len(reports) == 3
 
 
 def test_two_conditions_with_one_seed_do_not_share_their_random_numbers():

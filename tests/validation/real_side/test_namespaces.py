@@ -176,9 +176,9 @@ def test_a_run_that_takes_too_long_is_ended():
 
 def test_a_congestion_control_that_the_kernel_does_not_have_is_told_in_one_line():
     need_link()
-    with pytest.raises(EmulatorError, match="'none-such'") as told:
+    with pytest.raises(EmulatorError, match="'none-such'") as error:
         run_job(EmulatedJob("nothing", congestion="none-such"))
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(error.value)
 
 
 def test_where_packets_can_be_emulated_nothing_is_missing():
@@ -191,5 +191,5 @@ def test_where_devices_are_forbidden_one_line_says_what_is_needed(monkeypatch):
         raise EmulatorError("a user namespace is refused: Operation not permitted")
 
     monkeypatch.setattr("dva_sim.validation.network.real_side.cell.run_job", refuse)
-    told = why_no_packets()
-    assert not unnamed(told, "Linux", "/dev/net/tun", "Operation not permitted")
+    reported = why_no_packets()
+    assert not unnamed(reported, "Linux", "/dev/net/tun", "Operation not permitted")

@@ -20,10 +20,10 @@ print(json.dumps(notes.read()))
 
 
 def test_notes_of_a_process_are_read_after_it_ended():
-    told = patience.run(
+    ended = patience.run(
         [sys.executable, "-c", A_PROCESS_NOTES_AND_ENDS], capture_output=True, text=True, check=True
     )
-    assert json.loads(told.stdout) == [[4, 0, 1.5], [8, 3, 2.25]]
+    assert json.loads(ended.stdout) == [[4, 0, 1.5], [8, 3, 2.25]]
 
 
 def test_there_is_no_note_without_room():

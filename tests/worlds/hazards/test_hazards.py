@@ -44,9 +44,9 @@ def test_what_is_not_known_is_said_by_its_names():
         ("gas_leak", {"rate": 1e9}, "rate: most 10, 1000000000"),
         ("gas_leak", {"wind": 51.0}, "wind: most 50, 51"),
     ):
-        with pytest.raises(ConfigError) as told:
+        with pytest.raises(ConfigError) as error:
             make_hazard(kind, (0.0, 0.0), 0.0, **settings)
-        assert unnamed(told.value, *names.split()) == []
+        assert unnamed(error.value, *names.split()) == []
 
 
 # --- fire ------------------------------------------------------------------------------

@@ -113,8 +113,8 @@ def test_a_row_outside_its_band_is_named_and_fails_the_model(results, capsys, mo
     monkeypatch.setitem(GOOD, "command_rate_hz", 15.0)
     found = validation.validate("network", beside=results(), quick=True, jobs=1)
     assert found == ExitCode.GATE_FAILED
-    said = capsys.readouterr().out
-    assert unnamed(said, "12 of 14", "command_rate_hz", "outside") == []
+    output = capsys.readouterr().out
+    assert unnamed(output, "12 of 14", "command_rate_hz", "outside") == []
 
 
 def test_disturbed_runs_are_not_judged(results):
