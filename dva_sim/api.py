@@ -72,7 +72,7 @@ def episode(
         still: Draw one moment: `.png`, `.pdf` or `.svg`.
         strip: Draw several moments in one figure: .png, .pdf or .svg.
         at: Moment of the still, or moments of the strip: 10,20,30. In seconds, also as numbers.
-        panels: How many moments a strip has.
+        panels: Number of moments in a strip.
         camera: The still shows what this robot's camera sees.
         inset: Show in the film what a robot's camera sees.
         side_by_side: Run the same seed under two patterns. The episode is that of the first.
@@ -115,7 +115,7 @@ def replay(
         still: Draw one moment: `.png`, `.pdf` or `.svg`.
         strip: Draw several moments in one figure: .png, .pdf or .svg.
         at: Moment of the still, or moments of the strip: 10,20,30. In seconds, also as numbers.
-        panels: How many moments a strip has.
+        panels: Number of moments in a strip.
         camera: The still shows what this robot's camera sees.
         inset: Show in the film what a robot's camera sees.
         ros2: Write a ROS 2 bag to a new folder.
@@ -159,14 +159,14 @@ def run(
         out: Results folder; default: `results/STUDY`.
         set: Change a key. Or several: a mapping, or `key=value` pairs.
         seed: Random seed of the whole study. In place of its own.
-        jobs: How many processes; default: one for each core.
+        jobs: Number of processes; default: one for each core.
         scheduler: Use a dask.distributed cluster instead. Its address; recordings are made here.
         limit_s: A run that takes longer has failed. By the wall clock [s].
         quick: The study's small version.
         full: The study's larger version.
         pilot: Run only this many persons, with a random seed of their own. The study never uses it.
         progress: Called with the number of runs done and of all runs, as they finish.
-        report: Whether to write the report.
+        report: True to write the report.
 
     Returns:
         What came out; `failures` tells of runs that failed.
@@ -276,7 +276,7 @@ def tune(
     Args:
         study: A study, by name or path.
         out: Folder of the trials; default: `results/STUDY-tuning`.
-        jobs: How many processes; default: one for each core.
+        jobs: Number of processes; default: one for each core.
         progress: Called with the number of trials done and of all trials, as they finish.
 
     Raises:
@@ -322,7 +322,7 @@ def show(
     Args:
         folder: A results folder.
         table: Show the rows of a table.
-        rows: How many of them.
+        rows: Number of rows to print.
         columns: Explain the columns of one table or all.
 
     Raises:

@@ -426,7 +426,7 @@ class AgentDevice:
 
         Args:
             body: The finding.
-            on_reply: Takes the first reply.
+            on_reply: Callback for the first reply.
             on_failure: Called if there is none.
         """
         life = self._life

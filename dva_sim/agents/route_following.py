@@ -265,8 +265,8 @@ class Reach:
     """Limits of the robot, or of the cursor.
 
     Attributes:
-        speed: At most [m/s].
-        turn_rate: At most, either way [rad/s].
+        speed: Largest speed [m/s].
+        turn_rate: Largest turn rate, either way [rad/s].
         radius: Radius of its sharpest curve [m]; 0: it turns on the spot.
     """
 

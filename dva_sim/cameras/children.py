@@ -32,7 +32,7 @@ class Child:
     It ends when its pipe does, whatever happens to us. Ctrl-C of a terminal reaches us alone.
 
     Args:
-        name: For people.
+        name: Name for people.
         module: Module to run.
         words: Its further arguments.
         others: Sockets that it gets beside its pipe.

@@ -51,7 +51,7 @@ class Screens:
     Args:
         screen: Id of a device of its own.
         numbers: Numbers of all agents, by id or name.
-        tell: Takes a line for each frame that has arrived, and the robot's number.
+        tell: Callback for a line for each frame that has arrived, and the robot's number.
     """
 
     def __init__(

@@ -33,7 +33,7 @@ class CameraService:
         host: Address to listen on.
         port: Port; if it is taken, or 0, any free one.
         clock: Clock of the run.
-        tell: Takes a line for the story of the run.
+        tell: Callback for a line for the story of the run.
 
     Attributes:
         base: URL below which the cameras are.

@@ -132,7 +132,7 @@ def folder(help: str, *names: str) -> Any:
     return file(help, *names, metavar="FOLDER")
 
 
-_JOBS = "How many processes; default: one for each core."
+_JOBS = "Number of processes; default: one for each core."
 Jobs = count(_JOBS, "-j", "--jobs", least=1, most=MOST_JOBS, of=int | None)
 RunSeed = count("The run's random seed.")
 ScenarioName = argument("A scenario by name or path.", "SCENARIO", SCENARIOS)
@@ -177,13 +177,13 @@ OPTIONS: dict[str, Any] = {
     "mcap": text("Turn an .mcap.part into a complete recording in a new file.", metavar="FILE"),
     "name": argument("Name or path of the new study.", "NAME"),
     "overwrite": Overwrite,
-    "panels": count("How many moments a strip has.", least=1, most=24),
+    "panels": count("Number of moments in a strip.", least=1, most=24),
     "pdf": flag("--pdf", "Also print it as PDF, using Chromium."),
     "pilot": count(_PILOT, metavar="PERSONS", least=1, of=int | None),
     "quick": flag("--quick", "The study's small version."),
     "record": text("Record the run in a file: .mcap, for replay and viewers.", metavar="FILE"),
     "ros2": text("Write a ROS 2 bag to a new folder.", metavar="FOLDER"),
-    "rows": count("How many of them.", least=1),
+    "rows": count("Number of rows to print.", least=1),
     "scenario": ScenarioName,
     "scheduler": text("Use a dask.distributed cluster instead.", metavar="tcp://HOST:PORT"),
     "second": argument("The results folder to compare with it.", "B"),

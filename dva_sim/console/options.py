@@ -28,7 +28,7 @@ class ConsoleOptions(PageOptions):
     """Options of a console: scenario, and address of its page.
 
     Attributes:
-        scenario: By name or path.
+        scenario: Name or path.
         seed: Random seed.
         changes: Changes of the scenario, `KEY=VALUE`.
         links: `modelled` as in a study, or `real`: sockets, which others may join.

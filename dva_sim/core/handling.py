@@ -14,7 +14,7 @@ class Choice(NamedTuple):
         label: Label of the author.
         action: Kind of decision, as in `audit.Fact`.
         time: Time [s].
-        reason: In words; may be empty.
+        reason: Reason in words; may be empty.
         device: About whom; empty: about nobody.
     """
 

@@ -242,7 +242,7 @@ class Permissions:
     """At most one grant to drive each robot, and any number to read its sensors.
 
     Attributes:
-        draw: Gives `LOW_BITS` random bits.
+        draw: Function that returns `LOW_BITS` random bits.
         count: Sessions handed out so far, from any start that is higher than in an earlier
             life of the DVA: it makes sessions grow.
         changes: Number of grants made or ended.

@@ -61,7 +61,7 @@ class Store:
     """The file that a DVA writes down what it must not forget in.
 
     Args:
-        file: Made if it does not exist.
+        file: File; created if missing.
 
     Attributes:
         past: Added to the DVA's time it gives the time that is kept [s].

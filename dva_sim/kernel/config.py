@@ -393,7 +393,7 @@ def validate(
     Args:
         model: The pydantic model.
         data: Plain data.
-        error: Makes the error for a problem at a key path; normally `Document.error`.
+        error: Function that makes the error for a problem at a key path; normally `Document.error`.
 
     Raises:
         ConfigError: the first mistake, with the key and what would be right.

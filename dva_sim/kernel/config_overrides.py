@@ -80,7 +80,7 @@ def blame(
     Args:
         error: A mistake of all changes together.
         changes: New values by dotted key.
-        make: Makes what is wanted of some of the changes; raises `ConfigError`.
+        make: Function that builds the result from some of the changes; raises `ConfigError`.
         source: The file that is changed.
     """
 

@@ -23,7 +23,7 @@ class Measure:
 
     Attributes:
         name: Name of the column; it ends in the unit.
-        meaning: In words, for the data dictionary.
+        meaning: Meaning in words, for the data dictionary.
         title: In reports; left out, the name without its unit.
         better: Better direction, where one has to be chosen.
         awaits: Event that a duration waits for, such as `confirmation`. A run in which it never

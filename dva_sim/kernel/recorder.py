@@ -20,7 +20,7 @@ class Moment(NamedTuple):
     Attributes:
         time: Time [s].
         who: The agent it is about.
-        what: In words.
+        what: Description in words.
         kind: `event`, `order`, `drive`, `mode`, `link` or `safety`.
     """
 
@@ -213,7 +213,7 @@ class DriveLog:
         refused: Number of commands refused, by reply code, including those without a reply.
         refusal: The code that ended it, if one did.
         disturbed: Time of the scenario's disturbance [s].
-        round_trips: From each command's request to its reply [s]; none of what is published.
+        round_trips: Time from each command's request to its reply [s]; none of what is published.
         samples: Number of accelerometer samples, in all batches after which the phone's filter was
             read.
         values: Number of such batches; 0 for a filter without batches.
@@ -224,7 +224,7 @@ class DriveLog:
         intents: Commands wanted, in order.
         workload: Workload measures of the way of steering, such as `waits`.
         taken_up: Time at which the operator turned to the order [s].
-        attended: From when to when the operator looked at this robot's picture [s].
+        attended: Time from when to when the operator looked at this robot's picture [s].
         looks_since: From when on it has been looking [s]; None: it looks elsewhere.
         turned_to: Number of times the operator turned to it from another order.
         waits_from: Time at which the robot reached the place where its operator has to judge [s].

@@ -35,7 +35,7 @@ class FoxgloveServer:
     """Serves one run.
 
     Args:
-        seed: With which seed.
+        seed: Random seed.
         port: To listen on; 0 for any that is free.
 
     Attributes:

@@ -17,7 +17,7 @@ class Inlets:
     """Pipes that parts write lines into, each read by a thread.
 
     Args:
-        keep: Takes whole lines; None: nobody keeps them.
+        keep: Callback for whole lines; None: nobody keeps them.
         judge: Likewise.
         also: Likewise, after them.
     """

@@ -87,7 +87,7 @@ def run_part(
     Args:
         name: `dva`, `world` or `operator`.
         options: Scenario, addresses and other options.
-        say: Takes a report as soon as the part listens, each second, and one at the end.
+        say: Callback for a report as soon as the part listens, each second, and one at the end.
         number: Number of the operator.
         epoch: Start of the run by `time.monotonic`, which all processes of a machine share [s].
         supervised: True to end when standard input does: the parent process has gone.

@@ -63,7 +63,7 @@ class LiveRecorder(Recorder):
         keeps: Write everything for a recording; else only the facts that rules are judged by.
 
     Attributes:
-        log: Takes the facts that this part sees; None: it sees neither robots nor the DVA.
+        log: Callback for the facts that this part sees; None: it sees neither robots nor the DVA.
         is_own: Predicate for device ids of this run: their messages are kept where they are sent,
             those of others where they arrive.
     """
@@ -281,9 +281,9 @@ class Keeper:
 
     Args:
         target: The recording that is to be made.
-        seed: With which seed.
+        seed: Random seed.
         judge: Judges it by the safety rules meanwhile; None: somebody else does that.
-        also: Takes whole lines, too; None: nobody does.
+        also: Callback for whole lines, too; optional.
 
     Attributes:
         inlets: Files that parts write to.
@@ -363,7 +363,7 @@ class RunKeeping:
     Args:
         options: Options of the run.
         scenario: The scenario that is run.
-        also: Takes whole lines, too; None: nobody does.
+        also: Callback for whole lines, too; optional.
 
     Raises:
         ConfigError: the recording cannot be written.

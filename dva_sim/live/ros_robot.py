@@ -42,7 +42,7 @@ class RosRobotOptions:
     Attributes:
         ros: Address of the rosbridge server, `ws://HOST:PORT`.
         namespace: Namespace of the robot's topics.
-        profile: By name or path.
+        profile: Name or path.
         number: Number of the robot at the DVA, from 1.
         dva: Address of the DVA, `HOST:PORT`.
         host: Address of this machine to listen on.

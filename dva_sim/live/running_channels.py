@@ -31,7 +31,7 @@ class RunningChannels:
     """Turns lines into messages, one after the other; see `ToldRun` for the lines.
 
     Args:
-        seed: With which seed.
+        seed: Random seed.
     """
 
     def __init__(self, scenario: Scenario, seed: int) -> None:

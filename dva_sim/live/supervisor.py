@@ -73,7 +73,7 @@ class Supervisor:
 
     Args:
         options: Scenario and other options.
-        hear: Takes each report of each part.
+        hear: Callback for each report of each part.
         rosbridge: Port for clients of ROS; None: there is none.
         foxglove: Server that shows the run; None: there is none.
     """

@@ -80,7 +80,7 @@ class RunCarrier:
         Args:
             clock: Waits for what arrives.
             ring: Keys of the devices, for ZeroMQ; None to run without.
-            tell: Takes one line about each connection that could not be made.
+            tell: Callback for one line about each connection that could not be made.
             zeromq: Set on ZeroMQ's sockets.
             broker: Address of MQTT's broker, `HOST:PORT`.
             tells_loss: True if this process reports a lost broker.

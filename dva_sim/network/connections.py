@@ -55,7 +55,7 @@ class Stream:
         clock: The run's clock.
         forward: Carries the data.
         backward: Carries the acknowledgements (their size is neglected).
-        deliver: Takes each payload, once and in order.
+        deliver: Callback for each payload, once and in order.
 
     Attributes:
         deliver: Callback for each message; may be replaced at any time.
@@ -196,8 +196,8 @@ class Connection:
         clock: The run's clock.
         out: The link from the opener.
         back: The link to the opener.
-        at_peer: Takes what the opener sends.
-        at_opener: Takes what the peer sends.
+        at_peer: Callback for messages from the opener.
+        at_opener: Callback for messages from the peer.
     """
 
     HANDSHAKE_ROUND_TRIPS = 3
@@ -300,8 +300,8 @@ class DatagramConnection:
         clock: The run's clock.
         out: The link from the opener.
         back: The link to the opener.
-        at_peer: Takes what the opener sends.
-        at_opener: Takes what the peer sends.
+        at_peer: Callback for messages from the opener.
+        at_opener: Callback for messages from the peer.
     """
 
     depth: Final = "datagram"
@@ -432,8 +432,8 @@ class Connector:
         Args:
             clock: The run's clock.
             links: From the opener, and to it.
-            at_peer: Takes what the opener sends.
-            at_opener: Takes what the peer sends.
+            at_peer: Callback for messages from the opener.
+            at_opener: Callback for messages from the peer.
             publishes: True if the peer publishes to the opener.
         """
         ends = clock, *links, at_peer, at_opener

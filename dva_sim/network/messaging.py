@@ -27,7 +27,7 @@ class Request(NamedTuple):
 
     Attributes:
         data: Its bytes.
-        answer: Takes the bytes of the reply; once, now or later.
+        answer: Callback for the bytes of the reply; once, now or later.
         sender: Id of the device whose key opened the connection; None without keys.
         peer: Local identity of the connection that it came by; meaningless elsewhere.
     """

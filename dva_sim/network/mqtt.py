@@ -93,11 +93,11 @@ class MqttNetwork(RealNetwork):
     Args:
         clock: Waits for what arrives.
         broker: Its address, `HOST:PORT`, which is that of every node.
-        tell: Takes one line when the broker is lost, or found again.
+        tell: Callback for one line when the broker is lost, or found again.
         qos: 0: messages are sent once. 1: until the broker has acknowledged them.
         tells_loss: True to report a lost broker; otherwise another process of the run does.
-        ways: Gives the socket of the file system that leads a node to the broker across a link;
-            None: the node connects to its address.
+        ways: Function that returns the socket of the file system that leads a node to the broker
+            across a link; None: the node connects to its address.
     """
 
     def __init__(

@@ -271,8 +271,8 @@ class RunLog:
         replied: Number of each command whose reply arrived, and when.
         timeouts: Times at which the operator gave up waiting for a reply.
         alerts: Times at which the operator gave up a command after the last attempt.
-        connected_s: From opening the first socket to TCP's connection [s].
-        handshake_s: From opening the first socket to the end of ZeroMQ's handshake [s].
+        connected_s: Time from opening the first socket to TCP's connection [s].
+        handshake_s: Time from opening the first socket to the end of ZeroMQ's handshake [s].
     """
 
     start: float = 0.0

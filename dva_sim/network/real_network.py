@@ -33,7 +33,7 @@ class RealNetwork(ABC):
 
     Args:
         clock: Waits for what arrives.
-        tell: Takes one line about each connection that could not be made.
+        tell: Callback for one line about each connection that could not be made.
 
     Attributes:
         counters: Messages refused or not sent, counted by reason.

@@ -224,7 +224,7 @@ class SocketNetwork(RealNetwork):
     Args:
         clock: Waits for the sockets.
         ring: Keys of the devices; None to run without.
-        tell: Takes one line about each connection that could not be made.
+        tell: Callback for one line about each connection that could not be made.
         zeromq: Set on every socket; `conflate` cannot be, since messages here have several
             parts, of which ZeroMQ would keep the last alone.
         crossing: Leads connections between nodes of this process that are at different ends of a

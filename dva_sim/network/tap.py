@@ -35,8 +35,9 @@ class Exchange:
         peer: Identity of the connection; for a publication, the id of its publisher.
         published: True for a publication, which has no reply.
         reply: Reply; None until there is one.
-        service_s: From arrival to answer [s]: by the run's clock or, where the answer came within
-            the handling of the request, the real time which that took; None without an answer.
+        service_s: Time from arrival to answer [s]: by the run's clock or, where the answer came
+            within the handling of the request, the real time which that took; None without an
+            answer.
     """
 
     number: int
@@ -53,8 +54,9 @@ class Tap:
 
     Args:
         clock: The run's clock.
-        on_exchange: Takes each exchange once the message has been handled, and a request that is
-            answered later a second time, with its reply: the same object, by the same number.
+        on_exchange: Callback for each exchange once the message has been handled, and a request
+            that is answered later a second time, with its reply: the same object, by the same
+            number.
         publications: True to include publications.
     """
 

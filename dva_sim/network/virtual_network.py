@@ -32,9 +32,9 @@ class VirtualNetwork:
 
     Args:
         clock: The run's clock.
-        links: Gives the link from one node to another, and the one back.
+        links: Function that returns the link from one node to another, and the one back.
         traffic: Callback for each message sent: time [s], sender, receiver, size [B], content.
-        connector: Makes the connections.
+        connector: Function that makes the connections.
         delivered: Callback for each message that arrives: time [s], sender, receiver, content.
 
     Attributes:

@@ -176,7 +176,7 @@ class ZmtpEnd:
         tcp: The end of the connection below.
         link: Carries what is sent.
         options: Options of the socket.
-        deliver: Takes each message that arrives, whole and in order.
+        deliver: Callback for each message that arrives, whole and in order.
 
     Attributes:
         pipe: Messages waiting for the encoder.
@@ -333,8 +333,8 @@ class ZmtpConnection:
         clock: The run's clock.
         out: The link from the opener.
         back: The link to the opener.
-        at_peer: Takes what the opener sends.
-        at_opener: Takes what the peer sends.
+        at_peer: Callback for messages from the opener.
+        at_opener: Callback for messages from the peer.
         opener: Options of the opener's socket.
         peer: Options of the peer's socket.
     """

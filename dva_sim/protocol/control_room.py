@@ -29,7 +29,7 @@ class SetDispatch:
 
     Attributes:
         dispatch_mode: `automatic` or `ask_first`.
-        reason: In words.
+        reason: Reason in words.
     """
 
     dispatch_mode: str
@@ -52,7 +52,7 @@ class Assign:
         device: Id of the guard or robot.
         operator: Id of the device that is to drive the robot; None: the DVA chooses.
         task: Task as in `Order`; None: `confirm`.
-        reason: In words.
+        reason: Reason in words.
         decisions: `EventStatus.decisions` as the sender has seen it; who has not, cannot take
             an event out of somebody's hands. Where it is not the newest, nothing is done.
     """
@@ -72,7 +72,7 @@ class TakeOff:
     Attributes:
         event_id: The event.
         device: Id of the guard or robot.
-        reason: In words.
+        reason: Reason in words.
         decisions: Expected decision count, as in `Assign`.
     """
 
@@ -103,7 +103,7 @@ class Escalate:
 
     Attributes:
         event_id: The event.
-        reason: In words.
+        reason: Reason in words.
         decisions: Expected decision count, as in `Assign`.
     """
 
@@ -133,7 +133,7 @@ class Revoke:
 
     Attributes:
         device: Id of the robot.
-        reason: In words.
+        reason: Reason in words.
     """
 
     device: str
@@ -158,7 +158,7 @@ class LastDecision:
         label: Label of the author.
         action: `assign`, `take_off`, `false_alarm`, `escalate` or `expire`.
         ago: Age of the decision [s], up to 1e6.
-        reason: In words, if any were given.
+        reason: Reason in words, if any were given.
     """
 
     device: str

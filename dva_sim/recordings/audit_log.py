@@ -89,7 +89,7 @@ class AuditRow(AuditEntry):
     """An entry in its place.
 
     Attributes:
-        number: From 1.
+        number: Number, from 1.
         before: The hash of the row before.
         hash: Hash of this row.
     """
@@ -110,7 +110,7 @@ class AuditLog:
     """A file to which rows are added; an existing log is appended to.
 
     Args:
-        path: Made if it does not exist.
+        path: File; created if missing.
 
     Attributes:
         number: Number of the last row.

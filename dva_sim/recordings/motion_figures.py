@@ -22,7 +22,7 @@ class MotionFigures(NamedTuple):
 
     Attributes:
         samples: Number of samples.
-        duration_s: From the first to the last [s].
+        duration_s: Time from the first to the last [s].
         rate_hz: By the median of the intervals.
         jitter: Standard deviation of the intervals without gaps, as a share of their median.
         gaps: Intervals longer than three medians.

@@ -32,7 +32,8 @@ class RosBody(RobotBody):
         spec: Limits that commands are clamped to.
         clock: Real time.
         period: Between two repetitions of a command [s].
-        send: Takes speed [m/s] and turn rate [rad/s]; returns False if they could not be sent.
+        send: Callback for speed [m/s] and turn rate [rad/s]; returns False if they could not be
+            sent.
 
     Attributes:
         stopped_at: Time since which the robot should slow down and stand [s].

@@ -21,7 +21,7 @@ class Subscribed(NamedTuple):
 
     Attributes:
         type: Type of its messages, in the spelling of this version of ROS.
-        take: Takes each message.
+        take: Callback for each message.
         largest: Larger ones are dropped unread [B].
         throttle_ms: The server sends no more often.
     """

@@ -21,7 +21,7 @@ class Dialling:
         clock: Gives the time to look.
         host: Name or address.
         port: TCP port.
-        connected: Takes the socket, which does not block.
+        connected: Callback for the socket, which does not block.
         failed: Callback with the reason of a failure.
     """
 

@@ -58,8 +58,8 @@ class ScanReader:
 
     Args:
         device: Device that reads.
-        robot: By its id.
-        take: Takes ranges [m].
+        robot: Id of the robot.
+        take: Callback for ranges [m].
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class RosDriver:
 
     Args:
         device: Its own.
-        console: Gives pattern, rate and limits of the next drive.
+        console: Function that returns pattern, rate and limits of the next drive.
     """
 
     def __init__(self, device: AgentDevice, console: Callable[[], Console]) -> None:
@@ -201,14 +201,14 @@ class RosGateway:
 
     Args:
         stage: Stage on which the devices are made.
-        console: Gives pattern, rate and limits of the next drive; None: those of the scenario.
+        console: Function that returns pattern, rate and limits of the next drive; None: those of
+            the scenario.
 
     Attributes:
         robots: Those that the DVA has on its list, by their namespace.
-        on_frame: Takes what has arrived of a robot: the robot, an observation, and when it was
-            captured [s].
-        on_scan: Takes the robot, and ranges [m].
-        on_picture: Takes the robot, a JPEG, and when it was captured [s].
+        on_frame: Callback for news of a robot: the robot, an observation, and its capture time [s].
+        on_scan: Callback for the robot, and ranges [m].
+        on_picture: Callback for the robot, a JPEG, and its capture time [s].
         camera_token: Shown to servers of pictures; empty: none.
     """
 

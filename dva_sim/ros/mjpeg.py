@@ -26,7 +26,7 @@ class MjpegReader:
         clock: Polls the socket.
         url: `http://HOST:PORT/PATH`.
         token: Shown to the server; empty: none.
-        take: Takes each picture, and when it was captured [s]; None: not said.
+        take: Callback for each picture, and its capture time [s]; None: not said.
     """
 
     def __init__(

@@ -65,7 +65,7 @@ class RosPeer:
     """A client.
 
     Args:
-        name: For people.
+        name: Name for people.
         connection: To it.
         host: Its server.
 

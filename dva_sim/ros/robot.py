@@ -46,7 +46,7 @@ class RosRobot:
     Attributes:
         agent: Agent that obeys the DVA and the driver.
         bridge: To its rosbridge server.
-        on_picture: Takes each picture, as JPEG.
+        on_picture: Callback for each picture, as JPEG.
     """
 
     def __init__(

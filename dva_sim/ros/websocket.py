@@ -34,12 +34,12 @@ class WebSocketConnection:
         clock: Polls the socket.
         sock: Connected, not blocking.
         protocol: The state of this end.
-        on_text: Takes each whole text message.
+        on_text: Callback for each whole text message.
         on_end: Callback once, with the reason, when the connection is over.
 
     Attributes:
         is_open: False once the connection is over.
-        on_event: Takes requests and responses of the handshake.
+        on_event: Callback for requests and responses of the handshake.
         heard_at: Time of the newest bytes of the peer, pongs among them [s].
     """
 
@@ -199,7 +199,7 @@ class WebSocketDialer:
         url: Address of the server.
         largest: Size of the largest message that is read [B].
         on_open: Callback when the handshake is done.
-        on_text: Takes each text message.
+        on_text: Callback for each text message.
         on_end: Callback once, when the connection is over or could not be made.
 
     Attributes:

@@ -56,7 +56,7 @@ class PipeEnd:
 
     Args:
         end: Number of the open file; it is closed by `close`.
-        following: Gives what is to be written next; None: nothing.
+        following: Function that returns the next bytes to write; None: nothing.
 
     Attributes:
         is_open: True while the other end is still there.
@@ -137,7 +137,7 @@ class WatchedEnd(PipeEnd):
     Args:
         loop: Watches it.
         end: See `PipeEnd`.
-        take: Gets what comes.
+        take: Callback for incoming data.
         ended: Called once when no more will come.
         following: See `PipeEnd`.
     """

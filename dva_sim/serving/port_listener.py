@@ -52,7 +52,7 @@ class PortListener:
 
     Args:
         sock: A listening socket that does not block.
-        make: Makes the protocol of a connection.
+        make: Function that makes the protocol of a connection.
         context: For TLS; None: without.
         places: The connections of the port.
     """

@@ -45,7 +45,7 @@ def effect_size(
     """Standardised sizes of `a - b`, over persons' means.
 
     Args:
-        a: One treatment `(n,)`, nan where missing.
+        a: Values under one treatment `(n,)`, nan where missing.
         b: The other `(n,)`, row by row the same person and trial.
         person: Person of each run `(n,)`.
         resamples: Number of bootstrap resamples.

@@ -43,7 +43,7 @@ def paired_difference(
     """The mean over persons of `a - b`, run by run.
 
     Args:
-        a: One treatment `(n,)`.
+        a: Values under one treatment `(n,)`.
         b: The other `(n,)`, row by row the same person and trial.
         person: Person of each run `(n,)`.
         level: Confidence level.
@@ -60,7 +60,7 @@ def one_sided_test(
     below 0.025 where the interval of 95 % lies beyond the bound.
 
     Args:
-        a: One treatment `(n,)`, nan where missing.
+        a: Values under one treatment `(n,)`, nan where missing.
         b: The other `(n,)`, row by row the same person and trial.
         person: Person of each run `(n,)`.
         bound: In the measure's unit.
@@ -80,7 +80,7 @@ def equivalence(a: ArrayLike, b: ArrayLike, person: ArrayLike, margin: float) ->
     on sameness. It is below 0.05 where the interval of 90 % lies within the margin.
 
     Args:
-        a: One treatment `(n,)`, nan where missing.
+        a: Values under one treatment `(n,)`, nan where missing.
         b: The other `(n,)`, row by row the same person and trial.
         person: Person of each run `(n,)`.
         margin: Largest difference that does not matter, either way; in the measure's unit.
@@ -105,7 +105,7 @@ def permutation_test(a: ArrayLike, b: ArrayLike, person: ArrayLike) -> float:
     Whether a difference is beyond some bound is for `one_sided_test`.
 
     Args:
-        a: One treatment `(n,)`, nan where missing.
+        a: Values under one treatment `(n,)`, nan where missing.
         b: The other `(n,)`, row by row the same person and trial.
         person: Person of each run `(n,)`.
 

@@ -32,7 +32,7 @@ class AnswerWatch:
 
     Args:
         recorder: Recorder that counts refusals and notes broken rules.
-        now: Gives the time [s].
+        now: Function that returns the time [s].
         nodes: Ids of those who have to answer, with their labels.
         heard: Called with each answer: of whom, to whom, its bytes; whether it gets there or not.
         waits: Returns True for a request that is still in the queue of a node.

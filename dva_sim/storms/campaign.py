@@ -69,7 +69,7 @@ class Journal:
     """Outcomes of storms in a file, one line each, so that a campaign can be resumed.
 
     Args:
-        file: Made if it is not there.
+        file: File; created if missing.
 
     Raises:
         ConfigError: it is something else.

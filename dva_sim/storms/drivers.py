@@ -37,7 +37,7 @@ class BusyDriver:
     """One driver: takes a robot, drives it or sends it somewhere, gives it back, takes another.
 
     Args:
-        number: From 1.
+        number: Number, from 1.
         robots: Ids of the robots.
         sensors: Names of the sensors that robots have.
         chance: Everything that it decides.

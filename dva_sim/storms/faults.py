@@ -42,7 +42,8 @@ class FaultKind:
     Attributes:
         words: Description for people.
         strikes: Kinds of devices that may be its target; empty: none is named.
-        begin: Makes it happen; returns what ends it, if that is to be ended.
+        begin: Function that starts the fault; returns a function that ends it, if it is to be
+            ended.
         lasts: Shortest and longest duration [s]; an act takes none.
         value: Lowest and highest strength; `words` say of what.
         on: Messages to the target that it may wait for.

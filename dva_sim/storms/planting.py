@@ -40,7 +40,7 @@ class Mutant:
         rule: The rule that it breaks first.
         words: Description of the bug.
         place: Module and function, such as `dva_sim.core.orders:Orders.found`.
-        make: Makes the wrong function from the right one.
+        make: Function that makes the wrong function from the right one.
     """
 
     rule: str

@@ -32,7 +32,7 @@ class RecoveryProbes:
 
     Args:
         recorder: Recorder of what has not recovered.
-        motion_of: Gives the motion of a robot now, by its id.
+        motion_of: Function that returns the motion of a robot now, by its id.
         calm: End of the last fault [s].
     """
 

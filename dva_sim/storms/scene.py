@@ -45,7 +45,7 @@ class StormScene:
 
     Args:
         plan: The storm.
-        folder: For the DVA's memory.
+        folder: Folder of the DVA's memory.
 
     Attributes:
         run: The run.

@@ -81,7 +81,7 @@ class Storm(StormScene):
 
     Args:
         plan: The storm.
-        folder: For the DVA's memory.
+        folder: Folder of the DVA's memory.
 
     Attributes:
         begun: Number of faults that have struck, by kind.

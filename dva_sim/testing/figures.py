@@ -64,7 +64,7 @@ def check_figure(
     """See that a figure keeps what every figure promises, drawn twice of results of every shape.
 
     Args:
-        figure: By name, as in a study, or its class.
+        figure: Name, as in a study, or its class.
         options: Keyword arguments of its constructor.
         slow: A figure that takes longer earns a warning [s].
         shapes: Shapes of the results, by name.

@@ -60,7 +60,7 @@ def check_hazard(
     """See that a hazard keeps what every hazard promises, by itself and on a site.
 
     Args:
-        hazard: By name, as in a scenario, or its class.
+        hazard: Name, as in a scenario, or its class.
         options: Keyword arguments of its constructor, besides place and start.
         slow: An answer that takes longer on the average earns a warning [s].
 

@@ -43,7 +43,7 @@ def check_measure(
     One of a user's own model is tried with that.
 
     Args:
-        measure: By name, as in a study, or its class.
+        measure: Name, as in a study, or its class.
         options: It has none.
         slow: An answer that takes longer earns a warning [s].
 

@@ -53,7 +53,7 @@ def check_pattern(
     It is tried on good links and bad ones, with a robot that is slow, gone, or refuses.
 
     Args:
-        pattern: By name, as in a scenario, or its class.
+        pattern: Name, as in a scenario, or its class.
         options: Keyword arguments of its constructor.
         slow: A command that takes longer earns a warning [s].
 

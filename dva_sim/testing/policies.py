@@ -253,7 +253,7 @@ def check_policy(
     takes, without what is only done once.
 
     Args:
-        policy: By name, as in a scenario, or its class.
+        policy: Name, as in a scenario, or its class.
         options: Keyword arguments of its constructor.
         count: Number of situations.
         slow: A decision that takes longer earns a warning [s].

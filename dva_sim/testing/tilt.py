@@ -39,7 +39,7 @@ def check_filter(
     It is tried sample by sample; one that works in batches, batch by batch.
 
     Args:
-        filter_: By name, as a phone names it, or its class.
+        filter_: Name, as a phone names it, or its class.
         options: Keyword arguments of its constructor, besides the time between samples.
         slow: A sample that takes longer earns a warning [s].
 

@@ -46,7 +46,7 @@ def check_transport(
     """See that a transport keeps what every transport promises.
 
     Args:
-        transport: By name, as in a scenario, or its class.
+        transport: Name, as in a scenario, or its class.
         options: Keyword arguments of its constructor.
 
     Raises:

@@ -154,7 +154,7 @@ class ValidationResult:
         A table `NAME` becomes `NAME.csv` and `NAME.parquet`, a figure an SVG and a PNG.
 
         Args:
-            folder: Made if it is not there.
+            folder: Folder; created if missing.
 
         Raises:
             DvaSimError: the folder cannot be written.

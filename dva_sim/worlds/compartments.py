@@ -42,7 +42,7 @@ def of_rooms(
     """One compartment for each room that is not outdoors.
 
     Args:
-        grid: Gives the cells.
+        grid: Grid of the cells.
         rooms: All rooms; where two overlap, the first counts.
         walls: Segments `(n, 4)` [m].
         ways: Doors and exits: ends x1, y1, x2, y2 [m], height [m], kind.
@@ -139,7 +139,7 @@ def of_floor(grid: OccupancyGrid, floor: NDArray[np.bool_]) -> FloorPartition:
     """Blocks of a floor without rooms, about `BLOCK` wide, parted where a wall parts them.
 
     Args:
-        grid: Says where the cells lie.
+        grid: Grid of the cells.
         floor: Cells of the floor, shape `(rows, columns)`.
     """
     labels = _joined(_pieces(floor, grid.resolution), grid.resolution)

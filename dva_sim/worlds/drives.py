@@ -96,7 +96,7 @@ class ThreeWay(Drive):
         spec: Mass, size and limits of the car.
         wheelbase_m: From axle to axle [m].
         steering_deg: Angle of the front wheels at either side [deg].
-        servo_s: From straight to a side [s].
+        servo_s: Time from straight to a side [s].
 
     References:
         R. Rajamani: Vehicle Dynamics and Control, 2nd ed., Springer 2012, chapter 2: kinematic
@@ -216,7 +216,7 @@ class DriveSpec:
         max_turn_acceleration: Either way [rad/s^2].
         motor_time_constant: Time constant of the speed [s].
         corners: Corners of a convex footprint, x ahead, y to the left [m]; none: a circle.
-        drive: Makes the motors.
+        drive: Function that makes the motors.
     """
 
     mass: float = 60.0

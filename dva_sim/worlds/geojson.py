@@ -39,7 +39,7 @@ class Feature:
         kind: A key of `KINDS`.
         shape: Shapely geometry [m].
         properties: Properties as written in the file.
-        fail: Makes an error at the feature's place in its file.
+        fail: Function that makes an error at the feature's place in its file.
     """
 
     kind: str

@@ -132,7 +132,7 @@ def outline(grid: OccupancyGrid, free: NDArray[np.bool_]) -> NDArray[np.float64]
     Scanned walls are ragged by one cell; the segments are true to one cell.
 
     Args:
-        grid: Says where the cells lie.
+        grid: Grid of the cells.
         free: Cells on the inside, shape `(rows, columns)`.
 
     Returns:
@@ -319,7 +319,7 @@ def cells_inside(
     side by side share no cell and leave none out.
 
     Args:
-        grid: Gives the cells.
+        grid: Grid of the cells.
         border: Segments of closed rings `(n, 4)` [m], holes among them.
         window: Rows and columns to look at.
     """

@@ -23,7 +23,7 @@ def write_site(site: Site, folder: Path) -> Path:
 
     Args:
         site: Drawn, generated or a bare map; the floor of a map becomes one room.
-        folder: Made if it is not there.
+        folder: Folder; created if missing.
 
     Returns:
         The YAML file.

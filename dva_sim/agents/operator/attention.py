@@ -166,7 +166,7 @@ class OperatorSetup:
     """Equipment of an operator, apart from the person.
 
     Attributes:
-        pattern: Makes what carries the commands of a drive of a robot, by its id.
+        pattern: Function that makes the messaging pattern of a drive, by the id of the robot.
         window: Maximum number of unanswered commands, where the pattern allows several.
         rate_hz: Wanted commands per second.
         timeout: Time-out of a request [s].

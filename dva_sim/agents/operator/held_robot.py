@@ -36,9 +36,9 @@ class HeldRobot:
 
     Args:
         device: The person's.
-        robot: By its id.
+        robot: Id of the robot.
         console: Current equipment of the person.
-        tilt: Gives what makes commands of what the person wants, for the next drive.
+        tilt: Function that returns the source of commands for the next drive.
         alert: Callback with messages for the person.
         let_go: Callback once the person no longer controls the robot.
         wanted: Predicate: True if the person controls a robot by now, by its id.
@@ -54,7 +54,7 @@ class HeldRobot:
         event: Event of the next drives; 0: no event.
         last: The newest input.
         level: Level of the requested permission.
-        app: Makes the commands of the newest drive.
+        app: Function that makes the commands of the newest drive.
     """
 
     def __init__(

@@ -29,8 +29,8 @@ class PersonAgent:
     Args:
         device: Device of the seat on the network.
         console: Equipment.
-        tilt: Gives what makes commands of what the person wants, for the next drive; if not given,
-            what is wanted enters as tilt.
+        tilt: Function that returns the source of commands for the next drive; by default the
+            desired command is given as tilt.
 
     Attributes:
         console: Equipment; a new one counts from the next drive on.

@@ -36,10 +36,10 @@ def watch(
 
     Args:
         device: Device with the screen.
-        robot: By its id.
+        robot: Id of the robot.
         session: Session of the permission.
         topic: On which the frames of a URL are published; see `Cameras`.
-        on_frame: Takes each frame.
+        on_frame: Callback for each frame.
         seen: Callback once it is watched.
         blind: Callback with the URL, if there is nothing to see there.
         wanted: Predicate: True while it is still wanted.
@@ -76,14 +76,14 @@ def start(
 
     Args:
         device: Device that sends the request.
-        robot: By its id.
+        robot: Id of the robot.
         body: Content of the request.
         session: Current session of the permission.
         wanted: Predicate: True while it is still wanted.
         begun: Callback once the robot agrees.
         refused: Callback with the reason for a refusal.
         lost: Callback if it does not reply.
-        waits: Takes the reply that refuses, each time before it is asked again.
+        waits: Callback for the reply that refuses, each time before it is asked again.
         tries: Number of this attempt.
     """
     if not wanted():

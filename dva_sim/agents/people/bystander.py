@@ -68,7 +68,7 @@ class BystanderAgent(OnFoot):
         clock: The run's.
         occupant: Properties of the person.
         walking: Its legs.
-        planner: It knows the building.
+        planner: Planner of the site.
         places: Working places; it begins at the first [m].
         refuges: Safe places [m].
         rng: Random generator of its walks in normal times.

@@ -111,7 +111,7 @@ def choose_escape(
     way keeps even the last limit there is no escape for now.
 
     Args:
-        planner: Knows the site.
+        planner: Planner of the site.
         here: Current position; a person in bad air goes through no worse to the first good place.
         refuges: Safe places, regardless of the conditions there: outdoors is beyond [m].
         limits: Each says how much of what one bears a place is; the strictest first.
@@ -283,7 +283,7 @@ class WayOut:
 
     Args:
         clock: The run's.
-        planner: It knows the building.
+        planner: Planner of the site.
         walking: The person's legs.
         exposure: Exposure of the person, and the conditions it avoids.
         refuges: Currently safe places [m].

@@ -54,7 +54,7 @@ class GuardProtocol:
 
     Attributes:
         dva: Id of the DVA: only its orders count.
-        mobilisation: From an order to the first step [s], for who was waiting.
+        mobilisation: Time from an order to the first step [s], for a guard who was waiting.
         is_at: Predicate: True if the guard stands at a place.
         errand: Current errand; None while it waits.
         ready_at: Time at which the guard can set out, or could [s].

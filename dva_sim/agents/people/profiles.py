@@ -41,10 +41,10 @@ class GuardProfile(PaceProfile):
     """Profile from which guards are drawn.
 
     Attributes:
-        mobilisation_s: From the order to the first step.
-        confirm_look_s: From arrival to being sure.
-        contain_s: From arrival until a leak or flood is over: a valve found and shut.
-        extinguish_s: From arrival until a young fire is put out.
+        mobilisation_s: Time from the order to the first step.
+        confirm_look_s: Time from arrival to certainty.
+        contain_s: Time from arrival until a leak or flood is over: a valve found and shut.
+        extinguish_s: Time from arrival until a young fire is put out.
         habits: Numbers that are the same for all guards, none of them measured.
 
     References:
@@ -70,10 +70,10 @@ class Walker:
 
     Attributes:
         speed: Walking [m/s].
-        mobilisation: From an order to the first step [s].
-        look: From arrival to being sure [s].
-        contain: From arrival until a leak or flood is over [s].
-        extinguish: From arrival until a fire is out [s].
+        mobilisation: Time from an order to the first step [s].
+        look: Time from arrival to certainty [s].
+        contain: Time from arrival until a leak or flood is over [s].
+        extinguish: Time from arrival until a fire is out [s].
         usual_mobilisation: Time that the guard expects for getting ready [s], which is the usual
             one. The actual time shows only when it is over.
         habits: Habits of all guards.
@@ -105,7 +105,7 @@ class BystanderProfile(PaceProfile):
     """Profile of people who work at a site and have no part in its surveillance.
 
     Attributes:
-        premovement_s: From the alarm, or from noticing the danger, to the first step outwards.
+        premovement_s: Time from the alarm, or from noticing the danger, to the first step outwards.
         moving_share: Share of the people who change their place now and then.
         stay_s: Length of a stay at a place.
         habits: Numbers that are the same for all bystanders, none of them measured.
@@ -134,7 +134,7 @@ class Occupant:
 
     Attributes:
         speed: Walking [m/s].
-        premovement: From the alarm to the first step [s].
+        premovement: Time from the alarm to the first step [s].
         moves: True if it changes its place now and then.
         stay: Length of a stay at a place [s].
         habits: Habits of all bystanders.

@@ -193,8 +193,8 @@ class CommandQueue:
 
     Args:
         clock: The run's clock.
-        service: Gives the time that the next message takes [s].
-        handle: Takes each letter when its processing is done.
+        service: Function that returns the time that the next message takes [s].
+        handle: Callback for each letter when its processing is done.
         latest_wins: Keep only the newest waiting command, as a subscriber that drains its
             socket before it works does.
         limit: Maximum number of queued messages of the holder, and of emergencies.
@@ -203,7 +203,7 @@ class CommandQueue:
         standing: Current standing of a message's sender.
         driven: Predicate: True while somebody drives the robot, so that other senders must leave it
             time.
-        refuse: Takes each letter that there is no room for.
+        refuse: Callback for each letter that there is no room for.
 
     Attributes:
         service: Service time; may be replaced at any time.

@@ -37,8 +37,8 @@ class Confirmations:
     Args:
         device: The robot's.
         controller: Its decider.
-        decide: Takes the answer of the DVA.
-        conclude: Takes a message that has waited; it does not wait again.
+        decide: Callback for the answer of the DVA.
+        conclude: Callback for a message that has waited; it does not wait again.
         happened: Called when a question is asked, and when one has failed.
     """
 

@@ -280,7 +280,7 @@ class RobotController:
         Args:
             state: State as in `MissionStatus`; `done` and `failed` end the mission.
             left: Places still to be visited.
-            reason: In words.
+            reason: Reason in words.
         """
         before = self.mission_status
         if self.mode is MISSION:

@@ -68,7 +68,7 @@ class Manoeuvre:
 
     Attributes:
         state: State of the mission meanwhile.
-        reason: In words.
+        reason: Reason in words.
     """
 
     state: str

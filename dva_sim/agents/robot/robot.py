@@ -58,14 +58,14 @@ class RobotSetup:
 
     Attributes:
         pattern: Messaging pattern of SetTeleOp.
-        service: Gives the time that the next message takes its computer [s].
+        service: Function that returns the time that the next message takes its computer [s].
         frame_rate: Frame rate of the camera [1/s].
         frame_bytes: Size of a frame [B].
         view: Field of view of the camera.
         hazards: Visible hazards at a time [s].
         sensors: Sensors by name.
         guarded: True if a collision guard slows its drivers (coordinated control).
-        encode: From taking a frame to publishing it [s]; one frame at a time.
+        encode: Time from taking a frame to publishing it [s]; one frame at a time.
         charge: Share of the battery's charge that is left.
         conflates: True if its socket keeps only the newest published command.
         limit: Maximum number of queued messages of a class.

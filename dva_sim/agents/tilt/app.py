@@ -65,7 +65,7 @@ class Trail:
     comes out of both. It is for the recorder alone, and touches no command.
 
     Args:
-        make_filter: Makes another filter like the phone's.
+        make_filter: Function that makes another filter like the phone's.
     """
 
     def __init__(self, make_filter: Callable[[], Filter]) -> None:

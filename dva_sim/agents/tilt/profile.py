@@ -20,9 +20,9 @@ class PhoneProfile(PhoneHabits):
         accelerometer: Name of a part, or a file with one.
         sample_rate_hz: Samples per second that the app gets.
         reference_mps2: x, y, z of the pose that means nothing: speed zero, straight on.
-        filter: By name, or a class in a file, `mine.py:Mine`.
+        filter: Name, or a class in a file, `mine.py:Mine`.
         filter_options: Options of the filter, such as `{window: 9}` of the median.
-        mapping: By name, or a class in a file.
+        mapping: Name, or a class in a file.
         mapping_options: Options of the mapping, such as `{gain: 2}`.
         send: `on_change` sends what differs from the last one sent when 20 samples have come or
             `max_delay_s` has passed; `keep_alive` sends at the wanted rate always.

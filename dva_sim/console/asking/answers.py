@@ -42,7 +42,7 @@ class Answers:
         Args:
             number: Its id.
             do: Does it, and tells what came of it, now or later; what it raises is a refusal.
-            tell: Takes the answer.
+            tell: Callback for the answer.
             repeats: Do it again if it was answered a while ago: an emergency stop has to stop,
                 though its id was used before.
         """

@@ -59,9 +59,9 @@ class ActionDispatcher:
     Args:
         place: Place whose actions are carried out here.
         holders: Objects with marked methods, for all that is declared for this place.
-        tell: Takes the answers.
+        tell: Callback for the answers.
         elsewhere: The refusal of actions that are declared for other places only.
-        audited: Gives the audit log; None: there is none.
+        audited: Function that returns the audit log; None: there is none.
     """
 
     def __init__(

@@ -16,7 +16,7 @@ class ToldFacts:
     """Alarm facts from messages alone; a robot's watchdog shows only as silence.
 
     Args:
-        system: To which the console is attached.
+        system: System to which the console is attached.
     """
 
     def __init__(self, system: AttachedSystem) -> None:

@@ -53,7 +53,7 @@ class AttachedAudit(Audited):
 
     Args:
         keeper: Keeper of the file.
-        system: To which the console is attached.
+        system: System to which the console is attached.
         author: Name of the person at a page.
     """
 

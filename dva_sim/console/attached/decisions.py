@@ -24,7 +24,7 @@ class AttachedDecisions:
     """Does what pages ask for about events.
 
     Args:
-        system: To which the console is attached.
+        system: System to which the console is attached.
         people: People at the pages.
     """
 

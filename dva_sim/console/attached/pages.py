@@ -36,7 +36,7 @@ class AttachedPages:
     """State of a remote system for pages; see `ConsoleSubject`.
 
     Args:
-        system: To which the console is attached.
+        system: System to which the console is attached.
         audit: Keeps the audit log.
 
     Attributes:

@@ -29,9 +29,10 @@ class FakeDevices:
     """All that were added by hand.
 
     Args:
-        make: Makes a device of an id, a label, a type and an address.
+        make: Function that makes a device of an id, a label, a type and an address.
         is_known: Predicate: True if a device with this id exists.
-        id_of: Gives the id of the n-th fake device, and an address at which nobody is, from 1.
+        id_of: Function that returns the id of the n-th fake device, and an address at which nobody
+            is, from 1.
         dismiss: Forgets a device, and makes the DVA forget it where it can be made to.
 
     Attributes:

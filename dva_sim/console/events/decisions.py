@@ -30,7 +30,7 @@ def decision_of(
 
     Args:
         line: Line as checked by the web process.
-        device: Gives the id of a label.
+        device: Function that returns the id of a label.
         seen: Number of known decisions on an event, for pages that do not send it.
     """
     number, reason = line.get("event", 0), line.get("reason") or None

@@ -28,7 +28,7 @@ def send_on_mission(
 
     Args:
         device: Device of the control room that sends it.
-        robot: By its id.
+        robot: Id of the robot.
         label: Label of the robot.
         body: Mission with its destination.
         on_result: Callback for the result.

@@ -80,8 +80,8 @@ class ConsoleRoom:
         Args:
             body: Content of the request.
             on_result: Callback for the result.
-            done: In words, if it is done.
-            then: Makes more of a reply that says so.
+            done: Description in words, if it is done.
+            then: Function that extends a positive reply.
         """
 
         def answered(reply: m.Reply) -> None:
@@ -101,7 +101,6 @@ class ConsoleRooms:
     """All control rooms of a console.
 
     Args:
-        run: In which.
         roles: Roles as the DVA knows them: no device states its own.
 
     Attributes:

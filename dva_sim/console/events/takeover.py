@@ -26,8 +26,8 @@ class Takeover:
 
     Args:
         agent: Control room that decides.
-        robot: By its id.
-        reason: In words.
+        robot: Id of the robot.
+        reason: Reason in words.
         event: Event that the robot was sent to; None: it was sent nowhere.
         seat: Id of the device that is to drive it; None: the DVA sends it nowhere.
         take: Asks for the robot, for the seat or otherwise.

@@ -14,7 +14,6 @@ class PlayedGuards:
     """Assignment of people to guards.
 
     Args:
-        run: In which.
         feed: About it.
 
     Attributes:

@@ -41,8 +41,8 @@ class ConsoleSubject(Protocol):
 
     Attributes:
         clock: Its time, at its pace.
-        tell: Takes lines for pages, and a key for those of which the newest counts.
-        show: Takes lines for the process that draws pictures, likewise.
+        tell: Callback for lines to pages, with a key where only the newest counts.
+        show: Callback for lines to the renderer, with a key likewise.
         dropped: Number of lines for pages dropped so far.
     """
 

@@ -48,9 +48,6 @@ LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
 class Actions:
     """Does what lines of the web process ask for.
 
-    Args:
-        world: In which.
-
     Attributes:
         take: Does what a line asks for.
     """

@@ -31,9 +31,8 @@ class PhoneActions:
     """Does what phones ask for.
 
     Args:
-        world: In which.
         seats: Seats and their clients.
-        robot: Gives the id of a robot by what a line calls it.
+        robot: Function that returns the id of a robot by its name in a line.
         stop: Ends the drive of a client, and says why.
     """
 

@@ -30,10 +30,9 @@ class RoomActions:
     """Does what control rooms are asked for.
 
     Args:
-        world: In which.
         seats: Seats and their clients.
         robot: Finds the id of a robot that a line names.
-        take: Takes a robot for a page's seat.
+        take: Callback for a robot for a page's seat.
     """
 
     def __init__(

@@ -41,7 +41,6 @@ def tour_of(run: Run, numbers: Mapping[str, int]) -> TourPlan | None:
     """Two robots and their goals, from where they stand now; None: no two have such a way.
 
     Args:
-        run: In which.
         numbers: Numbers of the robots, by id.
     """
     site = run.stage.site

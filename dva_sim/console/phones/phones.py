@@ -41,7 +41,6 @@ class Phones:
     """All phones of a console.
 
     Args:
-        run: In which.
         clock: Its own.
         console: Current equipment of persons.
         address: Address of the DVA, if the links are real; a modelled one has no real address.

@@ -46,8 +46,8 @@ class Player:
         clock: Clock of the viewer; the recording's own time follows it.
 
     Attributes:
-        tell: Takes lines for pages, and a key for those of which the newest counts.
-        show: Takes lines for the process that draws pictures, likewise.
+        tell: Callback for lines to pages, with a key where only the newest counts.
+        show: Callback for lines to the renderer, with a key likewise.
         audit: The audit log in the recording.
         take: Does what a page asks for; what would tell somebody something is refused.
     """

@@ -41,7 +41,7 @@ class RobotActions:
 
     Args:
         windows: Windows of all robots.
-        robot: Gives the id of a robot by what a line calls it.
+        robot: Function that returns the id of a robot by its name in a line.
         why_not: Reason why nobody may drive now; empty if driving is allowed.
         labels: Labels of all devices, by id.
         deaf: Callback when a robot's computer is made to hang, or to work again.

@@ -29,7 +29,7 @@ class ConsoleRecorder(Recorder):
         on_ordered: Callback for each drive as it is ordered.
         on_tidy: Called before what is old is forgotten.
         on_tidied: Called afterwards.
-        kept: Takes lines for a recording, if there is to be one.
+        kept: Callback for lines for a recording, if there is to be one.
         robots: Ids of those of whom it is noted when a message to them was sent.
     """
 

@@ -37,7 +37,7 @@ class RobotOptions(PageOptions):
     """Options of a single robot: its profile, its port, and its DVA.
 
     Attributes:
-        profile: By name or path.
+        profile: Name or path.
         number: Number of the robot, from 1: its id and its label follow from that.
         dva: Address for registering at once, `HOST:PORT`; None: from its page.
         listen: Port of its requests; its publications have the next one. 0: any two that are free.

@@ -67,8 +67,8 @@ class RobotWorld:
         station: Progress of the robot from off to listening.
         audited: Keeps who did what, once that is wanted.
         windows: Its windows.
-        tell: Takes lines for pages, and a key for those of which the newest counts.
-        show: Takes lines for the process that draws pictures, likewise.
+        tell: Callback for lines to pages, with a key where only the newest counts.
+        show: Callback for lines to the renderer, with a key likewise.
 
     Raises:
         ConfigError: the site has no place for it.

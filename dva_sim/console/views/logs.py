@@ -102,7 +102,8 @@ class Logs:
 
     Args:
         transport: Transport that carries the messages.
-        node_of: Gives the id of a device by its label; None: there is none of that label.
+        node_of: Function that returns the id of a device by its label; None: there is none of that
+            label.
     """
 
     def __init__(self, transport: Transport, node_of: Callable[[str], str | None]) -> None:

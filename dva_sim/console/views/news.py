@@ -15,7 +15,7 @@ class News:
     """Tells a line unless nothing in it has changed, its time apart.
 
     Args:
-        tell: Gives what takes lines, and a key for those of which the newest counts.
+        tell: Function that returns the callback for lines, with a key where only the newest counts.
     """
 
     def __init__(self, tell: Callable[[], Tell]) -> None:

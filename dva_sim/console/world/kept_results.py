@@ -35,7 +35,7 @@ class KeptResults:
 
     Args:
         out: The folder.
-        scenario: By name or path.
+        scenario: Name or path.
         changes: Changes of the scenario, `KEY=VALUE`.
         seed: Random seed of the study.
         overwrite: True to replace existing files.

@@ -35,7 +35,6 @@ class SeatLines:
     """Lines for those who sit somewhere.
 
     Args:
-        run: In which.
         feed: About it.
         persons: By the numbers of their seats.
         client_of: Client in each seat, by number.

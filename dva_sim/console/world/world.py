@@ -54,7 +54,8 @@ class ConsoleWorld(ToldWorld):
         name: Name of the scenario.
         seed: Random seed.
         clock: Its time; default: real time.
-        sockets: Makes what carries the messages; default: the link that the scenario models.
+        sockets: Function that makes the transport of the messages; default: the link that the
+            scenario models.
         measured: True to keep everything for measuring in the end.
 
     Attributes:
@@ -64,8 +65,8 @@ class ConsoleWorld(ToldWorld):
         logs: Requests to devices, and their replies.
         windows: Those of the robots.
         dva: The DVA as people see and serve it.
-        tell: Takes lines for pages, and a key for those of which the newest counts.
-        show: Takes lines for the process that draws pictures, likewise.
+        tell: Callback for lines to pages, with a key where only the newest counts.
+        show: Callback for lines to the renderer, with a key likewise.
 
     Raises:
         ConfigError: the site cannot hold the team, or the events.

@@ -23,9 +23,9 @@ class Instance:
 
     Attributes:
         release: Time at which each event becomes known [s], ascending, shape `(events,)`.
-        arrival: From being sent from the base to being there [s], shape `(events, units)`;
+        arrival: Time from being sent from the base to being there [s], shape `(events, units)`;
             infinite where a unit cannot go.
-        busy: From being sent to being back and free again [s], same shape.
+        busy: Time from being sent to being back and free again [s], same shape.
     """
 
     release: Floats

@@ -42,7 +42,7 @@ def tune(
     Args:
         out: Results folder of the trials.
         jobs: Processes; by default one for each core.
-        episode: Makes the tables of one run; by default a simulation.
+        episode: Function that makes the tables of one run; by default a simulation.
         progress: Called with the number of runs done and of all runs, as they finish.
         limit_s: A run that takes longer, by the wall clock, has failed.
 

@@ -81,8 +81,8 @@ def dry_run(
         asked: From `load_study`, or its plan if that has been made.
         out: Results folder.
         jobs: Processes; by default one for each core.
-        probe: Makes the tables of one run. With it, a few runs are tried for the estimate if none
-            is done yet.
+        probe: Function that makes the tables of one run. With it, a few runs are tried for the
+            estimate if none is done yet.
 
     Raises:
         ConfigError: the study is not valid, or the folder holds another one.

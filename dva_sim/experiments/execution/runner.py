@@ -57,7 +57,7 @@ def run_study(
         out: Results folder, made if need be.
         jobs: Processes of this machine; by default one for each core.
         scheduler: Address of a dask.distributed cluster to use instead.
-        episode: Makes the tables of one run; by default a simulation.
+        episode: Function that makes the tables of one run; by default a simulation.
         progress: Called with the number of runs done and of all runs, as they finish.
         limit_s: A run that takes longer, by the wall clock, has failed.
 

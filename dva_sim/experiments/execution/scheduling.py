@@ -55,7 +55,8 @@ def run_all(
 
     Args:
         jobs: The runs.
-        episode: Makes the tables of one run; must be importable by name unless it is run here.
+        episode: Function that makes the tables of one run; must be importable by name unless it is
+            run here.
         limit_s: A run that takes longer by the wall clock has failed.
 
     Raises:

@@ -20,7 +20,7 @@ class Heading:
     """A title within the report.
 
     Attributes:
-        text: In words.
+        text: Text in words.
         level: 2 for a section, 3 for what is below it.
     """
 
@@ -33,7 +33,7 @@ class Words:
     """A paragraph.
 
     Attributes:
-        text: In words.
+        text: Text in words.
         kind: Emphasis; a banner precedes everything else.
     """
 

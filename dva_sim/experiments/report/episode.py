@@ -55,7 +55,7 @@ class EpisodeRequest:
     """Request to run one scenario, with changes, recording and pictures.
 
     Attributes:
-        scenario: By name or path.
+        scenario: Name or path.
         set: Keys to change.
         side_by_side: Two patterns to play the same seed under, separated by a comma.
         pictures: Pictures to draw.

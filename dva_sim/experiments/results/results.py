@@ -43,7 +43,7 @@ class Column(NamedTuple):
     Attributes:
         table: Name of the table.
         unit: Unit as printed; empty for none.
-        meaning: In words; empty if nothing is known of it.
+        meaning: Meaning in words; empty if nothing is known of it.
     """
 
     table: str

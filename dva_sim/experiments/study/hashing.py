@@ -36,7 +36,7 @@ def inputs(scenarios: Iterable[Config], others: Iterable[str] = ()) -> dict[str,
     """Files that scenarios name by path (maps, traces), with the hash of their contents.
 
     Args:
-        scenarios: All that are run.
+        scenarios: Scenarios of the runs.
         others: Other files that the runs depend on, as `file.py:Class`.
     """
     dumps = (scenario.model_dump(mode="json") for scenario in scenarios)

@@ -80,7 +80,7 @@ class StudyPart(Config):
     """One scenario that is run in every cell.
 
     Attributes:
-        scenario: By name or path, also relative to the study's file.
+        scenario: Name or path, also relative to the study's file.
         changes: Changes to the scenario, in every cell of the part.
         reference: Changes that make the reference run, one for each person and trial.
         replications: Trials per person, if not those of the study.
@@ -129,7 +129,7 @@ class Hypothesis(Config):
     """A claim about one contrast at one place, to be tested; registered, it is confirmatory.
 
     Attributes:
-        text: In words.
+        text: Text in words.
         comparison: Contrast to test: `answer`, or the name of a comparison.
         direction: Sign of the first level minus the second: `above` zero, `below` it, or the
             `same`.
@@ -204,7 +204,7 @@ class Prediction(Config):
     """Prediction for one contrast, written down before the first run.
 
     Attributes:
-        text: In words.
+        text: Text in words.
         direction: Sign of the first level minus the second: `above` zero, `below` it, or the `same`
             but for less than the smallest effect that matters. Without it nothing is judged.
         factor: Factor whose levels are compared; by default the answer's.

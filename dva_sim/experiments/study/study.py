@@ -60,7 +60,7 @@ class Study(Config):
     """Study: a question, and everything that is run to answer it.
 
     Attributes:
-        question: In words.
+        question: Description in words.
         predictions: Predictions written down before anything was run.
         seed: Random seed of the whole study; the population of persons is drawn from it too.
         persons: Simulated persons: the blocks of the design and clusters of the statistics.

@@ -59,7 +59,7 @@ def run_pair(
         link: Joins them.
         near: Command whose end is the end; it reads the standard input.
         far: Command that is ended then.
-        tell: Takes a line that should be read at once.
+        tell: Callback for a line that should be read at once.
         published: Listening sockets of this machine, led to the same ports of the near end.
 
     Raises:

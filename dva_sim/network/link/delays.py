@@ -90,7 +90,7 @@ class _Law(Config):
             delay: The link's `delay_s` [s].
             streams: The run's random streams.
             name: Name of this source.
-            make: Makes the numbers of packets that are independent of one another.
+            make: Function that makes the numbers of packets that are independent of one another.
         """
         if self.correlation_s:
             slow = SlowWeather(streams, name, self.correlation_s)

@@ -90,7 +90,7 @@ class Plan(Config):
     """Instructions for both programs.
 
     Attributes:
-        transport: By name, or a file and a class.
+        transport: Name, or a file and a class.
         options: Options of the transport.
         near: Address of the operator's machine.
         far: Address of the robot's.

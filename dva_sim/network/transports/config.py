@@ -35,7 +35,7 @@ class Rtnp(Config):
     queue in the network knows nothing of it.
 
     Attributes:
-        header_bytes: Besides IP and UDP, in each datagram.
+        header_bytes: Header besides IP and UDP, in each datagram.
 
     References:
         Y. Uchimura, T. Yakoh: Bilateral robot system on the real-time network structure. IEEE
@@ -57,7 +57,7 @@ class Trinomial(Config):
     Each direction is a flow of its own, and each of its datagrams is acknowledged by one.
 
     Attributes:
-        header_bytes: Besides IP and UDP, in each datagram and acknowledgement.
+        header_bytes: Header besides IP and UDP, in each datagram and acknowledgement.
         linear: Datagrams per round trip, with each round trip since the last loss.
         square: Datagrams per round trip, with the square of that number.
         decrease: Share of the rate that a loss costs.
@@ -85,7 +85,7 @@ class Irtp(Config):
     **Simplifications**: no handshake; it runs over UDP here, not over IP.
 
     Attributes:
-        header_bytes: Besides IP and UDP, in each datagram and acknowledgement.
+        header_bytes: Header besides IP and UDP, in each datagram and acknowledgement.
         increase: Datagrams per round trip, with each round trip.
         decrease: Share of the rate that a loss costs.
 
@@ -107,7 +107,7 @@ class Btp(Config):
     Both directions are one session: acknowledgements ride on the datagrams of the other.
 
     Attributes:
-        header_bytes: Besides IP and UDP, in each datagram, with the acknowledgements.
+        header_bytes: Header besides IP and UDP, in each datagram, with the acknowledgements.
         tolerance_s: Queueing in the round trip that is taken for none.
         widen: Factor of the gap where there is more, or something is lost.
         narrow: Divisor of the gap where there is not.
@@ -126,7 +126,7 @@ class Tcp(Config):
     """One TCP connection; whatever was written arrives, in order.
 
     Attributes:
-        send_buffer_bytes: Left out, the kernel tunes it.
+        send_buffer_bytes: Size of the send buffer; by default the kernel tunes it.
     """
 
     kind: Literal["tcp"]
@@ -138,7 +138,7 @@ class Zeromq(Config):
 
     Attributes:
         conflate: True if the publisher keeps only the newest message in ZeroMQ's queue.
-        send_buffer_bytes: Left out, the kernel tunes it.
+        send_buffer_bytes: Size of the send buffer; by default the kernel tunes it.
     """
 
     kind: Literal["zeromq"]

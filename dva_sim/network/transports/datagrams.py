@@ -34,7 +34,8 @@ class DatagramSender:
             arrived.
 
     Attributes:
-        ride: Gives the acknowledgements, of the other direction, that ride on a datagram.
+        ride: Function that returns the acknowledgements, of the other direction, that ride on a
+            datagram.
         on_arrival: Callback at the other end for every datagram, with its feedback.
     """
 

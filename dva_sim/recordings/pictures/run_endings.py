@@ -17,7 +17,7 @@ class RunVerdict(NamedTuple):
 
     Attributes:
         time: From when on that is so [s].
-        text: In words; empty if it is not known.
+        text: Text in words; empty if it is not known.
         good: True if every event was confirmed, and every false alarm refuted.
         ahead: Lead over the other of two runs [s]; infinite if the other never got there, negative
             if this one was later.

@@ -246,7 +246,7 @@ def add_operator(
     """The `number`-th operator.
 
     Args:
-        number: From 1.
+        number: Number, from 1.
         truth: The true state of a robot by id, where somebody can tell.
 
     Raises:

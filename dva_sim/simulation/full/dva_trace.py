@@ -41,7 +41,7 @@ class TracedDva:
 
     Args:
         desk: Core that makes the decisions.
-        sink: Takes lines.
+        sink: Callback for lines.
         stage: Stage of the run.
         memory: Store that it will recall, if any.
     """

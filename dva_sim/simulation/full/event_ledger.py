@@ -113,7 +113,7 @@ class EventLedger:
         dva: Id of the DVA.
         place_of: True position of a device.
         at_event: Distance within which a device may have seen the event [m].
-        name: Gives the name of a device by its id.
+        name: Function that returns the name of a device by its id.
 
     Attributes:
         knows_places: True if true positions are known; otherwise devices are believed.

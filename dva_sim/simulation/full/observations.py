@@ -324,11 +324,11 @@ class FactLog:
     """Observer that keeps facts for a recording, and judges nothing.
 
     Args:
-        put: Takes facts, in order.
+        put: Callback for facts, in order.
         robots: Ids of the robots whose facts are kept.
         dva: Id of the DVA.
-        look: Gives the motion of a robot now, by its id.
-        page: Gives what the DVA's book shows now; None: the DVA is elsewhere.
+        look: Function that returns the motion of a robot now, by its id.
+        page: Function that returns the current page of the DVA's book; None: the DVA is elsewhere.
         keeps_sent: Keep sent messages, too; else the caller does that.
     """
 

@@ -256,7 +256,7 @@ class SafetyAudit:
     Args:
         recorder: Recorder of broken rules.
         terms: Limits that the run is held to.
-        motion_of: Gives the motion of a robot now, by its id.
+        motion_of: Function that returns the motion of a robot now, by its id.
         place_of: True position of a device, by its id; None if it has none.
     """
 

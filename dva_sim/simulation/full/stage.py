@@ -110,7 +110,7 @@ class Stage:
     Attributes:
         seed: Random seed of everything but the persons.
         recorder: Recorder of the run.
-        address: Gives a new device its address, by kind and number.
+        address: Function that returns the address of a new device, by kind and number.
         time_of_day: See `AgentDevice`.
         cameras: Addresses of the robots' pictures.
         devices: All that were made.

@@ -76,7 +76,7 @@ class TeamBuilder:
         """The `number`-th robot, in its place; it registers and begins to work.
 
         Args:
-            number: From 1.
+            number: Number, from 1.
             registers: Without that it does neither by itself.
 
         Raises:

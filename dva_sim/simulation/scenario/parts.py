@@ -200,7 +200,7 @@ class OperatorConfig(OmitsUnset):
     """The operators: how they drive, and which simulated person each is.
 
     Attributes:
-        strategy: By name, or a class in a file, `mine.py:Mine`.
+        strategy: Name, or a class in a file, `mine.py:Mine`.
         options: Options of the strategy, such as `{inner: pursuit, quality: 0.8}` of the predictor.
         traits: Medians that take the place of the population's, such as `{margin: 0.4}`.
         habits: Assumed numbers that take the place of the population's, such as
@@ -361,7 +361,7 @@ class DispatchConfig(Config):
     """Dispatch policy of the DVA, and the rules that hold whatever it advises.
 
     Attributes:
-        policy: By name, or as `my_policy.py:Mine`.
+        policy: Name, or as `my_policy.py:Mine`.
         options: Options of that policy.
         escalate_after_s: An event that has waited so long for somebody is escalated; 0: at
             once if nobody is free; null: never.

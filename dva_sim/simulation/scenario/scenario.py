@@ -171,7 +171,7 @@ def phone_profile(scenario: Scenario, error: Fail | None = None) -> PhoneProfile
 
     Args:
         scenario: Names the profile.
-        error: Makes the error for a change that is not valid, at its key path.
+        error: Function that makes the error for a change that is not valid, at its key path.
 
     Raises:
         ConfigError: no such profile, or a change that is not valid.

@@ -86,8 +86,8 @@ class Unicycle:
 
     Args:
         lag: Time constant of speed and turn rate [s].
-        top_speed: At most, never in reverse [m/s].
-        top_turn: At most, either way [rad/s].
+        top_speed: Largest speed, never in reverse [m/s].
+        top_turn: Largest turn rate, either way [rad/s].
 
     Attributes:
         x: [m]

@@ -28,7 +28,7 @@ class OneWayDelay(Config):
     """One direction of the link between the hand and what it moves.
 
     Attributes:
-        delay_s: One way.
+        delay_s: One-way delay.
         jitter_s: Half-width of a uniform law around the delay; nothing overtakes.
         loss: Probability that what is sent is lost.
     """
@@ -86,7 +86,7 @@ class DeviceConfig(Config):
         rate_hz: Rate at which it is read and sent. A tilt device has the rate of its accelerometer
             if that is lower.
         limit_deg: No hand tilts farther (tilt devices).
-        accelerometer: By name (tilt devices).
+        accelerometer: Name (tilt devices).
         filter: On what the accelerometer measures, by name (tilt devices).
         filter_options: Options of the filter.
     """

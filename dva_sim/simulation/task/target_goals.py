@@ -90,7 +90,7 @@ class PointGoal(ToTarget):
         task: Rules of selection.
         way: Motion of the target.
         width: Width of the target [m].
-        press: From the decision to press a button to the press at the machine [s].
+        press: Time from the decision to press a button to the press at the machine [s].
     """
 
     def __init__(self, task: Pointing, way: Wandering, width: float, press: float) -> None:

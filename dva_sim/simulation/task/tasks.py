@@ -85,7 +85,7 @@ class Tunnel(Config):
     Attributes:
         shape: A straight tunnel, or once around a circle.
         length_m: Along its middle.
-        width_m: From wall to wall.
+        width_m: Width from wall to wall.
         on_error: Effect of crossing a wall: the error is `counted` and the trial goes on, or it is
             `over`.
     """

@@ -39,7 +39,7 @@ class Seat:
     """Person who does the trials of a block, and what carries over between them.
 
     Attributes:
-        strategy: Makes the strategy for what is steered.
+        strategy: Function that makes the strategy for what is steered.
         delay: The person's estimate of the delay, on a clock that runs on over trials.
         begun: Start of this trial, on that clock [s].
         timing: Errors of the perceived delay.
@@ -146,8 +146,8 @@ class Trial(ABC, Generic[S]):
         reach: Limits of what is moved.
         device: Device in the hand.
         streams: Random streams of the trial.
-        reaction: From the first frame on the screen to the first that is acted on, perception in
-            it [s]; 0 for who expects the goal: it acts as soon as it has perceived a frame.
+        reaction: Time from the first frame on the screen to the first that is acted on, perception
+            in it [s]; 0 for who expects the goal: it acts as soon as it has perceived a frame.
 
     Attributes:
         now: Since the trial began [s].

@@ -34,7 +34,7 @@ class TunnelGoal(Goal):
     Args:
         task: The shape, and what an error does.
         length: Along the middle [m].
-        width: From wall to wall [m].
+        width: Width from wall to wall [m].
     """
 
     def __init__(self, task: Tunnel, length: float, width: float) -> None:

@@ -27,7 +27,7 @@ class Draws(Generic[T]):
     Args:
         streams: Random streams of the run.
         name: Name of the purpose, unique in the run.
-        draw: Makes a number of draws from a generator.
+        draw: Function that makes a number of draws from a generator.
     """
 
     def __init__(

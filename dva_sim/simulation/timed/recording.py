@@ -236,7 +236,7 @@ class UnitRecord:
     """One responder over the measured time.
 
     Attributes:
-        name: For people.
+        name: Name for people.
         kind: `guard` or `robot`.
         spent: Time by phase [s]: `ready`, `travel`, `look`, `act`, `stand by`, `return`.
         exposure: Time within danger radii by stage [s]: `approach`, `look`, `act`, `leave`.

@@ -108,7 +108,7 @@ class Unit:
 
     Args:
         number: Among all units, from 0.
-        name: For people.
+        name: Name for people.
         device: Its id.
         group: Properties of the unit.
         base: Waiting place.

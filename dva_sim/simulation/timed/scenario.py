@@ -135,8 +135,8 @@ class Group(Config):
             robot base on a site, the middle of an area.
         speed_mps: The mean, and what the DVA expects.
         speed_sd_mps: Between members.
-        mobilisation: From the order to the first step.
-        look: From arrival to being sure, unless the event says otherwise.
+        mobilisation: Time from the order to the first step.
+        look: Time from arrival to certainty, unless the event says otherwise.
         act: Time for a person to contain an event, unless the event sets another.
         after: `stay` where the event was; `return` to base and be busy until there; or `recall`:
             walk back, but take orders on the way.
@@ -201,18 +201,18 @@ class EventStream(Config):
 
     Attributes:
         name: Left out, the kind.
-        between: From one to the next; exponential: a Poisson process.
+        between: Time from one event to the next; exponential: a Poisson process.
         sources: Instead of `between`: a finite number of sources.
         batch: Instead of `between`: all at once.
         zones: Zones of the events, with weights. By default anywhere: uniform over the area, or
             over the rooms of the site.
-        notice: From the outbreak to the first report; `detectors`: until a detector of the site
-            notices.
+        notice: Time from the outbreak to the first report; `detectors`: until a detector of the
+            site notices.
         severity: Reported severity.
         confidence: Reported confidence.
         false_share: Share of false alarms.
-        look: Instead of the responders' own.
-        act: Instead of the responders' own.
+        look: Law of this time, in place of the responders' own.
+        act: Law of this time, in place of the responders' own.
         patience: Time after the report at which its sender withdraws it.
         repeats: Doubled reports.
         from_s: The first event comes one interval after this.
@@ -257,7 +257,7 @@ class TimedDispatch(Config):
     """The policy and the rules.
 
     Attributes:
-        policy: By name, or `file.py:Class`.
+        policy: Name, or `file.py:Class`.
         options: Options of the policy.
         escalate_after_s: Time that an event may wait; 0: not at all; `.inf` or null: forever.
         containment: True if a confirmed event needs a person to contain it.

@@ -37,7 +37,7 @@ class Mesh:
         b: Node on the other side.
         shape: Length of each border over the distance between its nodes.
         nodes: Node of each cell of the grid, or -1, shape `(rows, columns)`.
-        grid: Gives the cells.
+        grid: Grid of the cells.
     """
 
     area: Floats
@@ -80,7 +80,7 @@ def make_mesh(grid: OccupancyGrid, free: NDArray[np.bool_], cell: float = CELL) 
     """The mesh of some cells of a grid.
 
     Args:
-        grid: Gives the cells.
+        grid: Grid of the cells.
         free: True for cells that hold air, shape `(rows, columns)`.
         cell: Side of a coarse cell [m].
     """

@@ -54,7 +54,7 @@ class Building:
 
     Attributes:
         spaces: Its bodies of air; long ones are parted.
-        grid: Gives the cells.
+        grid: Grid of the cells.
         labels: The space of each cell, or `NOWHERE`, shape `(rows, columns)`.
     """
 

@@ -190,7 +190,8 @@ class March:
 
     Args:
         state: At age 0.
-        step: From a state at an age [s] to the one `dt` [s] later; it changes nothing.
+        step: Function from a state at an age [s] to the state `dt` [s] later; it has no side
+            effects.
         paces: Until which age, in which steps [s].
 
     Attributes:

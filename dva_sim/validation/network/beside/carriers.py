@@ -50,8 +50,9 @@ class BetweenPrograms:
         up: The link that commands take.
         down: The link from the robot.
         picture_bytes: Size of a picture [B].
-        on_command: Takes the number of a command at the robot, and what sends its reply.
-        on_picture: Takes the number of a picture at the operator.
+        on_command: Callback for the number of a command at the robot, and a function that sends its
+            reply.
+        on_picture: Callback for the number of a picture at the operator.
     """
 
     clock: Clock
@@ -257,8 +258,8 @@ class MqttClient:
         clock: Virtual time.
         links: From the client, and back.
         options: Options of the transport.
-        at_client: Takes what the broker sends.
-        at_broker: Takes what the client publishes.
+        at_client: Callback for messages from the broker.
+        at_broker: Callback for messages from the client.
     """
 
     def __init__(

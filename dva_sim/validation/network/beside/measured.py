@@ -189,7 +189,7 @@ def beside_of(
         measured: The runs of each; None if there are none, and all are predicted now.
         plays: Number of simulated runs per seed.
         workers: Processes.
-        progress: Gets how many plays are finished, and of how many.
+        progress: Callback with the number of finished runs, and of all runs.
 
     Raises:
         RunsFailed: a play failed.
