@@ -42,17 +42,18 @@ class Population(Config):
     """Population from which persons are drawn.
 
     Attributes:
-        perceptual_delay_s: From a picture on the screen to a decision.
+        perceptual_delay_s: Time from a picture on the screen to a decision.
         hand_lag_s: Time constant of the hand.
         crossover_rad_s: Gain of turning towards a target.
         caution: Share of the look-ahead that the robot may cover during the whole delay.
         pace: Share of the robot's top speed that the person cares to drive.
         confirm_look_s: Mean time for which an event in plain view is looked at until the person is
             sure: its criterion. A hasty person takes less, and is wrong more often.
-        reading_s: From an order on the screen to acting on it.
+        reading_s: Time from an order on the screen to acting on it.
         position_error_m: Error of the robot's position, as judged from the picture.
         heading_error_rad: Error of the robot's heading, as judged from the picture.
-        reaction_s: From the sight of a new goal to the first movement, the perceptual delay in it.
+        reaction_s: Time from the sight of a new goal to the first movement, perceptual delay
+            included.
         margin: Gain x delay of the loops that the person closes stays below this; pi/2 is the
             limit of stability.
         motor_noise: Standard deviation of what the hand does, as a share of it.
@@ -62,7 +63,7 @@ class Population(Config):
         search_s: Time that the person looks around at a place before reporting that nothing is
             there.
         patience_s: Time that it continues without progress, or without seeing anything.
-        switch_s: From turning to another robot's picture to understanding it.
+        switch_s: Time from turning to another robot's picture to understanding it.
         tempo: Time that everything takes which the person does itself, against the median person.
         waits_from_s: New delay at which half of its movements are followed by a wait.
         compensates: Share of a delay beyond the usual one for which it takes what it asked for to
@@ -144,7 +145,7 @@ def with_medians(profile: P, medians: Mapping[str, float], whose: str) -> P:
 
     Args:
         profile: Profile whose fields are traits, or numbers that all persons share.
-        medians: By the name of the trait, such as `{"margin": 0.4}`.
+        medians: Medians by trait, such as `{"margin": 0.4}`.
         whose: Part of a scenario that names them.
 
     Raises:

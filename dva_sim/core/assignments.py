@@ -79,8 +79,9 @@ class Rules:
         max_attempts: Orders given for one event before it is escalated.
         order_limit: Time limit of an order; a responder who has not settled the event by then gives
             it back [s].
-        depart_within: So does who has taken an order up and not set out after this [s].
-        still_within: And who is on the way and has not moved for so long [s].
+        depart_within: Time limit for setting out; a responder who accepted an order and stays gives
+            it back then [s].
+        still_within: Time limit without movement on the way; the same applies then [s].
         arrived_within: Distance for a confirmed arrival [m]: a responder counts as under way until
             its reported position is this near the event.
         bid_within: Time for which bids are taken [s].

@@ -38,7 +38,7 @@ class Fact:
         outcome: Result in words; for a refusal its reason.
         advised: Id of whom the policy would have sent; None: nobody, or that is no matter here.
         advised_in: Expected arrival of the advised device [s from then].
-        waited: Since the event was first reported [s].
+        waited: Time since the first report of the event [s].
     """
 
     time: float

@@ -60,7 +60,7 @@ class Dispatcher:
     Args:
         policy: Advises.
         travel: Travel times and distances.
-        orders: Gives the orders.
+        orders: Current orders.
         rng: Random generator passed to policies.
         ground: Knowledge of the site.
         roles: Roles of the control rooms.

@@ -64,10 +64,10 @@ class Event:
         act_taken_up: True if its present order to contain it, or to stand by, was accepted.
         attempts: Orders taken up for it.
         preemptions: Number of times its responder was redirected.
-        waiting_since: Since when it has waited for somebody [s]; an order that nobody took
-            up does not end the wait.
+        waiting_since: Start of the wait for a responder [s]; an order that nobody accepted does not
+            end the wait.
         failed: Responders that set out and gave the order back.
-        sent: Everybody who was ever ordered there; only they can tell what they found.
+        sent: Devices ever ordered there; only they can report findings.
         times: Time of each step in `STEPS` and `ACT_STEPS` that was taken [s].
         handling: Decisions on the event.
     """

@@ -48,7 +48,7 @@ class Handovers:
     Attributes:
         orders: Current orders.
         supervisors: Ids of the devices that may take a robot from its holder.
-        under_way: By robot.
+        under_way: Handovers by robot.
     """
 
     orders: Orders

@@ -24,7 +24,7 @@ class AccessRule:
         robots: Labels of the robots it is about; empty: all.
         levels: Levels that they may request.
         sensors: Sensors that they may read; None: all.
-        since: From when on [s].
+        since: Start of the permission [s].
         until: Up to when [s]; what is still held then is taken back.
     """
 

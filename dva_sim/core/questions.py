@@ -17,7 +17,7 @@ class Question:
         device: Id of the guard or robot that it would send.
         task: `confirm`, `contain` or `stand_by`.
         expected: Expected arrival of the proposed device [s].
-        until: It is sent by itself if nobody has decided by then [s].
+        until: Time at which it is carried out, if nobody has decided [s].
     """
 
     event: Event

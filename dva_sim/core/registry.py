@@ -31,9 +31,10 @@ class DeviceEntry:
         mode: Last known mode of a robot.
         silent: True if it has been silent for longer than the time-out.
         registrations: MessageID and timestamp of its last ones.
-        free_from: Until then it is given no order, because it declined one [s].
-        place: In order of registration, from 0.
-        there_until: Until then it counts as being at its address: it was heard from there [s].
+        free_from: Time until which it gets no order, because it declined one [s].
+        place: Place in the order of registration, from 0.
+        there_until: Time until which it counts as being at its address, as it was heard from there
+            [s].
     """
 
     device: Device
@@ -70,7 +71,7 @@ class Registry:
         forget_after: Time of silence after which it is forgotten, unless it is involved in
             something open [s].
         most: Maximum number of devices.
-        entries: In order of registration.
+        entries: Devices in the order of registration.
         version: Grows whenever somebody comes, goes silent, returns, is forgotten, or is called
             otherwise.
     """

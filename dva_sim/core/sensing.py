@@ -34,7 +34,7 @@ class SensorAlarm:
 
     Attributes:
         kind: Kind of event that it indicates: `fire`, `gas_leak` or `flood`.
-        threshold: From here on, in the unit of the sensor.
+        threshold: Lowest value that raises the alarm, in the unit of the sensor.
     """
 
     kind: str

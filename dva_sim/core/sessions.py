@@ -30,8 +30,8 @@ class Sessions:
     """Permissions, and the word about their end.
 
     Attributes:
-        untold: By session: what a robot has not said to have heard yet. Until then it may
-            still obey whom it should not.
+        untold: Notices that a robot has not acknowledged, by session. Until then it may obey the
+            wrong device.
         changes: Number of changes of `untold`.
         reserved: Robots that are being handed over: held, as far as others are concerned.
     """

@@ -66,7 +66,8 @@ class Store:
     Attributes:
         past: Added to the DVA's time it gives the time that is kept [s].
         keeps_time: Interval at which the time is written while events are open [s].
-        between_writes: Called before each statement that writes, and after the last; it may raise.
+        between_writes: Callback before each statement that writes, and after the last; it may
+            raise.
 
     Raises:
         ConfigError: the file cannot be opened, or is something else.

@@ -59,7 +59,7 @@ class SiteKnowledge:
         preference: Place of each device on the list for events at a position, from 0;
             infinite for who is not on it. None without such lists.
         stations: Waiting places for guards.
-        reach: From each station to each zone [s], shape `(stations, zones)`.
+        reach: Travel time from each station to each zone [s], shape `(stations, zones)`.
         demand: Share of events expected in each zone, shape `(zones,)`.
     """
 

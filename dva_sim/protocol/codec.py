@@ -188,7 +188,7 @@ def timestamp(seconds_of_day: float, exact: bool = False) -> str:
 
     Args:
         seconds_of_day: [s]
-        exact: To the microsecond; otherwise fractions are dropped.
+        exact: True for microseconds; otherwise fractions are dropped.
     """
     whole = int(seconds_of_day // 1)
     face = _clock_face(whole % 86_400)

@@ -174,9 +174,9 @@ class Proposed:
 
     Attributes:
         device: Id of the guard or robot that it would send.
-        task: To do what, as in `Order`.
+        task: Proposed task, as in `Order`.
         arrival_in: Expected arrival [s from now].
-        decide_within: It is sent by itself if nobody has decided by then [s from now].
+        decide_within: Time until the proposal is carried out, if nobody has decided [s from now].
     """
 
     device: str
@@ -197,10 +197,10 @@ class EventStatus:
         confidence: Confidence that the event is real, 0 to 1.
         event_state: `pending`, `assigned`, `on_scene`, `confirmed`, `contained`, `refuted`,
             `escalated` or `expired`.
-        age: Since it was first reported [s], up to 1e6.
-        state_for: Since when it is in that state [s], up to 1e6.
+        age: Age since the first report [s], up to 1e6.
+        state_for: Time in the present state [s], up to 1e6.
         decisions: Number of decisions on the event so far: assignments, recalls, and so on.
-        closed_for: Since when it is over [s], up to 1e6; None: it is not.
+        closed_for: Time since the event closed [s], up to 1e6; None: it is open.
         waits_for: Task that still needs a responder: `confirm` or `contain`.
         responder: Id of the guard or robot that goes to look, or is there.
         operator: Id of the device that drives that robot.
@@ -283,9 +283,10 @@ class Proposal:
         task: Proposed task, as in `Order`; None: nothing is to be done.
         device: Id of the guard or robot that it would send; None: nobody.
         arrival_in: Expected arrival [s from now].
-        decide_within: It is sent by itself if nobody has decided by then [s from now]; None:
+        decide_within: Time until it is carried out, if nobody has decided [s from now]; None:
             nobody is asked.
-        candidates: Everybody, the earliest there first; at most 32, and as many as fit.
+        candidates: All devices that could be sent, the earliest arrival first; at most 32, and as
+            many as fit.
     """
 
     event_id: int
@@ -310,9 +311,9 @@ class AuditRecord:
         code: `OK`, or why it was refused.
         text: Result in words; may be empty.
         role: Role of the author, if it is a control room.
-        event_id: On which event.
+        event_id: Number of the event.
         device: About which guard or robot.
-        task: To do what.
+        task: Task of the order.
         arrival_in: Expected arrival of the device [s from then].
         advised: Id of the guard or robot that the policy would have sent; None: nobody.
         advised_in: Expected arrival of the advised device [s from then].

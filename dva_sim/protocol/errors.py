@@ -10,7 +10,7 @@ class ProtocolError(DvaSimError):
 
     Args:
         code: The reply code that tells the sender; see `dva_sim.protocol.messages`.
-        reason: One line for people; what `decode` gives fits into the text of a reply.
+        reason: Reason in one line; that of `decode` fits into the text of a reply.
     """
 
     def __init__(self, code: int, reason: str) -> None:

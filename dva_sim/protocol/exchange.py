@@ -83,7 +83,7 @@ class ReplyCache:
     Args:
         each: Maximum number of replies kept per source. The oldest are forgotten first, so that no
             source can make another's be forgotten.
-        sources: For how many sources; those longest unheard of are forgotten first.
+        sources: Maximum number of sources; those longest unheard of are forgotten first.
         room: Maximum size of the replies kept per source, without the last one [B].
     """
 

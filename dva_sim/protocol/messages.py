@@ -179,7 +179,7 @@ class SensorValue:
 
     Attributes:
         sensor: Its name, up to 64 characters.
-        values: In the unit; one, or up to 360 of a sensor that looks many ways at once.
+        values: Values in the unit; one, or up to 360 from a sensor with many directions.
         unit: Such as `kW/m2`, up to 64 characters.
         tick: The robot's own clock when it was measured [ms].
     """

@@ -101,11 +101,11 @@ class RosLimits(Config):
     Attributes:
         max_speed_mps: Forward speed; commands are clamped to it.
         max_turn_rate_rad_s: Turn rate, likewise.
-        max_deceleration_mps2: With which it stops.
+        max_deceleration_mps2: Deceleration with which it stops.
         watchdog_s: A command is in force for at most this long after it has arrived.
         max_age_s: And for at most this long after the newest tick that its sender had seen.
-        odometry_within_s: Without odometry for longer the robot is stopped.
-        picture_within_s: Without pictures for longer none is shown.
+        odometry_within_s: Age of the odometry beyond which the robot is stopped.
+        picture_within_s: Age of a picture beyond which none is shown.
         stands_within_s: Time within which it has to stand once ordered to.
     """
 

@@ -69,7 +69,7 @@ def new_seed(scenario: str, **changes: Any) -> Work:
 
 
 def replayed() -> Work:
-    """The same messages at the same moments from an operator who only repeats them."""
+    """Repeat an operator's messages at the same moments, without looking."""
     from helpers.network.replaying_operator import replay, taped
 
     made = built("drive-to-event", {"pattern": "latest-wins", **FAR})
@@ -78,7 +78,7 @@ def replayed() -> Work:
 
 
 def physics_and_control() -> Work:
-    """The same world with path pursuit ten times a second, and nothing else."""
+    """Run the same world with path pursuit ten times a second, and nothing else."""
     from dva_sim.agents.observation import Observation
     from dva_sim.agents.operator.strategies import Pursuit, Reach, View
     from dva_sim.agents.population import Population, draw_person

@@ -1,4 +1,4 @@
-"""The same session in both clocks: a robot's decisions do not depend on the clock."""
+"""One session in both clocks: a robot's decisions do not depend on the clock."""
 
 import math
 from collections import Counter

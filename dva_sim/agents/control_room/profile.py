@@ -41,8 +41,8 @@ class DispatcherProfile(Config):
 
     Attributes:
         role: Role: `look`, `drive`, `dispatch` or `supervise`.
-        acknowledge_s: From when it turns to an event until it has acknowledged it.
-        decide_s: From then, or from the DVA's question, until it has decided.
+        acknowledge_s: Time from turning to an event until acknowledging it.
+        decide_s: Time from then, or from the DVA's question, until the decision.
         overrules: Conditions for overruling the policy: the first that holds counts.
     """
 

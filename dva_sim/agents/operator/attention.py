@@ -40,7 +40,8 @@ class Screen(Protocol):
     """A robot's picture, and what the person knows of the robot.
 
     Attributes:
-        waits_since: From when on the robot has waited for a judgement [s]; None: it does not.
+        waits_since: Time since which the robot has waited for a judgement [s]; None: it does not
+            wait.
         log: Log of the drive, which counts looks.
     """
 
@@ -64,8 +65,8 @@ def next_screen(
     Args:
         now: [s]
         current: Place of the one that is looked at, if any is.
-        since: From when on it was [s].
-        waits: From when on each robot has waited for a judgement [s]; None: it does not.
+        since: Time since which it has been looked at [s].
+        waits: Time since which each robot has waited for a judgement [s]; None: it does not wait.
         seen: Time of the latest look at each [s].
         glance: Time for which one that only drives is looked at [s].
     """
@@ -174,7 +175,7 @@ class OperatorSetup:
         truth: The true state of a robot by id, if the strategy is the oracle; else None.
         guarded: True if a collision guard may hold a robot back.
         heeds: True if the app reacts to refusals; see `CommandSender`.
-        topic: On which a camera's frames are published, by its URL; see `Cameras`.
+        topic: Topic of a camera's frames, by its URL; see `Cameras`.
     """
 
     pattern: Callable[[str], Pattern]

@@ -30,8 +30,8 @@ class DelayEstimate:
         start: Start of the drive or the trial [s].
         guess: Initial estimate, learnt before [s].
         step: Resolution of the guess [s].
-        scale: For each of the two channels, the difference that counts one, in its unit; left
-            out: those of driving.
+        scale: Difference that counts as one in each of the two channels, in its unit; by default
+            those of driving.
         habits: Habits of the person.
         hand: Lag of the hand, which is felt: only the rest is learnt from the picture [s].
 
@@ -77,7 +77,7 @@ class DelayEstimate:
         Args:
             now: [s]
             one: First component of the motion; see `intend`.
-            other: Likewise.
+            other: Second component of the motion.
             over: The time up to `now` over which the motion was summed [s].
         """
         if now < self._next_look:
@@ -183,7 +183,7 @@ class PeriodEstimate:
         Args:
             now: [s]
             one: First component of the motion; see `intend`.
-            other: Likewise.
+            other: Second component of the motion.
             delay: Whole delay as the person perceives it [s].
         """
         self._delay = delay
@@ -308,7 +308,7 @@ class Timing:
 
         Args:
             delay: Learnt delay [s].
-            usual: To which the person is used [s].
+            usual: Delay that the person is used to [s].
             now: [s]
         """
         return delay + max(delay - usual, 0.0) * (self.at(now) - 1.0)

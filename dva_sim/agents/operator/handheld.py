@@ -46,7 +46,7 @@ class Gathered:
         on_result: Callback once all have come.
 
     Attributes:
-        failed: Called before, if one was not good.
+        failed: Callback before `on_result`, if an answer was not good.
     """
 
     def __init__(self, count: int, on_result: OnResult) -> None:

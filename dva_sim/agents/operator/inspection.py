@@ -65,7 +65,7 @@ class Evidence:
 
     Attributes:
         level: Level of the evidence.
-        criterion: From this level on, the person is sure.
+        criterion: Level from which on the person is sure.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class Looking:
         place: Reported position [m].
         planner: The person knows the building.
         normals: Standard normal numbers, one for each look.
-        arrived: Called once, when the event or its place is before the robot.
+        arrived: Callback once the event or its place is before the robot.
     """
 
     def __init__(

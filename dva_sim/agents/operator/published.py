@@ -85,8 +85,8 @@ class SupportConfig(Config):
         strategies: Strategies that the data cover.
         steering: Behaviour observed there: `closed`, steering by what was seen; `waiting`, moving
             and waiting.
-        low_s: From.
-        high_s: To.
+        low_s: Shortest delay covered.
+        high_s: Longest delay covered.
         why: Source of the data.
     """
 

@@ -38,7 +38,7 @@ def watch(
         device: Device with the screen.
         robot: Id of the robot.
         session: Session of the permission.
-        topic: On which the frames of a URL are published; see `Cameras`.
+        topic: Topic of the frames of a URL; see `Cameras`.
         on_frame: Callback for each frame.
         seen: Callback once it is watched.
         blind: Callback with the URL, if there is nothing to see there.

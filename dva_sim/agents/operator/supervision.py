@@ -40,7 +40,8 @@ class Work:
         granted: True once a permission was granted.
         picture: The robot's camera, once it is watched.
         over: True once it has ended.
-        waits_since: From when on the robot has waited for a judgement [s]; None: it does not.
+        waits_since: Time since which the robot has waited for a judgement [s]; None: it does not
+            wait.
     """
 
     at_once: ClassVar[int | None] = None

@@ -167,8 +167,8 @@ class OnePole(Filter):
 
     Args:
         period: Mean time between two samples [s].
-        time_constant_s: In which it follows [s]; the mean age of its value, the wait for the
-            next sample included.
+        time_constant_s: Time constant [s]: the mean age of its value, the wait for the next sample
+            included.
     """
 
     def __init__(self, period: float, time_constant_s: float = 0.1) -> None:

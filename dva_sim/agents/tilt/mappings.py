@@ -42,7 +42,7 @@ class Mapping(ABC):
         Args:
             level: Level of the reading.
             turn: Turn of the reading [deg/s].
-            dt: For how long the reading stands [s].
+            dt: Time for which the reading holds [s].
 
         Returns:
             A level from 0 to `LEVELS`, and a turn rate of at most `MAX_TURN_DEG` either way.
@@ -55,7 +55,7 @@ class Mapping(ABC):
         Args:
             wanted: Desired command; a level below 0 means: surely stand.
             shown: Displayed command, as the person has perceived it.
-            within: In what time to get there [s].
+            within: Time in which to get there [s].
         """
 
     def begin(self) -> None:  # noqa: B027 - most mappings have nothing to forget

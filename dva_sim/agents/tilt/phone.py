@@ -48,8 +48,8 @@ class Phone(TiltApp):
             all runs; by default that of this run.
 
     Attributes:
-        hand_lag: By how much the hand makes a command follow later what is asked, on average [s].
-            The hand is moved from sample to sample, so that it is less than the time constant.
+        hand_lag: Mean time by which a command follows the hand's goal [s]. The hand is moved from
+            sample to sample, so this is less than the time constant.
         shown: The command on the display: level, turn [deg/s].
         samples: Number of samples in the batches of this drive.
         values: Number of batches.

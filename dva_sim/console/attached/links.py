@@ -23,7 +23,7 @@ class AttachedLinks:
         recorder: Keeps the story.
         network: Carries messages to the DVA, and to whom it lists.
         own: Id of the console's own device.
-        address: At which that is found.
+        address: Address of the DVA.
         close: Ends what was opened.
     """
 

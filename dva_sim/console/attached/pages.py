@@ -43,7 +43,7 @@ class AttachedPages:
         looked: True while somebody looks at the table of devices.
         people: People at the pages.
         alarms: Alarms that need action.
-        sensors: Those that somebody looks at.
+        sensors: Sensors that somebody looks at.
         audited: Keeps who did what.
     """
 

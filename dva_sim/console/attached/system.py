@@ -32,7 +32,7 @@ class AttachedSystem:
 
     Args:
         options: Address of the DVA, and other options.
-        links: To it.
+        links: Connections to the DVA.
 
     Attributes:
         clock: Real time.
@@ -41,10 +41,10 @@ class AttachedSystem:
         agent: The console's own control room.
         told: State reported by the devices.
         fakes: Devices that were added by hand.
-        numbers: By which pages know devices; each stays as it is.
+        numbers: Stable numbers by which pages know devices.
         site: Site of the scenario, if one is named.
         is_told: True once the DVA has sent all its events since its last restart.
-        on_devices: Called when there is a device more, or one less.
+        on_devices: Callback when a device appears or disappears.
         on_record: Callback for each decision that the DVA publishes.
 
     Raises:

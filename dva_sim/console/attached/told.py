@@ -51,10 +51,10 @@ class ToldSystem:
 
     Args:
         device: Device that subscribes.
-        on_news: Called when there is a device more, or one less.
+        on_news: Callback when a device appears or disappears.
 
     Attributes:
-        devices: By id.
+        devices: Devices by id.
     """
 
     def __init__(self, device: AgentDevice, on_news: Callable[[], object]) -> None:

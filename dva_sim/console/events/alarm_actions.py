@@ -16,7 +16,7 @@ class AlarmActions:
     """Does what people ask for about alarms.
 
     Args:
-        desk: With the alarms.
+        desk: Alarms of the console.
         author: Name of the person at a page.
         acknowledge: Action that notifies the DVA of an acknowledgement.
     """

@@ -44,9 +44,9 @@ class AlarmCondition(NamedTuple):
     """Condition that needs somebody to act.
 
     Attributes:
-        key: By which it is known as long as it lasts.
+        key: Key that identifies it as long as it lasts.
         kind: Kind of problem: equal ones fold in a flood.
-        priority: One of `PRIORITIES`.
+        priority: Priority, one of `PRIORITIES`.
         place: Place; empty if it does not matter.
         text: Description for people.
         since_ms: Start by the run's clock [ms].
@@ -71,7 +71,7 @@ class RaisedAlarm:
     Attributes:
         condition: Latest condition.
         state: See `AlarmState`.
-        raised: Since when it is what it is now, real time [s].
+        raised: Start of the present state, real time [s].
         is_on: True while the condition lasts.
         seen_by: Person who acknowledged it.
         shelved_until: Real time [s]; None if it is not shelved.
@@ -91,7 +91,7 @@ class Alarms:
     """All alarms of a control room.
 
     Attributes:
-        known: By key.
+        known: Alarms by key.
         is_flood: True while so many come that they fold.
         left_out: Conditions that found no place.
     """

@@ -36,8 +36,8 @@ class ConsoleRoom:
     """A person's share in the control of a run.
 
     Attributes:
-        number: By which its id is made.
-        agent: At the DVA.
+        number: Number from which its id is made.
+        agent: Agent at the DVA.
         role: Role that the person's address allows.
         registered: True once the DVA has registered it.
         unanswered: Requests of its person without a reply.
@@ -104,7 +104,7 @@ class ConsoleRooms:
         roles: Roles as the DVA knows them: no device states its own.
 
     Attributes:
-        listener: Hears for the pages what the DVA says of events.
+        listener: Control room that receives the DVA's news of events for the pages.
         by_client: The rooms by their pages.
     """
 

@@ -30,7 +30,7 @@ class Takeover:
         reason: Reason in words.
         event: Event that the robot was sent to; None: it was sent nowhere.
         seat: Id of the device that is to drive it; None: the DVA sends it nowhere.
-        take: Asks for the robot, for the seat or otherwise.
+        take: Function that requests the robot, for the seat or otherwise.
         on_result: Callback for the result.
     """
 

@@ -158,7 +158,7 @@ class OraclePolicy(Policy):
     So it keeps to the order of the plan even where the times turn out a little different.
 
     Args:
-        plan: From `solve`; event number 1 is its first event.
+        plan: Plan from `solve`; event number 1 is its first event.
         devices: Ids of the units, in the plan's order.
     """
 

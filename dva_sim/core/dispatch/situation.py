@@ -29,7 +29,7 @@ class Task:
         severity: 0 (harmless) to 1, the highest reported.
         confidence: Confidence that the event is real, 0 to 1.
         detected: Time of the first report [s].
-        waiting_since: Since when it has waited for somebody [s].
+        waiting_since: Start of the wait for a responder [s].
         engaged: Place in `Situation.responders` of who is under way to it; only a policy
             that `preempts` is shown such tasks.
         auction: `open` while bids may come, `over` when all have come or the time is up.
@@ -70,7 +70,7 @@ class Cover:
         stations: Names of the places to wait at.
         eta: Way from each responder to each station [s], shape `(responders, stations)`,
             without mobilisation; infinite for who cannot be sent to wait.
-        reach: From each station to each zone [s], shape `(stations, zones)`.
+        reach: Travel time from each station to each zone [s], shape `(stations, zones)`.
         demand: Share of events expected in each zone, shape `(zones,)`; they add up to 1.
         bound_for: Station that each responder is on its way to, to wait there; None if none.
     """
@@ -148,9 +148,9 @@ class Policy:
     whenever something has changed, and must not rely on its last advice having been taken.
 
     Attributes:
-        preempts: It wants to see who is under way, and may give them something else to do.
-        auctions: It announces tasks and wants to see the bids.
-        relocates: It moves idle guards.
+        preempts: True if it wants to see responders under way, and may redirect them.
+        auctions: True if it announces tasks and wants to see the bids.
+        relocates: True if it moves idle guards.
     """
 
     preempts: bool = False

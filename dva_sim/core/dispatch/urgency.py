@@ -47,9 +47,9 @@ class Preemptive(Policy):
     being idle nobody is redirected more often than `1 / margin` times.
 
     Args:
-        margin: By how much the severity must be higher than that of what is left behind.
+        margin: Least difference in severity between the new task and the one left behind.
         gain_s: Time by which the redirected responder must be faster than any idle one [s].
-        ageing_per_s: As in `PriorityEta`; it orders the tasks, but redirects nobody.
+        ageing_per_s: Ageing as in `PriorityEta`; it orders the tasks, but redirects nobody.
     """
 
     preempts = True

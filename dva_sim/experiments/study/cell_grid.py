@@ -101,7 +101,7 @@ class StudyJob(StudyRun):
     """A run with all that is needed to make it.
 
     Attributes:
-        scenario: All that the run needs but its seed.
+        scenario: Complete scenario of the run, without its seed.
     """
 
     scenario: AnyScenario

@@ -16,7 +16,7 @@ def located(study: Study, part: str, error: ConfigError, changes: Mapping[str, A
 
     Args:
         study: Study that runs the scenario.
-        error: With the keys at fault, if changes of the scenario are.
+        error: Error with the keys at fault, if changes of the scenario caused it.
         changes: All changes of the scenario.
     """
     if error.file is not None:

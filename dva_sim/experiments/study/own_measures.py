@@ -40,7 +40,7 @@ def columns_told(
     It is read without the files that the columns come from.
 
     Args:
-        measures: Those of the study itself.
+        measures: Measures that the study itself defines.
         scenarios: Scenarios of the runs.
     """
     values: dict[str, list[Measure]] = {}

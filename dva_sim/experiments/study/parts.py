@@ -133,8 +133,8 @@ class Hypothesis(Config):
         comparison: Contrast to test: `answer`, or the name of a comparison.
         direction: Sign of the first level minus the second: `above` zero, `below` it, or the
             `same`.
-        margin: By how much at least it is above or below; or within how much it is the same.
-            In the measure's unit.
+        margin: Margin in the measure's unit: least difference of `above` and `below`, largest
+            difference of `same`.
         at: Levels of other factors than the contrast's. By default those that the contrast is
             `within`, and the last level of the factor it runs `over`.
     """
@@ -172,7 +172,7 @@ class StopRule(Config):
         half_width: Largest half-width that is good enough, in the measure's unit.
         measure: Column of the table `runs`, in excess of the reference run where there is one.
         part: Part it is measured in.
-        comparison: Instead of a measure: `answer`, or the name of a comparison.
+        comparison: Comparison in place of a measure: `answer`, or the name of a comparison.
         batch_persons: Number of persons in each further batch.
         most_persons: After so many it ends in any case.
 

@@ -44,8 +44,8 @@ class Preregistration(Config):
         judged_with: The fingerprint of what will judge the hypotheses.
         full: True for the larger version.
         earlier: Hashes of the registrations that this one replaces, the oldest first.
-        plan: All that is fixed: the keys of the study, and hashes of its rows, its scenarios
-            as resolved, and the files these name.
+        plan: Everything that is fixed: the keys of the study, and hashes of its rows, its resolved
+            scenarios, and the files that these name.
         hash: Hash of the plan and the earlier registrations. Names and program versions are left
             out, so that changing one does not give another seed.
     """

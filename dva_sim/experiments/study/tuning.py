@@ -30,7 +30,7 @@ class ChosenValue(Config):
     """One value, for one combination of the levels it was tuned by.
 
     Attributes:
-        when: Those levels.
+        when: Levels that it was tuned for.
         value: Value of the tuned key.
     """
 
@@ -200,7 +200,7 @@ def trials_of(
     """Runs of one part of a study alone, with persons and random numbers of its own.
 
     Args:
-        study: It keeps everything but what `LEFT` names.
+        study: Study to derive from; everything is kept except for the keys in `LEFT`.
         key: Key of `rule` in the study, for errors.
         rule: Its seed and its size.
         part: Part that is run, without reference runs.

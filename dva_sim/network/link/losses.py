@@ -25,8 +25,8 @@ class Bursts(Config):
     Attributes:
         mean_s: Mean length of a burst. Bursts are functions of virtual time, so all who send at
             that time meet them.
-        mean_packets: Instead, how many packets one lasts on average: each packet moves the
-            weather on, which then depends on how often one sends.
+        mean_packets: Mean number of packets in a burst, in place of a time. Each packet then
+            advances the state of the link, which so depends on how often one sends.
         loss: Probability that a packet is lost in a burst; outside none is.
 
     References:
@@ -64,7 +64,7 @@ class Bursts(Config):
         """Return a fate that loses a share `loss` of all packets, from the named random stream.
 
         Args:
-            loss: In the long run.
+            loss: Share of packets lost in the long run.
             streams: Random streams of the run.
             name: Name of the bursts' random stream.
             uniforms: Random numbers that decide packet by packet within a burst.
@@ -90,10 +90,10 @@ def timed_bursts(spells: Spells, loss: float, uniforms: UniformNumbers) -> Fate:
 def counted_bursts(
     rng: np.random.Generator, share: float, length: float, loss: float, uniforms: UniformNumbers
 ) -> Fate:
-    """Runs of packets, whenever they come.
+    """Losses in bursts counted in packets, independent of their times.
 
     Args:
-        rng: Moves the weather on.
+        rng: Random generator of the bursts.
         share: Share of all packets that are in a burst.
         length: Mean length of a burst, in packets.
         loss: Probability in a burst.

@@ -18,7 +18,7 @@ class Gap(Config):
     Attributes:
         from_s: Start of the gap.
         for_s: Length of the gap.
-        every_s: From one beginning to the next; left out, it comes once.
+        every_s: Time from one start to the next; by default it occurs once.
     """
 
     from_s: Seconds

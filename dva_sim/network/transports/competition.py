@@ -40,7 +40,7 @@ class BottleneckConfig(Config):
     Attributes:
         rate_bps: Rate of the line.
         queue_bytes: Room in its drop-tail queue.
-        delay_s: One way, besides queue and line.
+        delay_s: One-way delay, without queue and line.
         loss: Probability that a packet is lost on the way, besides those that find no room.
         place: Location of its queue: in the `network`, or in the end `hosts` whose own line it is.
     """
@@ -226,7 +226,7 @@ class ContestConfig(Config):
 
     Attributes:
         transport: Transport of the session.
-        warm_up_s: Not counted, so that all flows have found their rate.
+        warm_up_s: Initial time that is not counted, so that all flows find their rate.
         measure_s: Counted.
     """
 
@@ -266,8 +266,8 @@ class Contest:
     """Outcome of a contest.
 
     Attributes:
-        since: From when on it counts [s].
-        until: Until when [s].
+        since: Start of the counted time [s].
+        until: End of the counted time [s].
         commands: Fates of the commands.
         pictures: Fates of the pictures.
         session_bytes: Bytes that the session put on the line in each direction, with all headers,

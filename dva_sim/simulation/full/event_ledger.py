@@ -92,7 +92,7 @@ class Word:
         ended: Devices that have finished, by their own report or the DVA's.
         loose: Devices no longer in charge, by their own report or the DVA's, or after a restart.
         busy: True if somebody accepted it since the last check.
-        anew: True if such a device was sent there again since then.
+        sent_again: True if such a device was sent there again since then.
         found: Findings and actions of those at the place.
     """
 
@@ -101,7 +101,7 @@ class Word:
     ended: set[str] = field(default_factory=set)
     loose: set[str] = field(default_factory=set)
     busy: bool = False
-    anew: bool = False
+    sent_again: bool = False
     found: set[str] = field(default_factory=set)
 
 
@@ -229,7 +229,7 @@ class EventLedger:
         if goes == to:  # a person has one order, the newest
             for other in self._words.values():
                 other.ended.add(to)
-        word.ordered[to], word.anew = goes, word.anew or to in word.loose
+        word.ordered[to], word.sent_again = goes, word.sent_again or to in word.loose
         word.taken.discard(to)
         word.ended.discard(to)
         word.loose.discard(to)
@@ -445,8 +445,8 @@ class EventLedger:
         taken = bool(word.taken.intersection(hands))
         confirmed = "confirmed" in found - old.found
         waits = now if taken or word.busy or confirmed else old.waits
-        since = old.since if hands == old.hands and not word.anew else now
-        word.busy = word.anew = False
+        since = old.since if hands == old.hands and not word.sent_again else now
+        word.busy = word.sent_again = False
         debt = self._debt(event, hands, old.debt, now)
         return Seen(
             found, hands, since, waits, times=dict(event.times), debt=debt, is_over=not event.open
@@ -462,7 +462,7 @@ class EventLedger:
         goes = hands[-1] or who
         step = ("act_departed" if hands[0] == "act" else "departed") in event.times
         place = self._place_of(goes)
-        known = (old.who, old.step) == (who, step) and not word.anew
+        known = (old.who, old.step) == (who, step) and not word.sent_again
         moved = step and (None in (place, old.place) or _far(place, old.place))
         return old if known and not moved else Debt(who, step, now, place)
 

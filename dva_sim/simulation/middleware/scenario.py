@@ -45,7 +45,7 @@ class ObedienceConfig(Config):
     """Rules that a robot obeys, as in a full scenario.
 
     Attributes:
-        watchdog_s: It stops when no newer command has come for so long.
+        watchdog_s: Time without a newer command after which it stops.
         max_age_s: A command that is older is not obeyed.
     """
 
@@ -64,7 +64,7 @@ class MiddlewareScenario(Config):
         pictures: Pictures that the robot sends over the same transport; by default none.
         robot: Robot's rules for accepting commands.
         set_up_s: Start of the measurement; a transport that is not connected by then has failed.
-        measure_s: For how long it is measured.
+        measure_s: Length of the measurement.
         attempts: Number of attempts when the machine disturbs a run; the last counts.
     """
 

@@ -52,7 +52,7 @@ class RobotConfig(Config):
     """The robots: how many, which kind, and the limits that keep them safe.
 
     Attributes:
-        profile: One for all, or a list: the first robot has the first, and so on in turn.
+        profile: Profile of all, or a list: the first robot has the first, and so on in turn.
         processing_s: Time a message takes a robot's computer, a number or a law such as
             `{law: gamma, mean_s: 0.2, cv: 0.5, first_s: 2}`; left out: as its profile says.
         sensors: Sensors that they carry; by default those of their profile.
@@ -285,7 +285,7 @@ class DisturbanceConfig(Config):
     Attributes:
         kind: `revoke`: the DVA ends the permission. `take_over`: and gives the robot to another.
             `refuse`: from then on the robot answers every command with NOT_PERMITTED.
-        after_s: So long after the drive began.
+        after_s: Time from the start of the drive.
         holder_told: True if the DVA's notice reaches the previous holder of the robot.
     """
 
@@ -300,7 +300,7 @@ class CameraConfig(Config):
     """The robots' cameras: what a frame costs and what it can show.
 
     Attributes:
-        encode_s: From taking a frame to publishing it; one frame at a time.
+        encode_s: Time from taking a frame to publishing it; one frame at a time.
     """
 
     rate_hz: Annotated[
@@ -370,13 +370,14 @@ class DispatchConfig(Config):
         merge_distance_m: Reports of one kind nearer than this are one event; 0: never.
         order_limit_s: Time limit of an order; a responder who has not settled the event by then
             gives it back.
-        depart_within_s: So does who has taken an order up and not set out after this; null: never.
+        depart_within_s: Time limit for setting out; a responder who accepted an order and stays
+            gives it back then. null: never.
         still_within_s: And who is on the way and has not moved for so long; null: never.
         bid_within_s: Time for which an auction takes bids.
         mode: `automatic`: the policy sends whom it wants. `ask_first`: it asks people at a control
             room, as long as one is there.
         decide_within_s: Time for which it then waits for an answer before it acts by itself.
-        person: Somebody who dispatches by a script; left out: nobody.
+        person: Scripted dispatcher; by default none.
     """
 
     policy: Annotated[str, Key("dispatch policy")] = "min_eta"
@@ -425,7 +426,7 @@ class AccessConfig(Config):
         robots: Labels such as `robot-1`; left out: all.
         levels: `teleoperation`, `missions`, `both`, `sensors`.
         sensors: Names of the sensors that may be read; left out: all.
-        from_s: From when on.
+        from_s: Start of the permission.
         until_s: Up to when; what is in use then is revoked. Left out: for good.
     """
 

@@ -66,7 +66,7 @@ class FramesConfig(Config):
 
     Attributes:
         rate_hz: Frames per second.
-        extra_s: From taking a frame to sending it, such as encoding.
+        extra_s: Time from taking a frame to sending it, such as encoding.
     """
 
     rate_hz: Annotated[float, Field(gt=0, le=1000), Key("frame rate")] = 60.0
@@ -87,7 +87,7 @@ class DeviceConfig(Config):
             if that is lower.
         limit_deg: No hand tilts farther (tilt devices).
         accelerometer: Name (tilt devices).
-        filter: On what the accelerometer measures, by name (tilt devices).
+        filter: Filter of the accelerometer's samples, by name (tilt devices).
         filter_options: Options of the filter.
     """
 

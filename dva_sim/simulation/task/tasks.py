@@ -31,7 +31,7 @@ class Pointing(Config):
     """Bring a cursor onto a target.
 
     Attributes:
-        amplitude_m: From the start to the centre of the target.
+        amplitude_m: Distance from the start to the centre of the target.
         width_m: Width of the target along the path; in two dimensions its diameter.
         axes: 1: the cursor moves on a line. 2: targets lie on a circle and are taken across it.
         targets: Number of targets on that circle (two dimensions).

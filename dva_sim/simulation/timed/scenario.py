@@ -200,10 +200,10 @@ class EventStream(Config):
     """Events of one class, one after the other.
 
     Attributes:
-        name: Left out, the kind.
+        name: Name of the stream; by default the kind.
         between: Time from one event to the next; exponential: a Poisson process.
-        sources: Instead of `between`: a finite number of sources.
-        batch: Instead of `between`: all at once.
+        sources: Finite number of sources, in place of `between`.
+        batch: Simultaneous events, in place of `between`.
         zones: Zones of the events, with weights. By default anywhere: uniform over the area, or
             over the rooms of the site.
         notice: Time from the outbreak to the first report; `detectors`: until a detector of the
@@ -267,7 +267,7 @@ class TimedDispatch(Config):
         max_attempts: Orders for one event.
         order_limit_s: Time limit of an order; by default none.
         bid_within_s: Time for which bids are taken.
-        preferences: For each zone, names of responders in order.
+        preferences: Names of responders in order of preference, by zone.
         stations: Places where guards may wait.
     """
 
@@ -295,7 +295,7 @@ class TimedScenario(Config):
         travel: `none`: no time; `straight`; `path`: planned on the site; or a law: a time for
             each pair of an event and a responder. Left out, whatever the ground allows best.
         intensity: Events of every stream with a `between` come so many times as often.
-        warm_up_s: Not measured.
+        warm_up_s: Initial time that is not measured.
         horizon_s: No event after this.
         max_events: No event after so many.
         drain: Go on after the horizon until every event is closed.

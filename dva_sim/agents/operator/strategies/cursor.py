@@ -59,7 +59,7 @@ def towards(
     Args:
         seen: The newest frame.
         delay: Whole delay as the person perceives it [s].
-        person: Knows its gain and margin.
+        person: Person with gain and margin.
         most: Highest speed that the person chooses [m/s].
         margin: Gain x delay; left out: the person's usual one.
     """

@@ -38,7 +38,7 @@ class Predictor(Strategy):
         person: Person who steers.
         reach: Limits of what is steered.
         inner: Strategy that steers by the predicted picture; left out: `Pursuit`.
-        quality: From 0, no prediction, to 1, a perfect model of one's own commands.
+        quality: Quality from 0, no prediction, to 1, a perfect model of one's own commands.
 
     Raises:
         ConfigError: the quality is none.
@@ -138,7 +138,7 @@ class Truth(Generic[S]):
 
     Attributes:
         state: State as a frame would show it.
-        delay: Until what is asked for now takes effect [s].
+        delay: Time until a command given now takes effect [s].
     """
 
     state: S

@@ -96,7 +96,7 @@ class BesideRow:
         levels: Its level of each factor.
         values: Measured values, run by run.
         band: The prediction; None where the model says nothing.
-        why: Reason why there is no prediction, or why the row is not judged.
+        why: Reason for not predicting, or for not judging the row.
     """
 
     levels: Mapping[str, str]
