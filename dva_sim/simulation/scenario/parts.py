@@ -372,7 +372,7 @@ class DispatchConfig(Config):
             gives it back.
         depart_within_s: Time limit for setting out; a responder who accepted an order and stays
             gives it back then. null: never.
-        still_within_s: And who is on the way and has not moved for so long; null: never.
+        still_within_s: Time limit without movement on the way; the same applies then. null: never.
         bid_within_s: Time for which an auction takes bids.
         mode: `automatic`: the policy sends whom it wants. `ask_first`: it asks people at a control
             room, as long as one is there.
