@@ -30,9 +30,9 @@ def test_the_picture_and_the_story_come_before_the_study(tmp_path, played, monke
     monkeypatch.setattr(module, "_command", lambda path: ["touch", str(path)])
     assert demo(tmp_path / "demo", jobs=1) is ExitCode.INTERRUPTED
     assert played == [(STUDY, True)]
-    told = capsys.readouterr().out
-    assert unnamed(told, "131.4 s", "22 s ahead") == []
-    assert told.index("one to two minutes") < told.index("side by side") < told.index("Film")
+    output = capsys.readouterr().out
+    assert unnamed(output, "131.4 s", "22 s ahead") == []
+    assert output.index("one to two minutes") < output.index("side by side") < output.index("Film")
 
 
 def test_a_film_that_is_still_being_made_ends_with_the_demo(tmp_path, monkeypatch):

@@ -41,7 +41,7 @@ def test_a_list_has_a_line_for_each_name_with_what_it_is():
     lines = out.splitlines()
     assert code == 0
     for name in ("fire-drill", "min_eta", "latest-wins", "caparica", "servrobot", "pursuit"):
-        assert any(re.match(f"  {name} +\\w", told) for told in lines)
+        assert any(re.match(f"  {name} +\\w", item) for item in lines)
     everything = names.everything()
     assert len(lines) == sum(len(found) + 2 for found in everything.values()) - 1
     assert all(entry.description for found in everything.values() for entry in found)
@@ -81,8 +81,8 @@ def test_plugins_are_told_by_kind_with_the_group_of_their_entry_points():
     out = say("plugins")[1]
     for several, (_, plugins) in names.kinds_of_plugins().items():
         assert f"\n{several}\n" in f"\n{out}"
-        for told in (plugins.group, plugins.key, plugins.public, plugins.folder):
-            assert told in out
+        for entry in (plugins.group, plugins.key, plugins.public, plugins.folder):
+            assert entry in out
     assert unnamed(out, "check policy mine.py:Mine", "agents/policies/patrol.py") == []
 
 
@@ -98,7 +98,7 @@ def test_lists_and_plugins_as_json_have_stable_keys():
     assert {frozenset(entry) for entry in entries} == {frozenset({"name", "description", "file"})}
     plugins = json.loads(say("plugins", "--json")[1])
     keys = {"key", "entry_points", "class", "method", "shipped", "installed", "files"}
-    assert all(told.keys() == keys for told in plugins.values())
+    assert all(item.keys() == keys for item in plugins.values())
 
 
 def keys_on_the_page(call_):
@@ -174,8 +174,8 @@ def test_a_report_is_quiet_or_tells_its_files(folders):
     results, _ = folders
     with blank_pictures():
         assert say("report", results, "--quiet") == (0, "", "")
-        told = say("report", results, "-v")[1]
-    assert re.search(r"tables/runs\.parquet: [\d,]+ bytes\n", told)
+        ended = say("report", results, "-v")[1]
+    assert re.search(r"tables/runs\.parquet: [\d,]+ bytes\n", ended)
 
 
 def test_a_dry_run_tells_every_configuration_if_asked_to(tmp_path, monkeypatch):

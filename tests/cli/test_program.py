@@ -74,8 +74,8 @@ def command_at(path):
 
 def test_the_help_of_the_program_states_every_exit_code(terminal, capsys):
     call(["--help"])
-    told = capsys.readouterr().out.partition("\nExit codes:\n")[2]
-    assert [int(line.split()[0]) for line in told.splitlines()] == list(ExitCode)
+    output = capsys.readouterr().out.partition("\nExit codes:\n")[2]
+    assert [int(line.split()[0]) for line in output.splitlines()] == list(ExitCode)
 
 
 def test_without_a_command_the_help_is_shown(capsys):
@@ -104,9 +104,9 @@ def test_without_a_command_the_help_is_shown(capsys):
 )
 def test_a_mistake_in_the_words_is_one_line_that_says_what_would_be_right(capsys, words, names):
     assert call(words.split()) == 2
-    said = capsys.readouterr()
-    assert (said.out, said.err.count("\n"), said.err[:7]) == ("", 1, "error: ")
-    assert unnamed(said.err, *names) == []
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err.count("\n"), captured.err[:7]) == ("", 1, "error: ")
+    assert unnamed(captured.err, *names) == []
 
 
 @pytest.mark.parametrize(
