@@ -54,13 +54,13 @@ def record(part: Path, target: Path) -> float:
         DvaSimError: there are no such lines, they name a class in a file, or the recording cannot
             be written.
     """
-    lines = told_in(part)
+    lines = lines_of_part(part)
     if OWN_CODE in json.dumps(lines.start["scenario"]["events"]):
         raise ConfigError("names a class in a Python file; a recording never runs code", part)
     return make_recording(lines, target)
 
 
-def told_in(part: Path) -> ToldRun:
+def lines_of_part(part: Path) -> RunLines:
     """Return the lines of a file, sorted.
 
     Raises:
@@ -68,12 +68,12 @@ def told_in(part: Path) -> ToldRun:
     """
     try:
         with part.open("rb") as file:
-            return ToldRun(file, part)
+            return RunLines(file, part)
     except OSError as error:
         raise ConfigError(f"cannot be read: {error.strerror}", part) from error
 
 
-def make_recording(told: ToldRun, target: Path) -> float:
+def make_recording(told: RunLines, target: Path) -> float:
     """Write a recording; return its duration [s].
 
     Raises:
@@ -125,7 +125,7 @@ def _all_of(file: IO[bytes]) -> bytes:
     return b"".join(pieces)[:MOST_BYTES]
 
 
-class ToldRun:
+class RunLines:
     """The lines of a run, sorted.
 
     Args:

@@ -29,7 +29,7 @@ from dva_sim.kernel.recorder import Moment, Recorder
 from dva_sim.live.judging import FRAME, HERE, JUDGED, SAID, SEEN, LiveJudge
 from dva_sim.live.options import LiveOptions
 from dva_sim.live.pipes import Inlets
-from dva_sim.live.recorded_lines import FORMAT, MOST_BYTES, ToldRun, make_recording, told_in
+from dva_sim.live.recorded_lines import FORMAT, MOST_BYTES, RunLines, lines_of_part, make_recording
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.recordings.writing import (
@@ -339,9 +339,9 @@ class Keeper:
         self.inlets.join()
         try:
             if self.path.exists():
-                lines = told_in(self.path)
+                lines = lines_of_part(self.path)
             else:  # the folder was removed meanwhile; the open file still has the lines
-                lines = ToldRun(self._file, self.path)
+                lines = RunLines(self._file, self.path)
                 self._target.parent.mkdir(parents=True, exist_ok=True)
             lasted = make_recording(lines, self._target)
             self.path.unlink(missing_ok=True)

@@ -28,7 +28,7 @@ Line = list[Any]
 
 
 class RunningChannels:
-    """Turns lines into messages, one after the other; see `ToldRun` for the lines.
+    """Turns lines into messages, one after the other; see `RunLines` for the lines.
 
     Args:
         seed: Random seed.

@@ -467,10 +467,10 @@ def test_how_a_mission_stands_is_told_to_everybody_who_asks(bench):
     bench.say(ANA, m.Patrol((HERE, HERE, HERE), 2), number=41)
     assert told(bench) == ("under_way", 3, "")
     assert bench.robot.mission_status.mission_id == 41
-    assert bench.robot.mission_stands("waiting", 2, "jammed")
-    assert not bench.robot.mission_stands("waiting", 2, "jammed")
+    assert bench.robot.mission_changed("waiting", 2, "jammed")
+    assert not bench.robot.mission_changed("waiting", 2, "jammed")
     assert told(bench) == ("waiting", 2, "jammed")
-    assert bench.robot.mission_stands("failed", 2, "no way")
+    assert bench.robot.mission_changed("failed", 2, "no way")
     assert told(bench) == ("failed", 2, "no way")
     assert bench.robot.mode is Mode.IDLE
 
@@ -495,7 +495,7 @@ def test_what_a_robot_says_of_a_mission_that_is_over_is_no_news(bench):
     bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
     bench.say(ANA, m.GoTo((HERE,)))
     bench.say(ANA, m.CancelMission())
-    assert not bench.robot.mission_stands("done", 0, "")
+    assert not bench.robot.mission_changed("done", 0, "")
     assert told(bench) == ("failed", 1, "cancelled")
 
 

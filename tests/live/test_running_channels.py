@@ -13,7 +13,7 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.live import foxglove_server
 from dva_sim.live.foxglove_server import LAYOUT, FoxgloveServer
-from dva_sim.live.recorded_lines import told_in
+from dva_sim.live.recorded_lines import lines_of_part
 from dva_sim.live.recording import Keeper, LiveRecorder
 from dva_sim.live.running_channels import RunningChannels
 from dva_sim.recordings import channels
@@ -78,7 +78,7 @@ def test_what_is_shown_now_is_what_the_recording_will_hold(run, running, tmp_pat
     keeper = Keeper(tmp_path / "run.mcap", scenario, SEED)
     keeper.keep(b"".join(lines))
     keeper.close()
-    kept = list(every_message(told_in(keeper.path).playback()))
+    kept = list(every_message(lines_of_part(keeper.path).playback()))
     for topic in ("/story", "/robot-1/activity"):
         assert of(running, topic) == sorted(of(kept, topic), key=lambda message: message.time)
     # A track is known only at its end to be straight: live there may be more poses, none else.

@@ -274,7 +274,7 @@ class RobotController:
         self._idle("")
         return Decision(m.OK, set_point=STAND)
 
-    def mission_stands(self, state: str, left: int, reason: str) -> bool:
+    def mission_changed(self, state: str, left: int, reason: str) -> bool:
         """The robot says how its mission goes on; True if that is news.
 
         Args:

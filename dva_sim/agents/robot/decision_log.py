@@ -150,7 +150,7 @@ def _again(
     if happened == LEASE_ENDS:
         controller.expire(now)
     elif happened == MISSION_ENDS:
-        controller.mission_stands("done", 0, "")
+        controller.mission_changed("done", 0, "")
     elif happened == TAKEN_BY_HAND:
         controller.take_by_hand(HAND, now, moving=False)
     elif happened == LET_GO:

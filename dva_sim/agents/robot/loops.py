@@ -135,5 +135,5 @@ class MissionLoop:
 
     def _obey(self, step: PilotStep) -> None:
         self._around.body.drive(*step.intent, self._around.clock.now + 2 * PERIOD)
-        if self._controller.mission_stands(step.state, step.left, step.reason):
+        if self._controller.mission_changed(step.state, step.left, step.reason):
             self._on_news()

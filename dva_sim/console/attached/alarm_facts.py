@@ -12,7 +12,7 @@ from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.protocol import messages as m
 
 
-class ToldFacts:
+class RemoteAlarmFacts:
     """Alarm facts from messages alone; a robot's watchdog shows only as silence.
 
     Args:

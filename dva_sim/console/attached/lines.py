@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from dva_sim.console.attached.told import ToldDevice
+from dva_sim.console.attached.told import DeviceState
 from dva_sim.console.dva.device_rows import link_of
 from dva_sim.console.run.lag import LIMIT
 from dva_sim.console.views.feed import SEVERITIES
+from dva_sim.console.views.foreign_devices import foreign_robot_row
 from dva_sim.console.views.scene import RULES, legend, site_of
-from dva_sim.console.views.strangers import row_of_stranger
 from dva_sim.console.views.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
 from dva_sim.console.wire.events import EventFacts
 from dva_sim.console.wire.rows import DeviceRow, RobotRow
@@ -29,7 +29,7 @@ BODIES: Final[Mapping[str, ThingBody]] = {"robot": UNKNOWN_ROBOT, "guard": UNKNO
 SILENT_AFTER: Final = 10.0  # without a place on the list: the DVA's own time-out [s]
 
 
-def things_of(devices: Iterable[ToldDevice], numbers: dict[str, int]) -> list[ThingShown]:
+def things_of(devices: Iterable[DeviceState], numbers: dict[str, int]) -> list[ThingShown]:
     """Everybody, with numbers that stay as they are."""
     things: list[ThingShown] = []
     for entry in devices:
@@ -85,7 +85,7 @@ def nowhere(frame: GeoFrame) -> SiteShown:
 
 
 def positions(
-    devices: Mapping[str, ToldDevice], numbers: dict[str, int], frame: GeoFrame
+    devices: Mapping[str, DeviceState], numbers: dict[str, int], frame: GeoFrame
 ) -> list[list[int]]:
     """Return the positions of everybody who has reported one."""
     rows = []
@@ -102,14 +102,14 @@ def positions(
     return rows
 
 
-def robot_row(device_state: ToldDevice, number: int, now: float) -> RobotRow:
+def robot_row(device_state: DeviceState, number: int, now: float) -> RobotRow:
     """A robot, as it says itself."""
     status, holder = device_state.status, device_state.holder
     known = status if isinstance(status, m.RobotStatus) else None
     holding, since = holder if holder is not None else (None, now)
     held = holding is not None and holding.holder is not None
     return {
-        **row_of_stranger(number, known.mode if known is not None else "unknown"),
+        **foreign_robot_row(number, known.mode if known is not None else "unknown"),
         "holder": holding.holder if holding is not None else None,
         "holder_label": holding.label if holding is not None else None,
         "session_age_s": round(holding.held_for + now - since, 1) if holding and held else None,
@@ -118,19 +118,19 @@ def robot_row(device_state: ToldDevice, number: int, now: float) -> RobotRow:
     }
 
 
-def sensors_of(device_state: ToldDevice) -> list[str]:
+def sensors_of(device_state: DeviceState) -> list[str]:
     """Describe what a device can measure."""
     return [f"{sensor.name} [{sensor.unit}]" for sensor in device_state.sensors]
 
 
-def readings_of(device_state: ToldDevice, now: float) -> list[str]:
+def readings_of(device_state: DeviceState, now: float) -> list[str]:
     """Describe the values of its sensors; a value that is no longer reported is unknown."""
     return [
         f"{sensor.name} {_reading(sensor, device_state, now)}" for sensor in device_state.sensors
     ]
 
 
-def _reading(sensor: m.Sensor, device_state: ToldDevice, now: float) -> str:
+def _reading(sensor: m.Sensor, device_state: DeviceState, now: float) -> str:
     value, heard = device_state.values.get(sensor.name, (None, 0.0))
     if value is None or now - heard > SILENT_AFTER:
         return "unknown"
@@ -140,7 +140,7 @@ def _reading(sensor: m.Sensor, device_state: ToldDevice, now: float) -> str:
     return f"{value.values[0]:.3g}{unit}"
 
 
-def device_row(device_state: ToldDevice, now: float, is_fake: bool, may_revoke: bool) -> DeviceRow:
+def device_row(device_state: DeviceState, now: float, is_fake: bool, may_revoke: bool) -> DeviceRow:
     """A device, as the DVA lists it and as it is heard here."""
     device, status, holding = device_state.device, device_state.status, device_state.holder
     silent = now - device_state.listed > SILENT_AFTER

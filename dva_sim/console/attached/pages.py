@@ -10,13 +10,13 @@ from typing import Final
 
 from dva_sim.cameras.lines import Show
 from dva_sim.console.attached import lines
-from dva_sim.console.attached.alarm_facts import ToldFacts
+from dva_sim.console.attached.alarm_facts import RemoteAlarmFacts
 from dva_sim.console.attached.audit import AttachedAudit
 from dva_sim.console.attached.people import AttachedPeople
-from dva_sim.console.attached.sensing import ToldSensors
+from dva_sim.console.attached.sensing import WatchedSensors
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import AuditKeeper
-from dva_sim.console.events.alarm_desk import AlarmDesk
+from dva_sim.console.events.console_alarms import ConsoleAlarms
 from dva_sim.console.events.decisions import about_event, dispatch_shown
 from dva_sim.console.run.lag import LagRule
 from dva_sim.console.views.feed import story_of
@@ -53,8 +53,8 @@ class AttachedPages:
         self.show: Show = lambda *_: None
         self.dropped: Callable[[], int] = lambda: 0
         self.looked, self.people = False, AttachedPeople()
-        self.sensors = ToldSensors(system.device, system.told, system.id_of)
-        self.alarms = AlarmDesk(ToldFacts(system))
+        self.sensors = WatchedSensors(system.device, system.told, system.id_of)
+        self.alarms = ConsoleAlarms(RemoteAlarmFacts(system))
         self.audited = AttachedAudit(audit, system, self.people.author)
         system.on_record = self.audited.heard
         self._answers, self._news, self._is_shown = False, News(lambda: self.tell), False

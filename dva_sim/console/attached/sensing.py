@@ -9,7 +9,7 @@ from typing import Final
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.operator.steps import give_back, start
 from dva_sim.agents.robot.sensors import sensor_topic
-from dva_sim.console.attached.told import ToldDevice, ToldSystem
+from dva_sim.console.attached.told import DeviceState, SystemState
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
@@ -27,7 +27,7 @@ class SensorWatch:
         device_state: State of the robot, which takes the values.
     """
 
-    def __init__(self, device: AgentDevice, device_state: ToldDevice) -> None:
+    def __init__(self, device: AgentDevice, device_state: DeviceState) -> None:
         self._device, self._told, self._robot = device, device_state, device_state.device.id_tag
         self._session: int | None = None
         self._over = False
@@ -95,7 +95,7 @@ class SensorWatch:
             self._told.values[message.body.sensor] = message.body, self._device.clock.now
 
 
-class ToldSensors:
+class WatchedSensors:
     """All robots whose sensors are listened to.
 
     Args:
@@ -105,7 +105,7 @@ class ToldSensors:
     """
 
     def __init__(
-        self, device: AgentDevice, told: ToldSystem, id_of: Callable[[int], str | None]
+        self, device: AgentDevice, told: SystemState, id_of: Callable[[int], str | None]
     ) -> None:
         self._device, self._told, self._id_of = device, told, id_of
         self._watches: dict[str, SensorWatch] = {}

@@ -12,7 +12,7 @@ from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice, do_nothing
 from dva_sim.console.attached.links import AttachedLinks
 from dva_sim.console.attached.options import AttachOptions
-from dva_sim.console.attached.told import ToldSystem
+from dva_sim.console.attached.told import SystemState
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.run.real_links import start_of_day
 from dva_sim.core.registry import CONTROL_ROOM, ROBOT
@@ -60,7 +60,7 @@ class AttachedSystem:
         self.agent = ControlRoomAgent(self.device)
         self.on_devices: Callable[[], object] = do_nothing
         self.on_record: Callable[[m.AuditRecord], object] = do_nothing
-        self.told = ToldSystem(self.device, lambda: self.on_devices())
+        self.told = SystemState(self.device, lambda: self.on_devices())
         self.fakes = FakeDevices(self._make, self._is_known, _identity, self._drop)
         self.is_told, self._heard = False, -UNHEARD
 

@@ -18,7 +18,7 @@ TOPICS: Final = {ROBOT: (HEARTBEAT, STATUS, HOLDER), GUARD: (HEARTBEAT, STATUS)}
 
 
 @dataclass
-class ToldDevice:
+class DeviceState:
     """A device, as far as messages tell.
 
     Attributes:
@@ -46,7 +46,7 @@ class ToldDevice:
     subscriptions: list[Subscription] = field(default_factory=list)
 
 
-class ToldSystem:
+class SystemState:
     """All devices that the DVA lists, and what they publish.
 
     Args:
@@ -59,7 +59,7 @@ class ToldSystem:
 
     def __init__(self, device: AgentDevice, on_news: Callable[[], object]) -> None:
         self._device, self._on_news = device, on_news
-        self.devices: dict[str, ToldDevice] = {}
+        self.devices: dict[str, DeviceState] = {}
 
     @property
     def _now(self) -> float:
@@ -96,7 +96,7 @@ class ToldSystem:
             return
         if known is not None:
             self._leave(known)
-        state = self.devices[device.id_tag] = known or ToldDevice(device, self._now)
+        state = self.devices[device.id_tag] = known or DeviceState(device, self._now)
         state.device, state.listed = device, self._now
         network, me, node = self._device.network, self._device.id_tag, device.id_tag
         network.introduce(node, device.address)
@@ -104,7 +104,7 @@ class ToldSystem:
             heard = self._hearing(state)
             state.subscriptions.append(network.subscribe(me, node, topic, heard))
 
-    def _hearing(self, device_state: ToldDevice) -> Callable[[bytes], object]:
+    def _hearing(self, device_state: DeviceState) -> Callable[[bytes], object]:
         def heard(data: bytes) -> None:
             message = self._device.read(data, device_state.device.id_tag)
             if message is None:
@@ -120,7 +120,7 @@ class ToldSystem:
         return heard
 
     @staticmethod
-    def _leave(device_state: ToldDevice) -> None:
+    def _leave(device_state: DeviceState) -> None:
         for subscription in device_state.subscriptions:
             subscription.close()
         device_state.subscriptions.clear()

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dva_sim.agents.operator.handheld import Gathered
 from dva_sim.console.asking.dispatcher import Doer, does
 from dva_sim.console.asking.refusal import OnResult
-from dva_sim.console.events.alarm_desk import AlarmDesk
+from dva_sim.console.events.console_alarms import ConsoleAlarms
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import OfAlarm, ShelveAsked
 
@@ -16,22 +16,24 @@ class AlarmActions:
     """Does what people ask for about alarms.
 
     Args:
-        desk: Alarms of the console.
+        alarms: Alarms of the console.
         author: Name of the person at a page.
         acknowledge: Action that notifies the DVA of an acknowledgement.
     """
 
-    def __init__(self, desk: AlarmDesk, author: Callable[[str], str], acknowledge: Doer) -> None:
-        self._desk, self._author, self._acknowledge_event = desk, author, acknowledge
+    def __init__(
+        self, alarms: ConsoleAlarms, author: Callable[[str], str], acknowledge: Doer
+    ) -> None:
+        self._alarms, self._author, self._acknowledge_event = alarms, author, acknowledge
 
     @does("alarm_acknowledge")
     def _acknowledge(self, client: str, line: Asked, on_result: OnResult) -> None:
         """Acknowledge an alarm: at the DVA if an open event is behind it, else here."""
-        keys = self._desk.members(line["alarm"])
-        events = self._desk.by_event(keys)
+        keys = self._alarms.members(line["alarm"])
+        events = self._alarms.by_event(keys)
         for key in keys:
             if key not in events:
-                self._desk.acknowledge(key, self._author(client))
+                self._alarms.acknowledge(key, self._author(client))
         if not events:
             on_result(True, "seen")
             return
@@ -43,11 +45,11 @@ class AlarmActions:
 
     @does("alarm_shelve")
     def _shelve(self, client: str, line: ShelveAsked, on_result: OnResult) -> None:
-        keys = self._desk.members(line["alarm"])
-        self._desk.shelve(keys, line["for_s"], self._author(client))
+        keys = self._alarms.members(line["alarm"])
+        self._alarms.shelve(keys, line["for_s"], self._author(client))
         on_result(True, f"shelved for {line['for_s'] / 60:.0f} minutes")
 
     @does("alarm_unshelve")
     def _unshelve(self, client: str, line: OfAlarm, on_result: OnResult) -> None:
-        self._desk.unshelve(self._desk.members(line["alarm"]))
+        self._alarms.unshelve(self._alarms.members(line["alarm"]))
         on_result(True, "back in the list")

@@ -12,7 +12,7 @@ from dva_sim.console.audit.audit_keeper import auditing
 from dva_sim.console.pages.addresses import own_address
 from dva_sim.console.pages.page_options import PageOptions
 from dva_sim.console.pages.processes import ConsoleProcesses
-from dva_sim.console.simulator.robot_desk import RobotDesk
+from dva_sim.console.simulator.lone_robot_actions import LoneRobotActions
 from dva_sim.console.simulator.robot_world import RobotWorld
 from dva_sim.live.process import ending_when_asked
 from dva_sim.network.addresses import check_address
@@ -112,7 +112,7 @@ class RobotSimulator:
             ending_when_asked(world.clock, supervised=False) as ending,
         ):
             world.keep_audit(audit)
-            self._processes.start(world, RobotDesk(world).take, audit=audit.path)
+            self._processes.start(world, LoneRobotActions(world).take, audit=audit.path)
             self._say(f"Robot: {world.robot.device.address}")
             if self._options.dva is not None:
                 self._begin(world, self._options.dva)

@@ -31,10 +31,10 @@ class Things:
 
     def add(self, id_tag: str, label: str, kind: str, body: ThingBody | None = None) -> None:
         """Somebody comes, who may be called by the label, too."""
-        self.add_stranger(id_tag, label, kind, body)
+        self.add_foreign(id_tag, label, kind, body)
         self.numbers[label] = self.numbers[id_tag]
 
-    def add_stranger(
+    def add_foreign(
         self, id_tag: str, label: str, kind: str, body: ThingBody | None = None
     ) -> None:
         """Somebody comes whose label may be that of another one."""

@@ -10,7 +10,7 @@ from dva_sim.cameras.lines import Show, contained_line
 from dva_sim.cameras.screens import Screens
 from dva_sim.console.audit.audited import Audited
 from dva_sim.console.dva.dva_pages import DvaPages
-from dva_sim.console.events.alarm_desk import AlarmDesk
+from dva_sim.console.events.console_alarms import ConsoleAlarms
 from dva_sim.console.events.decisions import about_event
 from dva_sim.console.events.rooms import ConsoleRooms
 from dva_sim.console.guards.played_guards import PlayedGuards
@@ -22,10 +22,10 @@ from dva_sim.console.run.recorder import ConsoleRecorder
 from dva_sim.console.run.sliders import LinkSliders
 from dva_sim.console.views.feed import Feed
 from dva_sim.console.views.fields import HazardFeed
+from dva_sim.console.views.foreign_devices import ForeignDevices
 from dva_sim.console.views.logs import Logs
 from dva_sim.console.views.news import News, clock_shown
 from dva_sim.console.views.scene import scene_of
-from dva_sim.console.views.strangers import Strangers
 from dva_sim.console.wire.events import SiteEventShown
 from dva_sim.console.wire.limits import LOG_PERIOD
 from dva_sim.console.wire.lines import Tell
@@ -40,7 +40,7 @@ POSITIONS, WINDOWS, ROWS, HAZARDS, DEVICES, TIDY = 0.1, 0.1, 0.5, 1.0, 1.0, 1.0
 SOON = 0.05  # from one look at what has changed to the next, real time [s]
 
 
-class ToldWorld:
+class PublishingWorld:
     """World that publishes its changes to pages.
 
     It says when and how; what there is to be told belongs to the world that this is the base of.
@@ -57,13 +57,13 @@ class ToldWorld:
     sliders: LinkSliders
     phones: Phones
     windows: RobotWindows
-    strangers: Strangers
+    foreign: ForeignDevices
     seat_lines: SeatLines
     screens: Screens
     logs: Logs
     hazards: HazardFeed
     rooms: ConsoleRooms
-    alarms: AlarmDesk
+    alarms: ConsoleAlarms
     guards: PlayedGuards
     dva: DvaPages
     audited: Audited | None
@@ -112,11 +112,11 @@ class ToldWorld:
 
     def _tell_positions(self) -> None:
         line = self.feed.positions()
-        line["p"] += self.strangers.positions()
+        line["p"] += self.foreign.positions()
         self._news.tell(line)
 
     def _tell_rows(self) -> None:
-        if self.strangers.come():
+        if self.foreign.come():
             self.tell_scene()
         self.lag.measured(time.monotonic(), self.clock.worst_lag())
         rows: RowsLine = {
@@ -128,7 +128,7 @@ class ToldWorld:
             "server": self.dva.port.line(),
             "robots": [
                 *self.feed.robots(self.lag.held),
-                *self.strangers.robots(),
+                *self.foreign.robots(),
             ],
             "people": self.feed.people(),
             "order": self.seat_lines.waiting_order(),

@@ -19,7 +19,7 @@ from dva_sim.cameras.screens import Screens, camera_url, topic_of
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited, name_of_page
 from dva_sim.console.dva.dva_pages import DvaPages
-from dva_sim.console.events.alarm_desk import AlarmDesk, RunFacts
+from dva_sim.console.events.console_alarms import ConsoleAlarms, RunFacts
 from dva_sim.console.events.rooms import ConsoleRooms
 from dva_sim.console.guards.played_guards import PlayedGuards
 from dva_sim.console.phones.phones import FIRST_SEAT, Phones
@@ -30,11 +30,11 @@ from dva_sim.console.run.recorder import ConsoleRecorder
 from dva_sim.console.run.sliders import LinkSliders
 from dva_sim.console.views.feed import Feed
 from dva_sim.console.views.fields import HazardFeed
+from dva_sim.console.views.foreign_devices import ForeignDevices
 from dva_sim.console.views.logs import Logs
-from dva_sim.console.views.strangers import Strangers
 from dva_sim.console.wire.lines import Tell
 from dva_sim.console.world.seat_lines import SeatLines
-from dva_sim.console.world.telling import ToldWorld
+from dva_sim.console.world.telling import PublishingWorld
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import PacedClock
 from dva_sim.recordings.audit_log import AuditRow, plain_row
@@ -47,7 +47,7 @@ PEOPLE = 1  # operators of the scenario whose places people take
 SCREEN = 0xFFFF  # number of the console's own screen among consoles
 
 
-class ConsoleWorld(ToldWorld):
+class ConsoleWorld(PublishingWorld):
     """Running world with its published state.
 
     Args:
@@ -120,9 +120,9 @@ class ConsoleWorld(ToldWorld):
             self.run, self.feed, self._persons, self.client_of, self.phones.by_client
         )
         self.guards = PlayedGuards(self.run, self.feed)
-        self.strangers = Strangers(self.run, self.feed)
+        self.foreign = ForeignDevices(self.run, self.feed)
         self.rooms = ConsoleRooms(self.run, self.run.dva.desk.roles)
-        self.alarms = AlarmDesk(RunFacts(self.run))
+        self.alarms = ConsoleAlarms(RunFacts(self.run))
         self.audited: Audited | None = None
         self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)
         self.recorder.on_applied = self.seat_lines.applied

@@ -12,11 +12,12 @@ from dva_sim.network.link.link import (
 from dva_sim.network.link.outages import Gap, Outage, Partition
 from dva_sim.network.link.rates import ConstantRate, PacketQueue, Serialiser, TraceRate
 from dva_sim.network.link.recorded import read_delay_log, read_trace
-from dva_sim.network.link.time_noise import Weather
+from dva_sim.network.link.time_noise import FastNoise
 
 __all__ = [
     "ConstantRate",
     "Direction",
+    "FastNoise",
     "Gap",
     "Link",
     "LinkConfig",
@@ -27,7 +28,6 @@ __all__ = [
     "Serialiser",
     "TraceRate",
     "Way",
-    "Weather",
     "check_partitions",
     "make_link",
     "make_serialiser",
@@ -35,3 +35,5 @@ __all__ = [
     "read_delay_log",
     "read_trace",
 ]
+
+Weather = FastNoise  # its name before 0.9

@@ -20,7 +20,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.network.link.recorded import read_delays
 from dva_sim.network.link.time_noise import (
     MakeNumbers,
-    SlowWeather,
+    SlowNoise,
     UniformNumbers,
     normal_quantile,
 )
@@ -93,7 +93,7 @@ class _Law(Config):
             make: Function that makes the numbers of packets that are independent of one another.
         """
         if self.correlation_s:
-            slow = SlowWeather(streams, name, self.correlation_s)
+            slow = SlowNoise(streams, name, self.correlation_s)
             return by_quantile(self.quantile(delay), slow)
         return by_quantile(self.quantile(delay), make(streams, name))
 

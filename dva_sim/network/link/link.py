@@ -25,7 +25,7 @@ from dva_sim.network.link.outages import Gap, Partition, gaps_of
 from dva_sim.network.link.rates import ConstantRate, PacketQueue, Serialiser, TraceRate
 from dva_sim.network.link.recorded import read_delay_log, read_trace
 from dva_sim.network.link.replay import Replay, period_of
-from dva_sim.network.link.time_noise import MakeNumbers, PacketNumbers, Weather
+from dva_sim.network.link.time_noise import FastNoise, MakeNumbers, PacketNumbers
 
 SMALLEST_PACKET = 40  # IPv4 and TCP headers alone [B]
 
@@ -64,7 +64,7 @@ class Link:
     ) -> None:
         way = config.toward(direction)
         self.offered = self.lost = self.cut = self.dropped = self.bytes = 0
-        self._make_numbers: MakeNumbers = Weather
+        self._make_numbers: MakeNumbers = FastNoise
         if by_packet:
             self._make_numbers = partial(PacketNumbers, number=lambda: self.offered)
         self.name, self.rate_bps, self.room = name, serialiser.rate_bps, way.queue_bytes
@@ -363,7 +363,7 @@ class RadioLink(Link):
         super().__init__(config, serialiser, streams, name, direction)
         way = config.toward(direction)
         self._reception = reception
-        self._uniforms = Weather(streams, f"{name}/radio")
+        self._uniforms = FastNoise(streams, f"{name}/radio")
         self._air, self._air_room = ConstantRate(way.rate_bps), way.queue_bytes
         self._newest = 0.0
 

@@ -34,7 +34,7 @@ MakeNumbers = Callable[[Streams, str], UniformNumbers]
 """Makes the source of a name from the run's random streams."""
 
 
-class Weather:
+class FastNoise:
     """Random numbers that are new in each millisecond, drawn in blocks on demand.
 
     Packets of the same millisecond have numbers of their own, which follow from that one.
@@ -102,7 +102,7 @@ def _scrambled(seed: float, count: int) -> float:
     return ((bits ^ (bits >> 31)) >> 11) * 2.0**-53
 
 
-class SlowWeather:
+class SlowNoise:
     """Random numbers that change slowly: packets sent close together get similar ones.
 
     An Ornstein-Uhlenbeck process, exact at each millisecond, seen through the normal law's

@@ -14,7 +14,7 @@ from helpers.processes.programs import Program, Programs
 
 from dva_sim.console.attached import lines
 from dva_sim.console.attached.options import AttachOptions
-from dva_sim.console.attached.told import ToldDevice
+from dva_sim.console.attached.told import DeviceState
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.keys import KeyRing, create_keys
 from dva_sim.protocol import messages as m
@@ -31,8 +31,8 @@ HERE = GeoFrame(38.66, -9.2)
 # --- what is told ------------------------------------------------------------------------------
 
 
-def told(kind: str = "Robot", **more: object) -> ToldDevice:
-    return ToldDevice(m.Device(ROBOT, "robot-1", kind, "10.0.0.1:5600"), 0.0, **more)
+def told(kind: str = "Robot", **more: object) -> DeviceState:
+    return DeviceState(m.Device(ROBOT, "robot-1", kind, "10.0.0.1:5600"), 0.0, **more)
 
 
 def test_of_a_robot_that_has_said_nothing_everything_is_unknown():

@@ -10,7 +10,7 @@ from helpers.processes.patience import PATIENCE_S
 from helpers.wording import unnamed
 
 from dva_sim.console.robots.robot_station import two_free_ports
-from dva_sim.console.simulator.robot_desk import RobotDesk
+from dva_sim.console.simulator.lone_robot_actions import LoneRobotActions
 from dva_sim.console.simulator.robot_simulator import RobotOptions
 from dva_sim.console.simulator.robot_world import RobotWorld
 from dva_sim.console.wire.actions import ACTIONS
@@ -35,7 +35,7 @@ class Bench:
         self.world = RobotWorld(options.read(), clock=PacedClock())
         self.lines = []
         self.world.tell = lambda line, key="": self.lines.append(checked(line))
-        self.desk = RobotDesk(self.world)
+        self.desk = LoneRobotActions(self.world)
         self.world.begin()
         self.world.clock.go()
         self.count, self.code, self.heard = 0, m.OK, []

@@ -12,7 +12,7 @@ from helpers.paths import ROOT
 from dva_sim.console.asking.dispatcher import _KNOWN, ActionDispatcher
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited
-from dva_sim.console.simulator.robot_desk import RobotDesk
+from dva_sim.console.simulator.lone_robot_actions import LoneRobotActions
 from dva_sim.console.web.outbox import OutgoingLines
 from dva_sim.console.wire import generated
 from dva_sim.console.wire.actions import ACTIONS, Action, ActionPlace, Asked, Audit
@@ -120,7 +120,7 @@ def test_a_robot_alone_keeps_who_switched_it_off(tmp_path):
     world.keep_audit(keeper)
     for what in ("robot_listen", "robot_off", "fault"):
         about = arguments_of(ACTIONS[what])
-        RobotDesk(world).take({"do": what, "id": what, "client": "c3-ab", **about})
+        LoneRobotActions(world).take({"do": what, "id": what, "client": "c3-ab", **about})
     keeper.close()
     world.close()
     rows = {row.action: row for row in read_rows(tmp_path / "audit.sqlite")}

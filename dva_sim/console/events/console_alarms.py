@@ -65,7 +65,7 @@ class RunFacts:
         )
 
 
-class AlarmDesk:
+class ConsoleAlarms:
     """The alarms of a console.
 
     Args:

@@ -7,7 +7,7 @@ from helpers.console.simulated_phone import PhonePage
 from helpers.wording import unnamed
 
 from dva_sim.console.asking.refusal import Refused
-from dva_sim.console.events.alarm_desk import ESCALATED_FOR, AlarmDesk, RunFacts
+from dva_sim.console.events.console_alarms import ESCALATED_FOR, ConsoleAlarms, RunFacts
 from dva_sim.worlds.bodies import TickTarget
 
 
@@ -27,83 +27,83 @@ def page(monkeypatch: pytest.MonkeyPatch) -> PhonePage:
 
 
 @pytest.fixture
-def desk(page: PhonePage) -> AlarmDesk:
+def alarms(page: PhonePage) -> ConsoleAlarms:
     page.let(5.0)  # everybody has registered
-    return AlarmDesk(RunFacts(page.world.run))
+    return ConsoleAlarms(RunFacts(page.world.run))
 
 
-def texts(desk: AlarmDesk, *events: Any, robots: Any = (), now_ms: int = 10_000) -> list[str]:
-    return [row["text"] for row in desk.look(events, robots, now_ms)["alarms"]]
+def texts(alarms: ConsoleAlarms, *events: Any, robots: Any = (), now_ms: int = 10_000) -> list[str]:
+    return [row["text"] for row in alarms.look(events, robots, now_ms)["alarms"]]
 
 
-def test_an_open_event_is_an_alarm_as_grave_as_it_is(desk):
-    (row,) = desk.look([event()], [], 10_000)["alarms"]
+def test_an_open_event_is_an_alarm_as_grave_as_it_is(alarms):
+    (row,) = alarms.look([event()], [], 10_000)["alarms"]
 
     assert (row["text"], row["priority"], row["since_ms"]) == ("Gas leak, Lab", "high", 5000)
     assert row["event"] == 1
 
 
-def test_what_the_dva_says_was_acknowledged_is(desk):
-    (row,) = desk.look([event(acknowledged={"label": "ana"})], [], 10_000)["alarms"]
+def test_what_the_dva_says_was_acknowledged_is(alarms):
+    (row,) = alarms.look([event(acknowledged={"label": "ana"})], [], 10_000)["alarms"]
 
     assert (row["state"], row["seen_by"]) == ("acknowledged", "ana")
 
 
-def test_an_escalation_is_critical_for_a_minute_and_then_returned(desk):
+def test_an_escalation_is_critical_for_a_minute_and_then_returned(alarms):
     over = event(state="escalated", over=True, since_ms=10_000)
-    (row,) = desk.look([over], [], 10_000)["alarms"]
+    (row,) = alarms.look([over], [], 10_000)["alarms"]
     assert (row["priority"], row["state"]) == ("critical", "unacknowledged")
 
     later = 10_000 + round(1000 * ESCALATED_FOR)
-    (row,) = desk.look([over], [], later)["alarms"]
+    (row,) = alarms.look([over], [], later)["alarms"]
     assert row["state"] == "returned"
-    desk.acknowledge(row["key"], "ana")
-    assert texts(desk, over, now_ms=later) == []
+    alarms.acknowledge(row["key"], "ana")
+    assert texts(alarms, over, now_ms=later) == []
 
 
-def test_a_robot_whose_watchdog_has_stopped_it_is_lost(desk):
-    assert texts(desk, robots=[robot(0), robot(1)]) == []
+def test_a_robot_whose_watchdog_has_stopped_it_is_lost(alarms):
+    assert texts(alarms, robots=[robot(0), robot(1)]) == []
     lost = robot(0, watchdog_left_s=0.0)
-    (text,) = texts(desk, robots=[lost])
+    (text,) = texts(alarms, robots=[lost])
     assert unnamed(text, "robot-1", "watchdog") == []
 
 
 @pytest.mark.invariant("S4")
-def test_a_safety_rule_that_is_broken_is_a_critical_alarm_until_somebody_has_seen_it(page, desk):
-    assert texts(desk) == []
+def test_a_safety_rule_that_is_broken_is_a_critical_alarm_until_somebody_has_seen_it(page, alarms):
+    assert texts(alarms) == []
     run = page.world.run
     body = next(iter(run.field.robots.values())).body
     body._asked.put(0, TickTarget(2.0, 0.0, body._world.tick_at(1e6)))
     page.let(1.0)
-    rows = {row["text"]: row for row in desk.look([], [], 10_000)["alarms"]}
+    rows = {row["text"]: row for row in alarms.look([], [], 10_000)["alarms"]}
     (asked,) = [text for text in rows if unnamed(text, "S4 ", "robot-1", "2.00 m/s") == []]
     assert (rows[asked]["priority"], rows[asked]["state"]) == ("critical", "unacknowledged")
     assert 5_000 <= rows[asked]["since_ms"] <= 6_000
 
-    desk.acknowledge(rows[asked]["key"], "ana")
+    alarms.acknowledge(rows[asked]["key"], "ana")
     body._asked.put(0, TickTarget(0.0, 0.0, 0.0))
     page.let(1.0)
-    again = {row["text"]: row["state"] for row in desk.look([], [], 20_000)["alarms"]}
+    again = {row["text"]: row["state"] for row in alarms.look([], [], 20_000)["alarms"]}
     assert again[asked] == "acknowledged"
 
 
-def test_a_robot_that_waits_for_its_first_command_is_not(desk):
+def test_a_robot_that_waits_for_its_first_command_is_not(alarms):
     waits = robot(0, watchdog_left_s=0.0, stands="waits for the first command: ...")
 
-    assert texts(desk, robots=[waits]) == []
+    assert texts(alarms, robots=[waits]) == []
 
 
-def test_nobody_left_to_send_is_an_alarm_only_while_something_waits(page, desk):
+def test_nobody_left_to_send_is_an_alarm_only_while_something_waits(page, alarms):
     waits = event(state="pending")
-    assert texts(desk, waits) == ["Gas leak, Lab"]  # somebody is free
+    assert texts(alarms, waits) == ["Gas leak, Lab"]  # somebody is free
     for entry in page.world.run.dva.desk.registry.entries.values():
         entry.silent = True
 
-    assert any(unnamed(text, "nobody", "1 wait") == [] for text in texts(desk, waits))
-    rows = desk.look([event()], [], 10_000)["alarms"]
+    assert any(unnamed(text, "nobody", "1 wait") == [] for text in texts(alarms, waits))
+    rows = alarms.look([event()], [], 10_000)["alarms"]
     assert [row["state"] for row in rows if row["key"] == "nobody"] == ["returned"]
 
 
-def test_a_row_that_is_gone_is_none_to_act_on(desk):
+def test_a_row_that_is_gone_is_none_to_act_on(alarms):
     with pytest.raises(Refused, match="is over"):
-        desk.members("event 1")
+        alarms.members("event 1")

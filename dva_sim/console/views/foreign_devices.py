@@ -18,7 +18,7 @@ from dva_sim.simulation.full.stage import kind_of
 MOST: Final = 64
 
 
-def row_of_stranger(number: int, mode: str) -> RobotRow:
+def foreign_robot_row(number: int, mode: str) -> RobotRow:
     """A robot of which little is known; what is not is null."""
     return {
         "i": number,
@@ -40,7 +40,7 @@ def row_of_stranger(number: int, mode: str) -> RobotRow:
     }
 
 
-class Strangers:
+class ForeignDevices:
     """Those of a run.
 
     Args:
@@ -72,7 +72,7 @@ class Strangers:
         self._known[device.id_tag] = "robot" if is_robot else "guard"
         body = UNKNOWN_ROBOT if is_robot else {**UNKNOWN_PERSON, "person": True}
         label = distinct(device.label, device.id_tag, self._run.stage.labels.values())
-        self._feed.things.add_stranger(device.id_tag, label, self._known[device.id_tag], body)
+        self._feed.things.add_foreign(device.id_tag, label, self._known[device.id_tag], body)
 
     def positions(self) -> list[list[int]]:
         """Return the positions of devices that have reported one."""
@@ -86,7 +86,7 @@ class Strangers:
     def robots(self) -> list[RobotRow]:
         """A row for each robot."""
         return [
-            row_of_stranger(self._feed.numbers[id_tag], entry.mode)
+            foreign_robot_row(self._feed.numbers[id_tag], entry.mode)
             for id_tag, entry in self._here()
             if self._known[id_tag] == "robot"
         ]

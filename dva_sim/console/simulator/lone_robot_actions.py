@@ -21,7 +21,7 @@ from dva_sim.network.addresses import check_address
 LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
 
 
-class RobotDesk:
+class LoneRobotActions:
     """Does what lines of the web process ask for.
 
     Args:
