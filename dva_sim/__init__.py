@@ -6,7 +6,7 @@
     results.answer.lead
     results.runs["drive_time_s"]
 
-What is here is loaded when it is first used; `dva_sim.api` explains it.
+Names are loaded when first used; `dva_sim.api` explains it.
 """
 
 from importlib import import_module

@@ -6,7 +6,7 @@ results are the same bytes. Only `show` prints, so nothing is quiet, verbose or 
 `--dry-run` is a function; mistakes are `DvaSimError`. A script needs no
 `if __name__ == "__main__"` around it.
 
-What does the work is imported when it is called, since every command begins with this module.
+Implementations are imported when called, since every command begins with this module.
 """
 
 from __future__ import annotations
@@ -317,7 +317,7 @@ def show(
 ) -> None:
     """Print what results hold: the answer and every cell, a table, or what columns mean.
 
-    Of a study under way it is what is known so far.
+    For a running study, the results so far are shown.
 
     Args:
         folder: A results folder.

@@ -306,7 +306,7 @@ class AgentDevice:
     def admit(self, request: Request) -> m.Message | None:
         """The message of a request, if it is one, and for this device.
 
-        What is none is refused here and now, before it costs anything but reading it; who sends
+        Invalid messages are refused at once, before it costs anything but reading it; who sends
         little else is not answered, and then not read (`Nuisances`). What may be an emergency
         always is.
         """

@@ -1,6 +1,6 @@
 """`dva-sim episode` and `replay`: a run played or read, drawn, kept, and told in a terminal.
 
-Of each model there is a story, a table, and a few lines of what came of it.
+Each model has a story, a table, and a few lines on its outcome.
 """
 
 from __future__ import annotations

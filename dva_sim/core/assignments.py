@@ -123,7 +123,7 @@ class Promise(NamedTuple):
 class Promises:
     """Deadlines of devices that have accepted an order: to set out, and then to keep moving.
 
-    What counts is what the DVA hears: `departed`, and positions as they are published. Time runs
+    Only reports to the DVA count: `departed`, and positions as they are published. Time runs
     from when something was first owed, or from the last move.
     """
 

@@ -326,7 +326,7 @@ class Orders:
     def _order_ends(self, device: str, event: Event) -> float:
         """Return when an order at a device counts as failed; standing by never does.
 
-        Who has found something says `done` soon; so long after the finding, that was lost.
+        A responder reports `done` soon after its finding; after this time the report was lost.
         """
         times = event.times
         if not event.open:

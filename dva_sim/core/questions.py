@@ -31,7 +31,7 @@ class Question:
 class Questions:
     """All that is open; one for each event and stage.
 
-    What the policy would do may change while it waits; the time that is left does not.
+    The policy's proposal may change while it waits; the time left does not.
 
     Attributes:
         within: Time that a question waits [s].

@@ -101,7 +101,7 @@ class Registry:
     def register(self, id_tag: str, request: Registration, now: float) -> DeviceEntry | None:
         """Enter a device, or renew its entry; None if the registry is full.
 
-        Of two whose labels look the same, one is called by its id, too: the one that is silent, or
+        If two labels look the same, one is shown with its id, too: the one that is silent, or
         else the one that came later.
         """
         label = self._label_of(id_tag, request.label)

@@ -135,7 +135,7 @@ class Store:
     def keep(self, dva: Dva, changed: Iterable[Event], now: float) -> str | None:
         """Write down what has changed; return what went wrong, in words, or None.
 
-        What cannot be written is tried again with the next call. A permission that cannot is
+        Failed writes are tried again with the next call. A permission that cannot is
         withdrawn: the next life of the DVA would give the robot to somebody else.
         """
         self._events |= {event.number: event for event in changed}

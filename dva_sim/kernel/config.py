@@ -1,6 +1,6 @@
 """Check a file against a pydantic model; mistakes are reported by key.
 
-What pydantic finds is said in words without Python: what is wrong, and what would be right. An
+Errors found by pydantic are reported without Python terms: the mistake, and the correct form. An
 unknown key is answered with the one that was meant: beside it, elsewhere in the file, or by another
 name. `Key` and `AlsoCalled` say at a field how a key is called.
 """

@@ -158,7 +158,7 @@ class KeyRing:
 def create_keys(folder: str | Path, ids: Iterable[str]) -> list[str]:
     """Make a pair of keys for each device that has none, and say for which.
 
-    What there is stays as it is. A device with a public key only is left alone, too: its secret
+    Existing keys stay as they are. A device with a public key only is left alone, too: its secret
     is on another machine.
 
     Args:

@@ -366,7 +366,7 @@ def _stale(
 ) -> Floats:
     """Age of what is in force at each look; from the start on before anything is.
 
-    What is applied at the very moment of a look is not seen by it: real programs are never
+    A command applied at the very moment of a look is not seen by it: real programs are never
     early, and where commands keep step with the looks a tie would be worth a whole step.
     """
     looks = warm_s + STALE_STEP_S * np.arange(round(dur_s / STALE_STEP_S))

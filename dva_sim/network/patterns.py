@@ -129,7 +129,7 @@ class Pattern(ABC):
 class Requested(Pattern):
     """Requests: the next command goes when one of those under way has been answered.
 
-    What the phone says meanwhile is superseded by what it says last. After the last attempt
+    Commands of the phone in the meantime are superseded by its latest one. After the last attempt
     without an answer the app alerts: the link is lost.
     """
 

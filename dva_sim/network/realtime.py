@@ -252,7 +252,7 @@ class PacedClock(LiveClock):
     def pulse(self, period: float, action: Callable[[], object]) -> None:
         """Run `action()` each `period` of real time [s], also while virtual time stands.
 
-        What is missed while a callback takes long is left out.
+        Pulses missed during a long callback are left out.
         """
         self._pulses.append(_Pulse(period, action))
 

@@ -1,6 +1,6 @@
 """Messages to bytes and back, by `protocol/dva.xsd`.
 
-What `encode` returns is valid by construction. `decode` trusts nobody: `schema` validates every
+The output of `encode` is valid by construction. `decode` trusts nobody: `schema` validates every
 message. Only messages in the very form that `encode` gives them, of the kinds that a drive is made
 of, take a shorter way: a command goes through here ten times a second and more, and a regular
 expression reads it several times as fast as a validating parser. It is narrower than the schema:
@@ -218,7 +218,7 @@ def encode(message: Message) -> bytes:
 def decode(data: bytes) -> Message:
     """The message in `data`; whatever the bytes, a message or a `ProtocolError`.
 
-    What was published is read by each who hears it: the same bytes are validated once.
+    A publication is read by every subscriber: the same bytes are validated once.
 
     Raises:
         ProtocolError: not a message by the specification; the reason fits into a reply.

@@ -1,6 +1,6 @@
 """Diagnosis of invalid messages: what is wrong, and where; only refused messages are searched.
 
-What the value of an element should look like is said in words, read from the schema itself.
+The correct form of a value is described in words, derived from the schema itself.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Values as XML: a check for each simple type of `protocol/dva.xsd`, made from that type.
 
-What passes is written; what the schema cannot hold raises `ProtocolError`.
+Valid values are written; values that the schema cannot hold raise `ProtocolError`.
 """
 
 from __future__ import annotations

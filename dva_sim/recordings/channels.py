@@ -55,7 +55,7 @@ def placed(time: float, moved: Sequence[tuple[str, TrackPoint]]) -> Iterator[Cha
 def sparse(track: Sequence[TrackPoint]) -> Iterator[TrackPoint]:
     """The points of a track between which everything lies on straight lines.
 
-    Of somebody who stands still, the first and the last point, and one for each `ALIVE_S`.
+    While somebody stands still: the first and the last point, and one for each `ALIVE_S`.
     """
     last = len(track) - 1
     for index, here in enumerate(track):

@@ -1,6 +1,6 @@
 """Messages of ROS as values: checked for types, finite numbers and frames; SI and the site's frame.
 
-What a message says is taken from JSON as rosbridge writes it. `NaN` and numbers that are none come
+Messages are read from JSON as rosbridge writes it. `NaN` and numbers that are none come
 as null or as `NaN`; both are refused where a value is needed.
 
 References:

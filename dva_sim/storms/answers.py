@@ -95,8 +95,8 @@ class AnswerWatch:
     def look(self) -> None:
         """Judge the requests that should have been answered by now.
 
-        What nobody answers has to be counted: each refusal without an answer counts for one of
-        them, at the same node.
+        Messages without a reply have to be counted: each refusal without an answer counts for one
+        of them, at the same node.
         """
         now = self._now()
         while self._open:

@@ -253,7 +253,7 @@ def _drift(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 def _by_hand(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     """Somebody takes the robot at the robot itself, as soon as it lets them, and drives about.
 
-    Whether it may is tried again and again, also while others drive it. Now and then the hand
+    It tries again and again, also while others drive the robot. Now and then the hand
     rests, or lets go and takes it again at once.
     """
     hand, goes = ManualControl(storm.robot(fault.target).agent), [True]

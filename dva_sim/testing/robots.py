@@ -34,7 +34,7 @@ def check_robot(
 ) -> Outcome:
     """See that a robot's motors keep what all promise, first by themselves, then in its body.
 
-    What users bring is held within the limits when it runs; here it is tried without that, so
+    Users' motors are held within the limits in a run; here they are tried without that, so
     that nothing is hidden.
 
     Args:

@@ -106,7 +106,7 @@ T = TypeVar("T")
 class AskedFor(Generic[T]):
     """Requests to a body: the one that holds now, and those of later ticks.
 
-    What was asked for first still has its tick, however soon something newer follows.
+    The first request still has its tick, however soon a newer one follows.
 
     Args:
         first: Initial request.
@@ -144,7 +144,7 @@ class AskedFor(Generic[T]):
 class Ticks:
     """A space stepped in whole ticks up to when somebody looks.
 
-    Who stands and is asked nothing sleeps: it costs nothing until it is asked or touched.
+    A standing body without requests sleeps: it costs nothing until requested or touched.
 
     Args:
         dt: Length of a tick [s], a whole number of microseconds.

@@ -1,6 +1,6 @@
 """A place where robots and people work, and such places by name: drawn, generated, or a bare map.
 
-Of a bare ROS map the walls are the border of its floor; bases are placed by a seed.
+On a bare ROS map the walls are the border of its floor; bases are placed by a seed.
 """
 
 from __future__ import annotations

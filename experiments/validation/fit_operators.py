@@ -21,7 +21,7 @@ only. Two fits were made before this rule, each by the smallest loss in the sear
 2. margin 0.454, motor_noise 0.0963, hand_lag_s 0.191, after three mechanisms were mended. The
    second comparison followed: 9 of 10.
 
-What each comparison found is in operators-history.csv; README.md says what was mended and why.
+The result of each comparison is in operators-history.csv; README.md says what was mended and why.
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ class Refusals:
     def held(self, holder: str | None, code: int | None, now: float, sent: int) -> str:
         """The robot says who holds it: why nobody obeys any more, or nothing.
 
-        What it said before the drive began may come late: it counts once it has said that it is
+        Reports from before the drive may arrive late: it counts once it has said that it is
         ours, or when it is said again and again.
 
         Args:

@@ -1,6 +1,6 @@
 """Bystanders: people who work at a site, and leave it when the alarm sounds or danger shows.
 
-What one does, as its `activity` tells:
+Values of `activity`:
 
 - **working** at a place, or **walking** to another one, if it is one of those who move around.
 - **alarmed**: it has heard the alarm, or noticed smoke, heat, water or flames itself, and gets

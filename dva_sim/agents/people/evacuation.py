@@ -279,7 +279,7 @@ class Exposure:
 class WayOut:
     """Leads a person to the nearest safe place, as long as there is a way.
 
-    Who finds none stands still, and looks for one again and again.
+    A person who finds none stands still, and searches again and again.
 
     Args:
         clock: The run's.

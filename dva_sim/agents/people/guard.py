@@ -7,7 +7,7 @@ has the place in sight, has seen enough: it confirms first. Until the guard is t
 orders; with such a dose it never takes one again. One who is incapacitated stays where it is, and
 its device answers that it lies down.
 
-What is **contained** is contained from afar: a fire with a hand-held extinguisher, a leak or a
+**Containment** works from a distance: a fire with a hand-held extinguisher, a leak or a
 burst pipe by its valve, which is taken to be no nearer than the air allows to go.
 """
 

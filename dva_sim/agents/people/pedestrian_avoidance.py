@@ -6,7 +6,7 @@ up to where one would touch somebody, if everybody else kept on, or a wall. Two 
 1. Walk in the direction whose free way ends nearest to where one would be if nothing were there.
 2. Walk no faster than would stop within the relaxation time before what is ahead.
 
-What touches nevertheless is left to the physics.
+Contacts are left to the physics.
 
 Who comes to a door towards which somebody else comes from the other side, and is nearer to it,
 waits beside the way until the other is through; but only as long as its patience lasts. Robots are

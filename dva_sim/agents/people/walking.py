@@ -14,7 +14,7 @@ push towards:
   it is for the agent to decide what then. So nobody is stuck for ever.
 - **At a crowded place** one is there as soon as others keep one from coming nearer.
 
-Who stands costs nothing: there is no step until somebody walks.
+People who stand cost nothing: steps are made only while somebody walks.
 """
 
 from __future__ import annotations

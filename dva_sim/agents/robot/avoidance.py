@@ -3,7 +3,7 @@
 A lane is the planned way shifted sideways for as long as somebody is there. Everybody keeps to
 the right where both sides are as good, so that two who meet do not dodge to the same side.
 
-Who goes first where only one fits through: people before robots; who stands in the narrow part
+Right of way where only one fits through: people before robots; who stands in the narrow part
 already; then the robot of the lower number. The other one steps aside.
 
 References:
@@ -151,7 +151,7 @@ class Avoidance:
     def _foreseen(self, way: Floats, here: Point, others: Sequence[Nearby]) -> Floats:
         """Predict where others will be along one's path: `(2, others, n)` [m].
 
-        Who goes first is expected to go on as it does; who does not, to stay where it is.
+        One with the right of way is expected to keep moving; the other to stay where it is.
         """
         x, y, vx, vy = np.array([(o.x, o.y, o.vx, o.vy) for o in others]).T[..., None]
         first = np.array(self.yields_to(here, others))[:, None]

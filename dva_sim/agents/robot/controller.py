@@ -333,7 +333,7 @@ class RobotController:
     def _told_by_dva(self, body: m.Reply) -> Decision:
         """Apply an answer of the DVA: nothing else gives anybody the robot.
 
-        That nobody holds it ends no drive: a DVA that has lost its memory may say so.
+        "Nobody holds it" does not end a drive: a DVA that has lost its memory may say so.
         """
         asked, permission = self.inquiry.answered(body), body.content
         if asked is None:

@@ -28,7 +28,7 @@ Triple = tuple[float, float, float]
 class AccelerometerPart(Config):
     """A part, with the numbers of its data sheet; `mg` are thousandths of gravity.
 
-    What a data sheet calls typical is taken to be a standard deviation, which is assumed.
+    A typical value of a data sheet is assumed to be a standard deviation.
 
     Attributes:
         data_sheet: Source of the numbers.

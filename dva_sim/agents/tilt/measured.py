@@ -16,7 +16,7 @@ SOONEST: Final = 0.005  # design: from one look to the next, while a batch is la
 class MeasuredTilt(TiltApp):
     """An app that is fed by `sample` alone.
 
-    What a sample does is what it does in any phone. The difference is that a batch that should be
+    Samples have the same effect as in any phone. The difference is that a batch that should be
     complete may not be, as its last samples are still on their way.
     """
 

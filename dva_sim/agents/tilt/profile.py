@@ -14,7 +14,7 @@ from dva_sim.kernel.config import Key
 class PhoneProfile(PhoneHabits):
     """A phone, how it is held, and how its app reads, filters, maps and sends.
 
-    What was assumed of all that stands in `PhoneHabits`.
+    Assumptions about these are in `PhoneHabits`.
 
     Attributes:
         accelerometer: Name of a part, or a file with one.

@@ -1,6 +1,6 @@
 """Decisions of people at an attached console: messages of its own control room.
 
-Whether that is allowed, the DVA says: it alone knows the role of each control room.
+The DVA decides if that is allowed: it alone knows the role of each control room.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Alarms: conditions that need somebody to act, and what people at pages do about them.
 
-What is shown is a run, or a system elsewhere: both tell the same few facts (`AlarmFacts`).
+The console shows a run, or a remote system: both tell the same few facts (`AlarmFacts`).
 """
 
 from __future__ import annotations

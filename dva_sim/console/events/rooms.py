@@ -1,6 +1,6 @@
 """The control rooms of a console: a device for each person who decides, and one that listens.
 
-What people decide becomes messages of their devices, and what pages show of events comes by the
+Decisions of people become messages of their devices, and what pages show of events comes by the
 DVA's own: another make of control room, or of DVA, can take either place.
 """
 

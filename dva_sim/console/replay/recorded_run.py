@@ -1,6 +1,6 @@
 """Recorded run at any moment, in the lines of a running world.
 
-What a recording does not hold, such as the charge of a battery, is not guessed: it is null.
+Values that a recording lacks, such as the charge of a battery, are not guessed: they are null.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Robots and guards that are none of the scenario's: they have joined by themselves, or are fakes.
+"""Robots and guards from outside the scenario: they have joined by themselves, or are fakes.
 
-Of them is shown what the DVA knows: that they are there, where, and in which mode.
+Pages show only what the DVA knows of them: presence, place and mode.
 """
 
 from __future__ import annotations

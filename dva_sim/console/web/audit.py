@@ -1,6 +1,6 @@
 """The audit log for pages and programs: read from its file, which the world alone writes.
 
-Of a recording its rows are in a file of JSON, as they were kept.
+For a recording, the rows are in a JSON file, as they were kept.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from dva_sim.console.wire.limits import MOST_ACTIONS, MOST_BATCHES, MOST_URGENT
 class OutgoingLines:
     """Lines to the simulation that have not been written yet.
 
-    Of inputs, of watched robots and of what is looked at only the newest waits, for each client.
+    Only the newest input, watched robots and viewed logs of each client wait.
     Of a phone's samples all count, in their order; if too many wait, the oldest are lost, which
     their numbers tell.
 

@@ -31,7 +31,7 @@ LOOK = 1.0  # from one look at who drives with what to the next, real time [s]
 class KeptResults:
     """A results folder in the making, which no other process writes into until it is closed.
 
-    What happens is in its journal a second later at most, whatever becomes of the console.
+    Events are in its journal within a second, whatever becomes of the console.
 
     Args:
         out: The folder.

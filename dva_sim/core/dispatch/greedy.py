@@ -103,8 +103,8 @@ class MinEta(Policy):
 class Preference(Policy):
     """Oldest task first; the first free one on the list of the event's zone.
 
-    Who is not on the list does not go. Where no lists are configured all are equal, and the
-    order of registration decides, as it does among equals on a list.
+    Responders that are not on the list do not go. Where no lists are configured all are equal, and
+    the order of registration decides, as it does among equals on a list.
     """
 
     @override

@@ -87,7 +87,7 @@ class OperatorAware(BatchOptimal):
 def match(cost: Floats, robots: NDArray[np.bool_], operators: int) -> list[tuple[int, int]]:
     """The cheapest of all largest matchings with at most `operators` robots, as (row, column).
 
-    What is impossible costs more than everything else together, so the largest matchings win.
+    An impossible pair costs more than everything else together, so the largest matchings win.
 
     The limit is exact by dummy rows: one for each robot beyond the operators, which must take a
     robot and nothing else. So many robots are then out, which ones is chosen together with

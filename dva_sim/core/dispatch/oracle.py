@@ -128,7 +128,7 @@ class _Search:
     def _bound(self, left: tuple[int, ...], free: tuple[float, ...], last: float) -> float:
         """No way to serve the rest has a smaller sum of response times than this.
 
-        Who is p-th on a unit's tour cannot be sent before the unit has done p others, which
+        The p-th event of a unit's tour cannot be served before the unit has done p others, which
         takes no less than the p quickest of all that are left. The best assignment of events
         to places on tours, each place once, is then a bound.
         """

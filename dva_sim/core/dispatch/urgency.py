@@ -38,7 +38,7 @@ class PriorityEta(Policy):
 class Preemptive(Policy):
     """`priority_eta` with preemption: responders may be redirected to clearly more urgent tasks.
 
-    That happens only if nobody idle can serve the task well: not at all, or much later. What
+    It does so only if no idle responder can serve the task well: not at all, or much later. What
     is left behind waits again, and is seen as such by the next decision.
 
     It cannot thrash. What counts for taking somebody away is severity alone, which never falls

@@ -62,7 +62,8 @@ class Need(NamedTuple):
 def settled_per_person(results: Results, part: str, where: Levels, since: float) -> Floats:
     """Events settled per second from a time [s] on, for each person, shape `(persons,)`.
 
-    What is before is left out: at the start every robot sets out, and nobody has anything to judge.
+    The time before is left out: at the start every robot sets out, and nobody has anything to
+    judge.
 
     Args:
         results: Results of a study of the full model.

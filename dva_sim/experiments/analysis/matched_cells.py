@@ -60,7 +60,7 @@ class Matched:
 def match(first: Results, second: Results) -> Matched:
     """Match cells by the levels of the factors that both folders vary.
 
-    What is left is matched by its configuration, so that a folder of one cell finds its like in
+    The rest is matched by configuration, so that a folder of one cell finds its like in
     a grid. Reference runs and repeats take no part.
     """
     a, b = _cells(first), _cells(second)

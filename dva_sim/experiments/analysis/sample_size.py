@@ -3,7 +3,7 @@
 Every number follows one law: the interval or band that the report shows, narrowed as persons are
 added.
 
-What is shown is shown by an interval that leaves zero (or a margin) out. An interval of `n`
+A claim is shown by an interval that excludes zero (or a margin). An interval of `n`
 persons reaches `stretch * t(n - 1) * spread / sqrt(n)` from its mean, where `t` is Student's
 quantile at the interval's level. How persons spread and how much farther than Student's their
 interval reaches, because they are skewed or because a band covers several levels at once, are

@@ -262,7 +262,7 @@ def with_rows(table: Table, names: Mapping[int, str]) -> Table:
 def keys_of(study: Mapping[str, Any]) -> list[Factor]:
     """The scenario keys that vary, with their levels: treatments by what they change.
 
-    Of a range these are its ends.
+    For a range these are its ends.
     """
     ranges = (study.get("design") or {}).get("ranges") or {}
     keys: dict[str, list[Level]] = {key: [r["low"], r["high"]] for key, r in ranges.items()}

@@ -245,7 +245,7 @@ def load_so_far(folder: str | Path) -> Results:
     Of a run that people took part in and that was killed, the tables are made first; of one that
     still goes on, they are made aside, as of now.
 
-    Of an unfinished study, only persons count who have all of their runs, so that every
+    In an unfinished study, only persons with all of their runs count, so that every
     comparison is paired and no cell has other persons than its neighbour. The key `partial` of
     the manifest then tells how much is there.
 

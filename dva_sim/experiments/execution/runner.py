@@ -189,7 +189,7 @@ def _run_rounds(
 ) -> tuple[list[StudyJob], dict[str, Any]]:
     """Round after round until the study has enough; the jobs it then has, and what ended it.
 
-    Whether it is enough is judged by whole rounds alone, which are the same wherever and however
+    The stopping rule is applied to whole rounds only, which are the same wherever and however
     often the study was interrupted. A round that is done counts even if the budget is spent.
     """
     batches = rounds(study, todo)
@@ -248,7 +248,7 @@ def _workers(plan: StudyPlan, jobs: int | None, scheduler: str | None) -> Iterat
 def _is_written(out: Path, manifest: Mapping[str, Any]) -> bool:
     """True if this very program wrote the tables of these runs, and they are unchanged.
 
-    What a run has made never changes once it is kept. So the same runs, with the same failures,
+    The tables of a run never change once kept. So the same runs, with the same failures,
     make the same tables; only a program that is being changed may write them in another way.
     """
     try:

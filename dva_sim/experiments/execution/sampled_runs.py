@@ -1,6 +1,6 @@
 """A few runs of a study, and their digests: enough to tell whether the program still gives them.
 
-Of each part the first, the middle and the last configuration are run, once, by the first person.
+The first, the middle and the last configuration of each part are run once, by the first person.
 """
 
 from __future__ import annotations

@@ -338,7 +338,7 @@ PAGE, PAPER, FIGURES = "report.html", "report.pdf", "figures"
 def write_report(folder: Path, pdf: bool = False, *, figures: Sequence[ReportFigure] = ()) -> Path:
     """Make `report.html` and `figures/` from what lies in a results folder.
 
-    Of a study that is not finished, the page says what is known so far.
+    For an unfinished study, the page shows the results so far.
 
     Args:
         folder: Results folder.

@@ -1,6 +1,6 @@
 """Manifest of a results folder: request, runs and status.
 
-What differs from machine to machine is apart, in a file of its own.
+Details that differ from machine to machine are in a separate file.
 """
 
 from __future__ import annotations

@@ -302,7 +302,7 @@ class Results:
     def distrusted(self) -> dict[str, str]:
         """Parts in which a class of the user's failed, so that something else decided: how often.
 
-        What is said of such a part would be said of the default as well.
+        A statement on such a part would hold for the default as well.
         """
         runs = self.table("runs") if self.has("runs") else {}
         parts = np.asarray(runs.get("part", []))

@@ -1,6 +1,6 @@
 """Hashes of configurations, studies and files, the same on every machine.
 
-What a run's numbers depend on besides its configuration: the program and what users edit.
+A run's numbers depend, besides its configuration, on the program and what users edit.
 
 Which state of the program made some results: commit, and whether anything was changed since.
 """

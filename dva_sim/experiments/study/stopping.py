@@ -1,6 +1,6 @@
 """Stopping rules: pure deciders on whole batches of persons, in the order of the design.
 
-Who finished first plays no part, so the same study stops after the same batch on every machine.
+The order of finishing plays no part, so the same study stops after the same batch on every machine.
 """
 
 from __future__ import annotations

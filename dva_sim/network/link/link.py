@@ -91,8 +91,8 @@ class Link:
     def change(self, now: float, config: LinkConfig) -> None:
         """Be like another link from `now` on [s]: delay, its law, loss and rate.
 
-        What was sent keeps its fate, and nothing overtakes it, unless the link may reorder. What
-        is sent from now on finds as many bytes in the queue, at the new rate where a rate is
+        Packets already sent keep their fate, and nothing overtakes it, unless the link may reorder.
+        What is sent from now on finds as many bytes in the queue, at the new rate where a rate is
         constant. The room of the queue stays.
 
         Raises:
@@ -230,7 +230,7 @@ def _make_replay(
 ) -> Replay | None:
     """One direction's part of a delay log; both directions play the same moment of it.
 
-    Of a round trip that was lost, chance decides in which direction, so that it is lost once.
+    A lost round trip is lost in one direction only, chosen at random.
     """
     if way.delay_log is None:
         return None

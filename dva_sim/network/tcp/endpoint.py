@@ -101,7 +101,7 @@ class TcpEndpoint:
     def finish(self) -> None:
         """The program closes its socket: what is written is still delivered, then the end.
 
-        What still arrives is thrown away and answered by a reset (`on_end` at the other end).
+        Later segments are discarded and answered by a reset (`on_end` at the other end).
         """
         if self.gone or self._finished:
             return

@@ -12,7 +12,7 @@ from dva_sim.network.tcp.endpoint import TcpEndpoint
 class OrderedMessages:
     """Messages written to one end of a connection and read from the other, in order.
 
-    What the send buffer has no room for waits in the program, without end.
+    Messages beyond the send buffer wait in the program, without limit.
 
     Args:
         writer: Endpoint that messages are written to.

@@ -8,8 +8,8 @@
 | IRTP | in the manner of it: crucial messages again until they arrive, rate control for the rest |
 | BTP | in the manner of it: two joined flows, as often as the least round trip allows |
 
-Of none of the four could the law be read, only abstracts and what others say of them; what is
-known, what is missing and what was left out stands with each, in `config` and `laws`.
+For none of the four was the law itself available, only abstracts and descriptions by others; what
+is known, what is missing and what was left out stands with each, in `config` and `laws`.
 """
 
 from dva_sim.network.transports.competition import Contest, ContestConfig, Fates, play

@@ -4,7 +4,7 @@ Each flow has a link of its own onto the same line, which is first-in-first-out 
 queue. If the queue is that of the end hosts themselves, packets of a flow with priority pass
 those of the others in it.
 
-Who drives does not change what is sent, so the network can be simulated first and the drive
+The driver does not change the traffic, so the network can be simulated first and the drive
 afterwards, with the fates of commands and pictures as they were.
 """
 

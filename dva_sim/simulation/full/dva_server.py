@@ -141,8 +141,8 @@ class DvaAgent:
     def _confirmed(self, message: m.Message, reply: m.Reply) -> m.Reply:
         """Return the reply, or a refusal where it would confirm what the memory has not kept.
 
-        What was asked is done all the same, but for permissions, and is written as soon as that
-        is possible: a report is acted on, and a session ends.
+        Requests other than for permissions are carried out all the same, and written as soon as
+        possible: a report is acted on, and a session ends.
         """
         if not self._problem or isinstance(message.body, NOTHING_TO_KEEP):
             return reply

@@ -97,7 +97,7 @@ class Driven(NamedTuple):
 def driven(log: DriveLog, end: float) -> Driven:
     """The commands made in a drive that took effect until `end` [s], and for how long.
 
-    Of the drive before, some may still have been under way.
+    Some of the previous drive may still have been under way.
     """
     start = math.inf if log.started is None else log.started
     applied = [a for a in log.applied if a.issued >= start and a.time <= end]

@@ -1,6 +1,6 @@
 """Build a run from a scenario, let its virtual time pass, and keep what happened.
 
-What carries the messages of a scenario, and what they ask of a robot's link, is decided here.
+The transport of a scenario's messages, and its demands on a robot's link, are decided here.
 """
 
 from __future__ import annotations

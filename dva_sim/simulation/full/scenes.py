@@ -1,6 +1,6 @@
 """Covariates of a run that are known before it begins.
 
-Who drives and how far the way to the event is decide much of what a run measures, and no treatment
+The driver and the distance to the event decide much of what a run measures, and no treatment
 changes them. A study that adjusts for them needs fewer runs; see `statistics.control_variates`.
 """
 

@@ -28,7 +28,7 @@ class Taker(Protocol):
 class Mail:
     """Carries messages to the desk and from it, one after the other, at once.
 
-    What is said while the desk is busy waits until it is not. The desk looks at deadlines
+    Messages to a busy desk wait. The desk looks at deadlines
     exactly when they are due. Where one decision can make the next possible, it also looks again
     a second after it has sent something, as it would on its network, until nothing is left to say.
 

@@ -1,6 +1,6 @@
 """Responders that are times only: to get ready, to get there, to look, to act, to come back.
 
-What has begun is dropped when a newer order comes; callbacks that were meant for the old one
+Current work is dropped when a newer order comes; callbacks that were meant for the old one
 find that their ticket is no longer the newest, and do nothing.
 """
 

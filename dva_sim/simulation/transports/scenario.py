@@ -1,6 +1,6 @@
 """A comparison of transports: who sends what beside whom, what is driven, and one such run.
 
-What is sent does not depend on what is driven, so the fates of commands and pictures are the same
+The traffic does not depend on the drive, so the fates of commands and pictures are the same
 as if both were simulated together. A drive begins at some moment of the time that is measured, and
 goes on from its beginning when it outlasts it.
 """

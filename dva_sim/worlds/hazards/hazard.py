@@ -2,7 +2,7 @@
 
 Derive from `Hazard` and `HazardField` to make a kind of your own (docs/explanation/hazards.md).
 
-What robots and people do changes nothing but when a source stops. So the fields shipped are solved
+Robots and people only change the time at which a source stops. So the fields shipped are solved
 once per process for each site, kind and space that they start in, step by step and only as far as
 somebody asks; a run goes on from there on its own once its hazard is dealt with.
 """
@@ -44,7 +44,7 @@ LARGEST = 2.5  # what can be seen of a leak or flood never grows beyond this [m]
 class Hazard(Config, defer_build=False):  # its signature, which tells the settings, is built too
     """A growing danger, as it would be in the open: what walls make of it, its field knows.
 
-    What a scenario may set of a kind are the fields of its class, with their units, limits and
+    A scenario may set the fields of the class, with their units, limits and
     defaults. The same settings are the same hazard: it draws no random numbers.
 
     Args:

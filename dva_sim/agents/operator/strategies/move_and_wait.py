@@ -255,7 +255,7 @@ class MoveAndWait(Strategy):
     def _lasting(self, way: float, most: float) -> float:
         """Return how long a move, or a turn, takes at this speed [s].
 
-        What is shorter than the period may be lost, and a command lasts for whole periods.
+        Moves shorter than the period may be lost, and a command lasts for whole periods.
         """
         lasts, period = max(way / most, self._habits.shortest_s), self.period
         if period <= self._habits.shortest_s:

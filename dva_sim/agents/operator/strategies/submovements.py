@@ -131,7 +131,7 @@ class Submovements:
     def presses(self, now: float, seen: Sighting, delay: float, hurried: bool) -> bool:
         """Press the button: the prediction is on the target, and so is the eye where it must be.
 
-        What has not been seen yet is trusted if a usual miss of that way is within the tolerance.
+        A motion not seen yet is trusted if a usual miss of that way is within the tolerance.
         Where a press beside the target costs nothing, it presses once it has made a movement.
         """
         person = self._person
