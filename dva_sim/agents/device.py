@@ -306,9 +306,8 @@ class AgentDevice:
     def admit(self, request: Request) -> m.Message | None:
         """The message of a request, if it is one, and for this device.
 
-        Invalid messages are refused at once, before it costs anything but reading it; who sends
-        little else is not answered, and then not read (`Nuisances`). What may be an emergency
-        always is.
+        Invalid messages are refused at once, at no cost but that of reading. A sender of little
+        else gets no replies, and then is not read (`Nuisances`). A possible emergency always is.
         """
         now, count = self.clock.now, self.recorder.counters
         hearing = self._nuisances.hearing(request.peer, now)

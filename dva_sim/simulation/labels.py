@@ -136,9 +136,8 @@ def level_name(
 ) -> str:
     """One level with its unit: 0.05 of `link.delay_s` is `50 ms`; a class without its file.
 
-    The value that a treatment sets may be a law, or another group of keys: `law gamma, mean_s 50
-    ms`; or
-    several: `from_s 7 s, for_s 2 s; from_s 20 s, for_s 1 s`.
+    The value that a treatment sets may be a law, or another group of keys:
+    `law gamma, mean_s 50 ms`; or several: `from_s 7 s, for_s 2 s; from_s 20 s, for_s 1 s`.
     """
     if isinstance(level, Mapping):
         return ", ".join(f"{key} {level_name(key, value)}" for key, value in level.items())

@@ -64,8 +64,8 @@ class Refusals:
     def held(self, holder: str | None, code: int | None, now: float, sent: int) -> str:
         """The robot says who holds it: why nobody obeys any more, or nothing.
 
-        Reports from before the drive may arrive late: it counts once it has said that it is
-        ours, or when it is said again and again.
+        A report from before the drive may arrive late. So reports count once the robot has
+        confirmed this driver, or when the same report is repeated.
 
         Args:
             holder: Id of the device that may act; None: nobody.

@@ -118,12 +118,12 @@ def start(
 
 
 def give_back(device: AgentDevice, robot: str, session: int, tries: int = 1) -> None:
-    """Tell the DVA that a permission is needed no longer, until it has heard and kept that.
+    """Notify the DVA that a permission is no longer needed, and retry until it has kept that.
 
     Args:
         device: Device with the permission.
         robot: Id of the robot.
-        session: Of the permission.
+        session: Session of the permission.
         tries: Which try this is.
     """
 

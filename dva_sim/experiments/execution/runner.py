@@ -65,8 +65,8 @@ def run_study(
         The results folder.
 
     Raises:
-        ConfigError: the study is not valid, the folder holds another one, or there is no such
-            cluster.
+        ConfigError: the study is not valid, the folder holds another one, or the cluster does not
+            exist.
         FolderInUse: another process writes into the folder.
         DvaSimError: the disk is full, another program holds the checkpoint, or the cluster is lost.
         KeyboardInterrupt: after tidying up; its message says what has been done.
