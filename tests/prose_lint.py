@@ -32,7 +32,9 @@ WORDS = re.compile(
     r"(?= [a-z]+[^a-z ]))\b",
     re.IGNORECASE,
 )
-ARGUMENT = re.compile(r"^\s+\w+: (Of|What|Whether|How|Who)\b", re.MULTILINE)
+ARGUMENT = re.compile(
+    r"^\s+\w+: (Of|What|Whether|How|Who|Whose|Which|When|Where|That|Told)\b", re.MULTILINE
+)
 
 
 class Finding(NamedTuple):
