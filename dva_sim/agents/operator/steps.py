@@ -124,7 +124,7 @@ def give_back(device: AgentDevice, robot: str, session: int, tries: int = 1) -> 
         device: Device with the permission.
         robot: Id of the robot.
         session: Session of the permission.
-        tries: Which try this is.
+        tries: Number of this attempt.
     """
 
     def again(tries: int = tries) -> None:
