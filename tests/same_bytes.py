@@ -46,6 +46,8 @@ def digests():
     with ProcessPoolExecutor(mp_context=get_context("forkserver")) as pool:
         reports = [pool.submit(digest_of_recording, name) for name in RECORDED]
         for file in sorted((ROOT / "experiments").glob("*.yaml")):
+            if file.name.endswith(".registration.yaml"):
+                continue
             reports += [
                 pool.submit(told_of_run, file.stem, *run) for run in sampled_jobs(load_study(file))
             ]

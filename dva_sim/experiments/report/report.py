@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
@@ -35,7 +36,7 @@ from dva_sim.experiments.report.blocks import (
 )
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.report.choice_table import beside_table, choice_table
-from dva_sim.experiments.report.figures.registry import draw_all
+from dva_sim.experiments.report.figures.registry import draw_all, leading
 from dva_sim.experiments.report.figures.style import Drawn, ReportFigure
 from dva_sim.experiments.report.glossary import Marker, terms_in
 from dva_sim.experiments.report.hypothesis_tables import comparison_table, hypothesis_table
@@ -65,7 +66,7 @@ if TYPE_CHECKING:
 
 
 WORDS = "Words"
-_MOST_ROWS = 12  # of a table that is not folded away
+MOST_FIGURES = 7  # design: that are not folded away, the answering one among them
 _KINDS = {
     "confirmatory": "Confirmatory: run as registered beforehand",
     "declared": "Declared: run as its file says, not registered beforehand",
@@ -130,16 +131,21 @@ def _claims(reading: Reading) -> Iterator[Block]:
         yield Heading(_whose_claims(status))
         yield Printed(hypothesis_table(hypotheses, reading.cluster), is_words=True)
     if status.registration:
-        yield Heading("Registration")
         if status.kind != "confirmatory":
             yield Words("This run is not the one that was registered: it settles nothing.", "note")
-        yield Printed(
-            registration_table(reading.manifest, reading.runs, reading.persons), is_words=True
-        )
+        registered = registration_table(reading.manifest, reading.runs, reading.persons)
+        yield Folded("The registration, and what was run", (Printed(registered, is_words=True),))
     predictions = judge_all(reading.study, reading.view)
     if predictions:
-        yield Heading("Predictions made before the run")
-        yield Printed(_prediction_table(predictions, reading.cluster), is_words=True)
+        table = Printed(_prediction_table(predictions, reading.cluster), is_words=True)
+        title = "Predictions made before the run"
+        if hypotheses:
+            counts = Counter(p.verdict for p in predictions)
+            verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
+            yield Folded(f"{title}: {verdicts}", (table,))
+        else:
+            yield Heading(title)
+            yield table
 
 
 def _whose_claims(status: Status) -> str:
@@ -162,8 +168,8 @@ def _prediction_table(predictions: Sequence[Judged], cluster: str) -> CellTable:
 
 def _comparisons(reading: Reading) -> Iterator[Block]:
     if reading.judgement.compared:
-        yield Heading("Named comparisons")
-        yield Printed(comparison_table(reading.judgement, reading.cluster), is_words=True)
+        table = comparison_table(reading.judgement, reading.cluster)
+        yield Folded("Named comparisons", (Printed(table, is_words=True),))
 
 
 def _endings(reading: Reading) -> Iterator[Block]:
@@ -179,10 +185,8 @@ def _endings(reading: Reading) -> Iterator[Block]:
     for sentence in sentences_of_endings(endings, view, reading.finding):
         yield Words(sentence)
     found = endings_table(endings, view, reading.cluster)
-    if len(found.rows) > _MOST_ROWS:
+    if found.rows:
         yield Folded(f"The shares of all {len(found.rows)} configurations", (Printed(found),))
-    elif found.rows:
-        yield Printed(found)
 
 
 def _found(reading: Reading) -> Iterator[Block]:
@@ -248,7 +252,10 @@ def _figures(reading: Reading, drawn: Sequence[Drawn]) -> Iterator[Block]:
     reads = dict.fromkeys(chain.from_iterable(figure.reads for figure in drawn))
     part = f"All are of part {reading.view.part.name} unless the title names another one."
     yield Words(" ".join([part, *reads]))
-    yield from map(FigureBlock, drawn)
+    shown = leading(drawn, MOST_FIGURES - 1)
+    yield from map(FigureBlock, shown)
+    if rest := [figure for figure in drawn if figure not in shown]:
+        yield Folded(f"{len(rest)} more figures", tuple(map(FigureBlock, rest)))
 
 
 def _tables(reading: Reading) -> Iterator[Block]:
@@ -277,13 +284,13 @@ def _tables(reading: Reading) -> Iterator[Block]:
 
 def _needed(reading: Reading) -> Iterator[Block]:
     if reading.plans:
-        yield Heading(f"How many {reading.cluster}s it would take")
-        yield Printed(plan_table(reading.plans, reading.cluster), is_words=True)
+        table = plan_table(reading.plans, reading.cluster)
+        yield Folded(f"How many {reading.cluster}s it would take", (Printed(table, is_words=True),))
 
 
 def _method(reading: Reading) -> Iterator[Block]:
     yield Heading("Method")
-    yield Items(tuple(remarks(reading)))
+    yield Folded("How it was run and analysed", (Items(tuple(remarks(reading))),))
     scenarios, study = reading.scenarios, reading.study
     of_model = reading.page.conditions if reading.view else conditions
     if stated := of_model(scenarios, keys_of(study), _changed(study)):

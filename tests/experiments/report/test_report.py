@@ -6,7 +6,7 @@ from helpers.studies.report_text import words, words_of
 from helpers.wording import unnamed
 
 from dva_sim.experiments.analysis.conditions import conditions
-from dva_sim.experiments.report.report import _levels, write_report
+from dva_sim.experiments.report.report import MOST_FIGURES, _levels, write_report
 from dva_sim.experiments.report.study_size import size_of
 
 pytestmark = pytest.mark.system
@@ -112,7 +112,13 @@ def test_the_report_needs_nothing_but_itself(page):
 
 
 def test_the_figures_come_in_order_and_as_files(report, page):
-    assert re.findall(r'<figure id="(\w+)"', page) == FIGURES
+    parts = [re.findall(r'<figure id="(\w+)"', part) for part in page.split("more figures")]
+    for names in parts:
+        assert names == [name for name in FIGURES if name in names]
+    shown, folded = parts
+    assert len(shown) == MOST_FIGURES
+    assert sorted(shown + folded) == sorted(FIGURES)
+    assert {"differences", "time_lapse_worst"} <= set(folded)
     files = {path.name for path in (report.parent / "figures").iterdir()}
     assert files == {f"{name}.{ending}" for name in FIGURES for ending in ("svg", "png", "csv")}
 

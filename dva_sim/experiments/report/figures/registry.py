@@ -118,6 +118,34 @@ def _problem_of_name(figure: ReportFigure, taken: set[str]) -> str:
     return ""
 
 
+_LATER: Final = tuple(
+    kind.name
+    for kind in (
+        distribution.Distributions,
+        effect.Differences,
+        factorial.FactorialEffects,
+        commands.CommandAge,
+        time_lapse.TypicalRun,
+        time_lapse.WorstRun,
+        story.StoryTimes,
+        shift.Percentiles,
+    )
+)
+"""Figures that repeat the answer in other ways, or show single runs; the first matters most."""
+
+
+def leading(drawn: Sequence[Drawn], most: int) -> list[Drawn]:
+    """The figures that a reader sees first, in the order of the report.
+
+    Args:
+        drawn: Figures.
+        most: The number of figures that there is room for.
+    """
+    ranks = {name: rank for rank, name in enumerate(_LATER, start=1)}
+    ranked = sorted(drawn, key=lambda figure: ranks.get(figure.name, 0))[:most]
+    return [figure for figure in drawn if figure in ranked]
+
+
 def draw_all(reading: Reading, own: Sequence[ReportFigure] = ()) -> tuple[list[Drawn], list[str]]:
     """Every figure that the results hold the tables and columns for.
 
