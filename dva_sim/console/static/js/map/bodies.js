@@ -1,11 +1,11 @@
 /** Robots and people from above: where they are and head for, and what they do. */
 import { modeOf, rowOf } from '../store.js';
+import { lettersOn } from './lettering.js';
 import { MODES, PERSON, ROBOT } from './marks.js';
 
 const LARGER = 1.25; // bodies are drawn a little larger than they are
 const LEAST_PX = /** @type {Record<string, number>} */ ({ robot: 15, guard: 13, bystander: 7 });
 const BATTERY = { width: 16, height: 3, low: 0.25 };
-const NAME_PX = 11;
 const MANY = 40;
 
 /** @type {Record<string, string>} */
@@ -126,7 +126,8 @@ export function drawBattery({ ctx, colours }, body, always) {
  * @param {Place[]} written
  */
 export function drawName({ ctx, colours }, body, strong, written) {
-  ctx.font = `${strong ? 600 : 400} ${NAME_PX}px system-ui, sans-serif`;
+  const letters = lettersOn(ctx);
+  ctx.font = `${strong ? 600 : 400} ${letters}px system-ui, sans-serif`;
   ctx.textAlign = 'center';
   ctx.textBaseline = 'bottom';
   ctx.lineJoin = 'round';
@@ -135,9 +136,9 @@ export function drawName({ ctx, colours }, body, strong, written) {
   ctx.fillStyle = colours.ink;
   const width = ctx.measureText(body.thing.label).width;
   const above = body.top - 0.6 * body.size - 3;
-  const below = body.top + 0.6 * body.size + NAME_PX + 10;
+  const below = body.top + 0.6 * body.size + letters + 10;
   const left = body.left - width / 2;
-  const top = [above, below].find((y) => strong || isFree(written, { left, top: y, width }));
+  const top = [above, below].find((y) => strong || isFree(written, { left, top: y, width }, letters));
   if (top === undefined) return;
   written.push({ left, top, width });
   ctx.strokeText(body.thing.label, body.left, top);
@@ -147,11 +148,12 @@ export function drawName({ ctx, colours }, body, strong, written) {
 /**
  * @param {Place[]} written
  * @param {Place} place
+ * @param {number} letters their height [px]
  */
-function isFree(written, { left, top, width }) {
+function isFree(written, { left, top, width }, letters) {
   return !written.some(
     (other) =>
-      Math.abs(other.top - top) < NAME_PX + 2 &&
+      Math.abs(other.top - top) < letters + 2 &&
       other.left < left + width + 3 &&
       left < other.left + other.width + 3,
   );

@@ -2,6 +2,7 @@
 import { selection } from '../store.js';
 import { worldNow } from '../net/world_time.js';
 import { ageText } from '../ui/words.js';
+import { lettersOn } from './lettering.js';
 import { SEVERITIES } from './marks.js';
 import { isOpen } from './shown.js';
 
@@ -78,7 +79,7 @@ function number(ctx, colour, value, left, top) {
  * @param {CanvasTextAlign} align
  */
 export function label(ctx, palette, text, left, top, align) {
-  ctx.font = '11px system-ui, sans-serif';
+  ctx.font = `${lettersOn(ctx)}px system-ui, sans-serif`;
   ctx.textAlign = align;
   ctx.textBaseline = 'middle';
   ctx.lineJoin = 'round';

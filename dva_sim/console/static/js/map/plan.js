@@ -1,8 +1,8 @@
 /** The ground that does not move: floors, walls, doors, exits and names; in metres, y up. */
 import { DARK, LIGHT } from '../palette.js';
+import { lettersOn } from './lettering.js';
 
 const WALL_M = 0.14;
-const NAME_PX = 11;
 const LEAST_PX = 30;
 
 /** @typedef {{path: Path2D, colour: string}} Floor */
@@ -88,13 +88,14 @@ export class Plan {
    * @param {Record<string, string>} colours
    */
   drawNames(ctx, affine, colours) {
-    ctx.font = `${NAME_PX}px system-ui, sans-serif`;
+    const letters = lettersOn(ctx);
+    ctx.font = `${letters}px system-ui, sans-serif`;
     ctx.textAlign = 'center';
     ctx.textBaseline = 'middle';
     ctx.fillStyle = colours['room-name'];
     for (const { name, x, y, width, height } of this.names) {
       const wide = width * affine.scale;
-      if (wide < LEAST_PX || height * affine.scale < 2 * NAME_PX) continue;
+      if (wide < LEAST_PX || height * affine.scale < 2 * letters) continue;
       const [left, top] = affine.pixel(x, y);
       for (const text of [name, name.replace(/^\D+(?=\d)/, '')]) {
         if (ctx.measureText(text).width > wide - 8) continue;

@@ -58,7 +58,7 @@ function Leg({ leg }) {
       <li class=${took === null ? '' : 'past'}>${turnText(now.plan.side_rad, goal)} hold <kbd>↑</kbd> and stop inside it. The picture is half a second old, and your commands take another half
         second.</li>
     </ol>
-    <p class="big">${(time / 1000).toFixed(1)} s <span class="soft">${hint(leg)}</span></p>
+    <div><p class="big">${(time / 1000).toFixed(1)} s</p><p class="soft">${hint(leg)}</p></div>
     ${took === null
       ? html`<button type="button" class="wide" onClick=${takeTour}>Begin again</button>`
       : html`<button type="button" class="go wide" onClick=${() => go(leg + 2)}>

@@ -1,0 +1,14 @@
+/** Size of what is written on a map: it grows with the map, so that it is read on a wall as well. */
+
+const SMALLEST_PX = 11;
+const LARGEST_PX = 24;
+const UP_TO_PX = 800; // lesser side of a map on which the smallest letters are used
+
+/**
+ * Height of the letters on a canvas [px].
+ * @param {CanvasRenderingContext2D} ctx
+ */
+export function lettersOn({ canvas }) {
+  const side = Math.min(canvas.width, canvas.height) / window.devicePixelRatio;
+  return Math.round(Math.min(LARGEST_PX, Math.max(SMALLEST_PX, (SMALLEST_PX * side) / UP_TO_PX)));
+}
