@@ -66,15 +66,23 @@ _SETTLED: dict[Verdict, str] = {
 
 
 def verdict_sentences(tested: Sequence[Tested], cluster: str = "person") -> list[str]:
-    """One sentence with the verdict on each hypothesis, for the top of a report."""
-    return [
-        f"Registered hypothesis {t.name} "
-        + ", ".join(filter(None, (_SETTLED[t.verdict], _few(t, cluster))))
-        + f": {_claim(t)}"
-        + (f"; found {_interval(t.difference, t.contrast.measure)}" if t.difference else "")
-        + (f", p {_p(t.adjusted)} by Holm." if t.difference else ".")
-        for t in tested
-    ]
+    """The verdict on each hypothesis in its own words, for the top of a report."""
+    return [f"{_settled(t, cluster)}{_found(t)}" for t in tested]
+
+
+def _settled(tested: Tested, cluster: str) -> str:
+    """`Registered hypothesis waiting held: Waiting costs.`"""
+    verdict = ", ".join(filter(None, (_SETTLED[tested.verdict], _few(tested, cluster))))
+    text = (tested.hypothesis.text or _claim(tested)).strip().removesuffix(".")
+    return f"Registered hypothesis {tested.name} {verdict}: {text}."
+
+
+def _found(tested: Tested) -> str:
+    """` Found: 4.0 s (3.0 to 5.0 s), claimed: above 2.0 s; p 0.003 by Holm.`, if it was run."""
+    if tested.difference is None:
+        return ""
+    found = _interval(tested.difference, tested.contrast.measure)
+    return f" Found: {found}, claimed: {bound_of(tested)}; p {_p(tested.adjusted)} by Holm."
 
 
 def comparison_table(found: Judgement, cluster: str = "person") -> CellTable:

@@ -50,8 +50,8 @@ class Reading(ResultsReading):
         tested = self.judgement.tested if self._confirms else []
         verdicts = verdict_sentences(tested, self.cluster)
         if verdicts:
-            lead = f"Not registered, over all levels at once: {found.lead}"
-            found = replace(found, lead=" ".join([*verdicts, lead]))
+            rest = f"Not registered, over all levels at once: {found.lead}"
+            found = replace(found, lead=" ".join(verdicts), notes=[rest, *found.notes])
         if self.map is not None:
             found = replace(found, lead=lead_of(self.map), notes=[found.lead, *found.notes])
         weighed = [few_that_weigh(self.finding, self.view)] if self.finding is not None else []
