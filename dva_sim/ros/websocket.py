@@ -1,4 +1,4 @@
-"""WebSocket connections in the thread of a run, which none of them ever blocks.
+"""WebSocket connections in the thread of a run, which none of them blocks before it ends.
 
 The clock of the run polls the sockets. Bytes that the kernel does not take wait in a buffer of
 bounded size; a peer that lets it fill up is disconnected.
@@ -7,6 +7,7 @@ bounded size; a peer that lets it fill up is disconnected.
 from __future__ import annotations
 
 import socket
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 FLUSH: Final = 0.01  # design: between two attempts to send what waits [s]
 AT_ONCE: Final = 1 << 16  # design: read before other sources have their turn [B]
 MOST_WAITING: Final = 8_000_000  # design: of a peer [B]
+LINGERS: Final = 0.5  # design: a bridge may take to read the last commands of a run [s]
 SHAKES_WITHIN: Final = 5.0  # design: from TCP to WebSocket [s]
 NORMAL, TOO_SLOW, GOING = 1000, 1008, 1001  # close codes of RFC 6455
 PORT: Final = 9090  # of rosbridge
@@ -85,14 +87,40 @@ class WebSocketConnection:
             self._protocol.send_ping(b"")
             self.push()
 
-    def close(self, code: int = NORMAL, reason: str = "") -> None:
-        """Say good-bye and end the connection, without waiting for the peer."""
+    def close(self, code: int = NORMAL, reason: str = "", *, linger: float = 0.0) -> None:
+        """Say good-bye and end the connection.
+
+        Args:
+            code: Close code.
+            reason: Why, for the peer.
+            linger: So long the peer may take to read what it was sent last [s]; nothing else
+                happens meanwhile.
+        """
         if not self.is_open:
             return
         if self._protocol.state.name == "OPEN":  # a handshake that never ended has no close frame
             self._protocol.send_close(code, reason[:120])
             self.push()
+            if linger and self.is_open:
+                self._linger(linger)
         self.end(reason)
+
+    def _linger(self, linger: float) -> None:
+        """Read until the peer has closed; a socket closed with bytes unread is reset.
+
+        Then what was sent last, such as a command to stand, would be lost on its way.
+        """
+        until = time.monotonic() + linger
+        with suppress(OSError):
+            self._sock.setblocking(True)
+            if self._buffer:
+                self._sock.settimeout(linger)
+                self._sock.sendall(self._buffer)
+            self._sock.shutdown(socket.SHUT_WR)
+            while (left := until - time.monotonic()) > 0.0:
+                self._sock.settimeout(left)
+                if not self._sock.recv(AT_ONCE):
+                    return
 
     def push(self) -> None:
         """Hand what the protocol has to say to the kernel, as far as that takes it."""
@@ -253,7 +281,7 @@ class WebSocketDialer:
     def close(self) -> None:
         """End the connection, or the attempt."""
         if self.connection is not None:
-            self.connection.close(GOING)
+            self.connection.close(GOING, linger=LINGERS)
         else:
             self._dialling.cancel()
         self._is_over = True
