@@ -26,7 +26,7 @@ help:  ## say what can be made
 
 setup: $(DEV)  ## the development environment, in .venv
 
-demo: $(RUNTIME)  ## one drive as picture and film, and the main study's small version: two minutes
+demo: $(RUNTIME)  ## one drive as picture and film, and the main study's small version: a minute
 	@$(BIN)/dva-sim demo -o $(DEMO)
 
 console: $(RUNTIME)  ## drive robots yourself, on a page in the browser; Ctrl-C ends it

@@ -32,7 +32,7 @@ def test_the_picture_and_the_story_come_before_the_study(tmp_path, played, monke
     assert played == [(STUDY, True)]
     output = capsys.readouterr().out
     assert unnamed(output, "131.4 s", "22 s ahead") == []
-    assert output.index("one to two minutes") < output.index("side by side") < output.index("Film")
+    assert output.index("about a minute") < output.index("side by side") < output.index("Film")
 
 
 def test_a_film_that_is_still_being_made_ends_with_the_demo(tmp_path, monkeypatch):

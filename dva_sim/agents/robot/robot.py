@@ -374,8 +374,6 @@ class RobotAgent:
             decision = controller.handle(message, arrived, now, moving, waited)
         else:
             decision = unable
-        if is_command and self.refuses is not None:
-            decision = Decision(self.refuses, "refuses all commands")
         if self.trace is not None and unable is None:
             self.trace.decided(message, arrived, now, moving, decision, waited)
         if decision.waits and not waited:
@@ -404,6 +402,8 @@ class RobotAgent:
 
         It obeys an emergency as far as it reaches the motors, and does not promise more.
         """
+        if isinstance(body, m.SetTeleOp) and self.refuses is not None:
+            return Decision(self.refuses, "refuses all commands")
         if isinstance(body, Mission) and not self.takes_missions:
             return Decision(m.NOT_SUPPORTED, "this robot drives no missions")
         if self.unfit and isinstance(body, m.StartTeleOp | Mission):

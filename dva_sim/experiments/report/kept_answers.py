@@ -91,12 +91,15 @@ def answer_in(folder: Path) -> tuple[KeptAnswer, dict[str, Any]]:
 
     Raises:
         ConfigError: the folder holds no results, or a study that is not finished or has failed
-            runs, or one that was run with settings or in another size than its file has.
+            runs, one in which a safety rule was broken, or one that was run with settings or in
+            another size than its file has.
     """
     reading = Reading(load_so_far(folder))
     manifest, study = dict(reading.manifest), reading.study
     if reading.results.partial or manifest.get("failures"):
         raise ConfigError(f"{folder}: only a study that is finished without failed runs is kept")
+    if reading.broken:
+        raise ConfigError(f"{folder}: safety rules were broken in {reading.broken}")
     if manifest.get("set"):
         raise ConfigError(f"{folder}: was run with --set {' '.join(manifest['set'])}")
     machine = json.loads((folder / "machine.json").read_text(encoding="utf-8"))

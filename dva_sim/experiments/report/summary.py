@@ -120,6 +120,11 @@ class Reading(ResultsReading):
         return [name for name in zipped if name not in axes]
 
     @property
+    def broken(self) -> str:
+        """The number of runs that broke a safety rule, by part; empty if none did."""
+        return _broken(self.runs)
+
+    @property
     def warnings(self) -> list[str]:
         """Warnings to be shown first."""
         found = []
@@ -131,8 +136,8 @@ class Reading(ResultsReading):
             found.append(f"In part {part} {reason}: no contrast of this part is shown.")
         if self.events is not None and self.events.warns:
             found.append(str(self.events))
-        if broken := _broken(self.runs):
-            found.append(f"Safety rules were broken in {broken}.")
+        if self.broken:
+            found.append(f"Safety rules were broken in {self.broken}.")
         for name in covariates_of(self.study, self.view.part)[1] if self.view else ():
             found.append(
                 f"The answer is not adjusted for {name}: over these persons its mean is more than "

@@ -14,10 +14,16 @@ from dva_sim.experiments.report import kept_answers
 from dva_sim.kernel.errors import ConfigError, ExitCode
 
 
-def finished(folder, *settings, is_dirty=False):
+def unsafe(job):
+    """A run in which a safety rule is broken."""
+    tables = cheap(job)
+    return tables | {"runs": [tables["runs"][0] | {"violations": 1}]}
+
+
+def finished(folder, *settings, is_dirty=False, episode=cheap):
     """The results of a small study, by a program without changes unless it has some."""
     folder.mkdir()
-    out = run_study(study_in(folder, *settings), folder / "results", episode=cheap, jobs=1)
+    out = run_study(study_in(folder, *settings), folder / "results", episode=episode, jobs=1)
     manifest = json.loads((out / "manifest.json").read_text())
     manifest["versions"]["dirty"] = is_dirty
     (out / "manifest.json").write_text(json.dumps(manifest))
@@ -97,6 +103,8 @@ def test_only_a_whole_study_as_its_file_has_it_is_kept(tmp_path):
         kept_answers.answer_in(changed)
     with pytest.raises(ConfigError, match="not committed"):
         kept_answers.answer_in(finished(tmp_path / "dirty", is_dirty=True))
+    with pytest.raises(ConfigError, match="safety rules were broken"):
+        kept_answers.answer_in(finished(tmp_path / "unsafe", episode=unsafe))
     with pytest.raises(ConfigError, match=r"."):
         kept_answers.answer_in(tmp_path)
 

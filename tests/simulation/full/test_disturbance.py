@@ -4,6 +4,8 @@ from typing import Any
 
 import pytest
 
+import dva_sim
+from dva_sim.agents.robot.controller import LEASE_S
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.episode_measures import measures_of, run_row
 from dva_sim.simulation.full.run import Run
@@ -39,6 +41,19 @@ def test_as_the_document_has_it_nobody_knows_for_long(pattern):
     row = run_row(disturbed(pattern, "revoke", heeds=False).run())
     assert row["driven_on_s"] > 10.0
     assert not row["alerted"]
+
+
+PATIENT = {"operator.person": 4, "link.delay_s": 0.05, "horizon_s": 75, "disturbance.after_s": 10}
+PATIENT_SEED = 8925906438681307792  # with which that person drives on for longer than the lease
+
+
+@pytest.mark.invariant("S2")
+def test_commands_that_are_refused_hold_no_robot():
+    of_it = {"disturbance.kind": "refuse", "disturbance.holder_told": False, "command.heeds": False}
+    changes = PATIENT | of_it | {"pattern": "pipelined"}
+    row = dva_sim.episode("drive-to-event", seed=PATIENT_SEED, set=changes).measures
+    assert row["commands_in_vain"] > 10 * (LEASE_S - 10.0)
+    assert row["violations"] == 0
 
 
 def test_what_is_told_by_the_dva_is_known_at_once_by_every_pattern():
