@@ -28,9 +28,10 @@ def code(text: object) -> str:
 
 
 def sentence(text: str) -> str:
-    """Return a text as prose with a capital and a full stop."""
+    """Return a text as prose with a capital, and a full stop if it ends without a mark."""
     text = prose(text)
-    return f"{text[:1].upper()}{text[1:].rstrip('.')}." if text else ""
+    stop = "" if text.endswith((".", "?", "!")) else "."
+    return f"{text[:1].upper()}{text[1:]}{stop}" if text else ""
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -82,7 +82,7 @@ class Screens:
         return sorted(self._watched)
 
     def hold(self, robots: set[str]) -> None:
-        """Whose frames come to a seat anyway."""
+        """Robots whose frames a seat receives anyway."""
         self._held = robots
         self._subscribe()
 

@@ -51,9 +51,9 @@ def storm(
     fourteen minutes of virtual time. Rules S1 to S8, S10 and S11 are checked by observers that rely
     on no agent. Two minutes after the last fault, everything must work again.
 
-    A storm that breaks a rule is reduced to the faults that matter. Its plan and timeline are saved
-    in the folder, and the plan can be replayed. The same seed gives the same storm. Storms already
-    in the folder are counted, not repeated.
+    At the end, each storm that broke a rule is reduced to the faults that matter. Its plan and
+    timeline are saved in the folder, and the plan can be replayed. The same seed gives the same
+    storm. Storms already in the folder are counted, not repeated.
 
     The exit code is 1 if a rule was broken, or with --mutants, if a planted bug was not found.
 
@@ -76,19 +76,21 @@ def storm(
         raise typer.Exit(_hunt(mutants, range(first, last + 1), profile, out))
     out.mkdir(parents=True, exist_ok=True)
     tally, known = StormTally(), 0
+    failed: list[StormOutcome] = []
     numbers: Iterable[int] = itertools.count(first) if hours else range(first, last + 1)
     for outcome, is_known in outcomes(numbers, profile, Journal(out / "storms.jsonl"), local(jobs)):
         tally.add(outcome)
         known += is_known
         if not outcome.is_clean:
             _tell_failure(outcome, profile)
-            if not is_known:
-                _keep_failure(draw(outcome.seed, profile), outcome, out / "found", profile)
+            failed.append(outcome)
         if not quiet and not is_known:
             _progress(tally, hours)
         if hours and tally.hours >= hours:
             break
     _tell(tally, known)
+    for outcome in failed:  # last: reducing one takes minutes of a single process
+        _keep_failure(draw(outcome.seed, profile), outcome, out / "found", profile)
     raise typer.Exit(ExitCode.DOES_NOT_HOLD if tally.failures else ExitCode.OK)
 
 
@@ -144,15 +146,17 @@ def _tell_failure(outcome: StormOutcome, profile: str) -> None:
 
 
 def _keep_failure(plan: StormPlan, outcome: StormOutcome, folder: Path, profile: str) -> None:
-    """Cut a failure down, and keep its plan and its story."""
+    """Reduce a failure, and keep its plan and its story, unless an earlier call has done so."""
     from dva_sim.storms.shrinking import Shrinker  # late: start-up
     from dva_sim.storms.storm import Storm, play  # late: start-up
 
+    file = folder / f"{profile}-{plan.seed}.yaml"
+    if file.exists():
+        return
+    typer.echo(f"reducing the storm of seed {plan.seed} ...", err=True)
     shrinker = Shrinker(plan, outcome)
     small = shrinker.shrink()
     folder.mkdir(parents=True, exist_ok=True)
-    file = folder / f"{profile}-{plan.seed}.yaml"
-    file.write_text(small.text(), encoding="utf-8")
     kept = list[Storm]()
     again = play(small, kept.append)
     when = min((breach.time for breach in again.breaches), default=again.simulated_s)
@@ -162,6 +166,7 @@ def _keep_failure(plan: StormPlan, outcome: StormOutcome, folder: Path, profile:
         if abs(moment.time - when) < AROUND or moment.kind == "fault"
     ]
     file.with_suffix(".txt").write_text("".join(story) + again.error, encoding="utf-8")
+    file.write_text(small.text(), encoding="utf-8")
     typer.echo(f"  {len(plan.faults)} faults cut to {len(small.faults)}: dva-sim storm {file}")
 
 

@@ -21,7 +21,7 @@ from dva_sim.cli.verbosity import loudness
     jobs=(Jobs, None),
 )
 def demo(out: Path, jobs: int | None) -> None:
-    """See what delay and messaging do to driving.
+    """Show what delay and messaging do to driving.
 
     It shows one drive under two patterns, as a picture, a story and a film, then runs the small
     version of the main study and writes its report.

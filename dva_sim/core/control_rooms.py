@@ -39,7 +39,7 @@ NEEDS: Final[dict[type, tuple[ControlRoomRole, str]]] = {
     m.SetDispatch: (R.SUPERVISE, "set_dispatch"),
     m.Revoke: (R.SUPERVISE, "revoke"),
 }
-"""What each message needs, and what it does in the words of a `Fact`."""
+"""Role that each message needs, and its effect in the words of a `Fact`."""
 LISTED_CLOSED = 50  # events that are over, of the last
 Decision = m.Acknowledge | m.Assign | m.TakeOff | m.FalseAlarm | m.Escalate | m.AddNote
 
@@ -470,4 +470,4 @@ class ControlRooms:
 
 
 _ON_HANDS = frozenset({"assign", "take_off", "false_alarm", "escalate"})
-"""What decides on who has an event in hand: there can be only one such decision at a time."""
+"""Messages that decide who handles an event; only one such decision is open at a time."""

@@ -167,7 +167,7 @@ class Dva:
         elif isinstance(body, m.GetSensorInfo):
             self.sensing.told(send.to, None, now)
         elif isinstance(body, m.DevSub):
-            self.sessions.permissions.end(send.session)  # it may have started anew
+            self.sessions.permissions.end(send.session)  # it may have restarted
         elif isinstance(body, m.HandoverRequest):
             sends = self.handovers.answered(send, False, now)
         else:

@@ -22,7 +22,7 @@ IN_A_ROW = 3  # values above a threshold: one alone may be noise; assumed
 REACH = 20.0  # what a robot feels has its source within so many metres [m]; assumed
 CONFIDENCE = 0.6  # of what a robot's sensor says alone; assumed
 SEVERITY = 0.5  # as of what a person reports who has not seen the source
-NO_NEWS = 600.0  # what was settled there so lately is not reported anew [s]; assumed
+NO_NEWS = 600.0  # what was settled there so lately is not reported again [s]; assumed
 
 LINE_BYTES, SENSOR_BYTES = 80, 55  # markup of a device and of a sensor, at most [B]
 MOST_LISTED = 64

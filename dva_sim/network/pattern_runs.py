@@ -37,14 +37,14 @@ RESULTS = (
     *(f"stale_{share}" for share in ("mean", "p50", "p95", "p99")),
     *("gap_p95", "gap_max", "timeouts", "alerts", "t_conn_ms", "t_hs_ms"),
 )
-"""What a run tells, the same for sockets and model; times in ms, None where not defined."""
+"""Results of a run, the same for sockets and model; times in ms, None where not defined."""
 
 EMULATOR_RESULTS = (
     *("emu_pkts_ab", "emu_lost_ab", "emu_tail_ab"),
     *("emu_pkts_ba", "emu_lost_ba", "emu_tail_ba"),
     *("emu_late_p50_ms", "emu_late_p99_ms", "emu_late_max_ms"),
 )
-"""What the emulated link tells about itself: a is the operator, b the robot."""
+"""Figures of the emulated link: a is the operator, b the robot."""
 
 COLUMN_WORDS = {"req": "req-rep", "pub": "pub-sub", "dealer": "pipelined"}
 """Patterns as tables, plans and labels of measurements write them, and what they are called."""

@@ -264,4 +264,4 @@ def meaning_of(kind: type[Pattern]) -> str:
 
 known_patterns = PLUGINS.known
 load_pattern = PLUGINS.load
-"""What makes the pattern that a name means, one for each drive; see `Plugins.load`."""
+"""Factory of the pattern of a name, one for each drive; see `Plugins.load`."""

@@ -308,7 +308,7 @@ class Security:
         return True
 
     def sender(self, frame: zmq.Frame) -> str | None:
-        """Whose key a message came with, by its last frame; None: of a key that is not known.
+        """Sender of a message by the key in its last frame; None: the key is unknown.
 
         The frame must have been received with `copy=False`.
         """

@@ -176,7 +176,7 @@ BODIES = {"robot": "#2f7fd0", "guard": "#2f7d32", "bystander": "#8c6d5a"}
 TALL = {"robot": 0.5, "guard": 1.75, "bystander": 1.7}  # as drawn [m]
 PERSON = 0.25  # radius [m]
 STEP_S = 1.0  # between updates of a hazard [s]
-LEAST_GROWTH = 0.05  # less is not drawn anew [m]
+LEAST_GROWTH = 0.05  # less is not drawn again [m]
 
 
 def bodies(playback: Playback) -> Iterator[ChannelMessage]:

@@ -36,7 +36,7 @@ BOUNDS: Final[dict[str, int]] = {
 }
 """Bounds on containers of agents, by class and attribute."""
 KEPT_FOR_MEASURES: Final = frozenset({"DvaAgent.events", "DvaAgent.facts"})
-"""What a run keeps of everything, to measure it afterwards; a DVA that lasts keeps none of it."""
+"""Records that a run keeps for its measures; a lasting DVA keeps none of them."""
 _ATOMS: Final = (str, bytes, int, float, complex, bool, type(None), type, ModuleType, FunctionType)
 _NOT_THEIRS: Final = (Recorder, Clock)
 _SHARED: Final = tuple(

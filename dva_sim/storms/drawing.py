@@ -33,7 +33,7 @@ PROFILES: Final[dict[str, tuple[str, ...]]] = {
     ),
     "none": (),
 }
-"""Which kinds of faults a profile draws from."""
+"""Kinds of faults that each profile draws from."""
 
 
 def draw(seed: int, profile: str = "all") -> StormPlan:

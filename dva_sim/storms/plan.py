@@ -26,7 +26,7 @@ A request fails after three attempts of 9 s. Who cannot register asks again ever
 chains follow each other where a robot has just been restarted under a driver.
 """
 PROBES_LAST: Final = 120.0
-"""How long a probe may take, from the first request to its end [s]."""
+"""Longest time of a probe, from the first request to its end [s]."""
 
 
 @dataclass(frozen=True)

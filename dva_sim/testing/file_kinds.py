@@ -215,10 +215,10 @@ _LOADERS: Final[dict[type[Config], Callable[[Document], object]]] = {
     SiteFile: lambda d: load_site(d.file),
     SplitFile: lambda d: load_split(str(d.file)),
 }
-"""How the program reads a file, where that is more than its keys."""
+"""Reader of each kind of file whose validation goes beyond its keys."""
 
 _CHECKS: Final[dict[type[Config], Callable[[Document], Iterator[ConfigError]]]] = {
     Preregistration: _check_registration,
     Study: _check_study,
 }
-"""Where there may be several mistakes."""
+"""Kinds of files in which several mistakes can be reported."""

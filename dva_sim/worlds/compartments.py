@@ -126,7 +126,7 @@ def _up_to(closed: Any, ends: Sequence[float]) -> tuple[float, float, float, flo
 
 
 def _labels(grid: OccupancyGrid, rooms: Sequence[Room]) -> Labels:
-    """Whose each cell is."""
+    """Compartment of each cell."""
     labels = np.full(grid.cells.shape, NOWHERE, np.int16)
     for number, room in reversed(list(enumerate(rooms))):
         window = grid.window(room.polygon)

@@ -23,7 +23,7 @@ mtype = { SEND, TAKE_UP, DECLINE, DEPART, ARRIVE, CONFIRM, REFUTE, CONTAIN, END,
 
 mtype state = PENDING;
 byte attempts;                  /* orders that were taken up */
-byte waited;                    /* since it was reported, or waits anew */
+byte waited;                    /* since it was reported, or waits again */
 byte lasted;                    /* the order that stands */
 hidden mtype what, before;
 hidden byte late, last;
@@ -34,7 +34,7 @@ hidden byte late, last;
 inline into(next)   { if :: (next == ORDERED || next == ACTOR_ORDERED || next == PENDING || next == CONFIRMED) -> lasted = 0 :: else fi; state = next }
 inline attempt()    { attempts++ }
 inline no_attempt() { attempts-- }
-inline wait_anew()  { waited = 0 }
+inline wait_again()  { waited = 0 }
 
 #include "event_table.pml"
 

@@ -104,7 +104,7 @@ def test_only_a_robot_that_stands_is_taken_and_by_one_hand(robot):
 
 
 @pytest.mark.invariant("S3")
-def test_an_emergency_wins_and_the_robot_has_to_be_taken_anew(in_hand):
+def test_an_emergency_wins_and_the_robot_has_to_be_taken_again(in_hand):
     in_hand.drive_by_hand(HERE, 0.4, 0.0, 1.0)
     assert say(in_hand, ANA, m.Emergency(), 2.0).set_point == STAND
     assert in_hand.drive_by_hand(HERE, 0.4, 0.0, 2.1).code == m.WRONG_MODE

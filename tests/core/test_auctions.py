@@ -147,7 +147,7 @@ def test_an_auction_ends_with_its_event(office):
     assert office.desk.next_deadline() > 2.0
 
 
-def test_an_auction_whose_only_bidder_has_gone_begins_anew():
+def test_an_auction_whose_only_bidder_has_gone_begins_again():
     """Else an event with endless patience would wait for a bidder for ever."""
     office = Office(Auction(), Rules(escalate_after=math.inf))
     office.busy(ROBOT, OPERATOR)

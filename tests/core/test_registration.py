@@ -122,13 +122,13 @@ def test_a_renewed_registration_changes_nothing_and_a_new_life_ends_what_was_hel
     session = granted(office)
     assert office.say(OPERATOR, AGAIN)[1] == []
     assert office.desk.sessions.permissions.grants[ROBOT].session == session
-    office.number = 0  # started anew, it counts its messages from 1 again
+    office.number = 0  # restarted, it counts its messages from 1 again
     over = m.PermissionRevocation(ROBOT, OPERATOR, session)
     assert office.say(OPERATOR, AGAIN)[1] == [Send(ROBOT, over), Send(OPERATOR, over)]
 
 
 @pytest.mark.invariant("S1", "S2")
-def test_a_robot_that_starts_anew_has_no_holder_any_longer(office):
+def test_a_robot_that_restarts_has_no_holder_any_longer(office):
     held = office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))[0].content
     office.number = 0
     sends = office.register(ROBOT, "Robot")
@@ -167,7 +167,7 @@ ELSEWHERE = m.Registration("robot", "Robot", "10.0.0.66:5600")
 @pytest.mark.invariant("S2")
 def test_who_is_heard_at_its_address_keeps_its_id_whoever_claims_it(office):
     session = granted(office)
-    office.number = 0  # as if it had started anew
+    office.number = 0  # as if it had restarted
     for second in range(0, 60, 2):
         office.status(ROBOT, 10, now=float(second))
         office.beat(OPERATOR, now=float(second))

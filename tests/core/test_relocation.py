@@ -106,7 +106,7 @@ def test_a_guard_that_declines_to_move_is_bound_for_nowhere():
     assert office.tick(3.0) == [Send(GUARD, THERE)]
 
 
-def test_a_guard_that_started_anew_is_bound_for_nowhere():
+def test_a_guard_that_restarted_is_bound_for_nowhere():
     office = office_of(Eastward())
     office.register(GUARD, "Guard")
     office.tick(1.0)

@@ -82,7 +82,7 @@ def test_a_robot_that_does_not_answer_holds_up_nobody_but_is_asked_again_by_name
     assert office.say(OPERATOR, m.GetSensorInfo(ROBOT))[1] == [ASK]
 
 
-def test_a_robot_that_starts_anew_is_asked_anew(office):
+def test_a_robot_that_restarts_is_asked_again(office):
     learn(office)
     office.number = 0
     assert ASK in office.register(ROBOT, "Robot")
@@ -124,7 +124,7 @@ def test_a_robot_that_no_longer_knows_the_dva_is_told_its_permission_again(offic
     assert sends[0].to == ROBOT
 
 
-def test_a_robot_that_was_gone_is_asked_and_permitted_anew(office):
+def test_a_robot_that_was_gone_is_asked_and_permitted_again(office):
     (grant,) = learn(office)
     office.ok([grant])
     office.silence(ROBOT, 11.0)

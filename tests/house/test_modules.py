@@ -152,7 +152,7 @@ FLOORS = {
 }
 MOST_ARGUMENTS = 6
 VARIADIC = {"_columns", "_new", "add_row", "attrgetter", "call_at", "chain", "pack"}
-"""What takes any number of arguments of one kind, or hands them on."""
+"""Functions that take any number of arguments of one kind, or pass them on."""
 
 
 def faults_of(node: ast.AST, room: str) -> Iterator[str]:
@@ -213,7 +213,7 @@ def _by_place(call: ast.Call) -> int:
 
 MOST_ALIKE = 4
 OF_PLUGINS = {"accelerations"}
-"""What classes of users define: only its arguments' places are known."""
+"""Methods that users' classes define: only the positions of their arguments are known."""
 ALIKE = {
     "number": r"float|int|bool",
     "text": r"str|Literal\[.*",
@@ -272,7 +272,7 @@ def exchangeable(nodes: Iterable[ast.AST], known: dict[str, list[list[str]]]) ->
 
 OF_TUPLES = {"_asdict", "_fields", "_make", "_replace"}
 DOCUMENTED = {"_Element", "_ElementTree", "_exit", "_repr_html_"}
-"""What has no other name: of lxml, of `os`, of pandas."""
+"""Names without another spelling: of lxml, of `os`, of pandas."""
 
 
 def read_of_others(nodes: Iterable[ast.AST]) -> set[str]:

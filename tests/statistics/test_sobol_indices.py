@@ -56,7 +56,7 @@ def test_the_estimates_are_those_of_scipy_from_the_same_runs():
     assert [i.total.mean for i in found] == pytest.approx(theirs.total_order.ravel(), abs=2e-3)
 
 
-def test_the_interval_is_that_of_blocks_drawn_anew_written_out():
+def test_the_interval_is_that_of_blocks_drawn_again_written_out():
     points = saltelli(16, 11)
     blocks = points.reshape(16, 5, 3)
     drawn = [np.repeat(blocks, own, axis=0) for own in draws(16, 100).astype(int)]

@@ -1,12 +1,15 @@
 """Campaigns: a journal that can be resumed, and the command."""
 
+from types import SimpleNamespace
+
 import pytest
+from helpers.processes.command_line import ended
 from helpers.wording import unnamed
 
 from dva_sim.experiments.execution.executors import local
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Breach
-from dva_sim.storms import campaign
+from dva_sim.storms import campaign, shrinking, storm
 from dva_sim.storms.campaign import Journal, StormTally, outcomes
 from dva_sim.storms.storm import StormOutcome
 
@@ -71,3 +74,34 @@ def test_the_upper_limit_of_failures_is_that_of_poisson():
     tally.add(outcome(100, breaches=[Breach("S1", "robot-1", 2.5, "moves")]))
     assert tally.failures == {100: ["S1"]}
     assert tally.most_per_hour() == pytest.approx(4.744 / 101, abs=1e-4)
+
+
+def test_failures_are_reduced_at_the_end_and_once(tmp_path, monkeypatch):
+    steps = []
+
+    def failing(seed, profile):
+        steps.append(f"played {seed}")
+        breaches = [Breach("S1", "robot-1", 2.5, "moves")] if seed == 1 else []
+        return outcome(seed, breaches=breaches)
+
+    def shrunk(shrinker):
+        steps.append(f"reduced {shrinker.plan.seed}")
+        return shrinker.plan.with_faults(())
+
+    def replayed(plan, before):
+        before(SimpleNamespace(recorder=SimpleNamespace(timeline=[])))
+        return failing(plan.seed, "none")
+
+    monkeypatch.setattr(campaign, "play_seed", failing)
+    monkeypatch.setattr(storm, "play", replayed)
+    monkeypatch.setattr(shrinking.Shrinker, "shrink", shrunk)
+    words = ("storm", "--seeds", "1:3", "--profile", "none", "-j", "1", "-o", tmp_path)
+    assert ended(*words)[0] == 1
+    assert steps == ["played 1", "played 2", "played 3", "reduced 1", "played 1"]
+    found = tmp_path / "found"
+    assert sorted(file.name for file in found.iterdir()) == ["none-1.txt", "none-1.yaml"]
+    assert ended(*words)[0] == 1
+    assert len(steps) == 5
+    (found / "none-1.yaml").unlink()  # as if it had been killed while it reduced
+    assert ended(*words)[0] == 1
+    assert steps[5:] == ["reduced 1", "played 1"]

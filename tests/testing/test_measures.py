@@ -114,7 +114,7 @@ def test_a_class_that_is_no_measure_is_refused_in_one_line(tmp_path, body, said)
         load_measure("mine.py:Mine", tmp_path)
 
 
-def test_a_file_that_changed_is_read_anew(tmp_path):
+def test_a_file_that_changed_is_read_again(tmp_path):
     import os
 
     text = (

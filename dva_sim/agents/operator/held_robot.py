@@ -281,7 +281,7 @@ class HeldRobot:
             on_result(False, f"{self.label}: {why}")
 
         def lost() -> None:
-            if self._starting is on_result:  # else it has ended, and that is told
+            if self._starting is on_result:  # otherwise it has ended, which was reported
                 self._unreachable()
                 silence = f"{self._silence()} after {self.device.attempts} attempts"
                 refused(silence, "lost link")
@@ -381,7 +381,9 @@ class HeldRobot:
                 self.phase = "held"
             if on_result is not None:
                 done = reply is not None and reply.code == m.OK
-                on_result(done, f"{self.label} {'is told to stop' if done else 'does not answer'}")
+                on_result(
+                    done, f"{self.label} {'has been told to stop' if done else 'does not answer'}"
+                )
 
         self.device.ask(self.robot, m.StopTeleOp(), stopped, stopped, self.session)
 

@@ -144,7 +144,7 @@ class PersonGuard(OnFoot):
             now = "need help" if self._needs_help else "need no help any more"
             self.device.tell(now.replace("need", "needs", 1), "safety")
             self._publish_status()
-            on_result(True, f"the DVA is told that you {now}")
+            on_result(True, f"the DVA knows that you {now}")
         elif order is None:
             on_result(False, "You have no order.")
         elif what in FINDINGS:
@@ -152,7 +152,7 @@ class PersonGuard(OnFoot):
         else:
             self._needs_help = False
             self._reach(order, what)
-            on_result(True, f"{what} is told")
+            on_result(True, f"{what} has been reported")
 
     def stand_at(self, x: float, y: float, on_result: OnResult) -> None:
         """Say where one is [m]."""
@@ -211,7 +211,7 @@ class PersonGuard(OnFoot):
         """Report a finding; one that the DVA cannot keep yet is reported again by itself."""
 
         def answered(reply: m.Reply) -> None:
-            later = "; the DVA cannot keep that yet, and is told again"
+            later = "; the DVA cannot store that yet, so it is sent again"
             is_heard = reply.code in (m.OK, m.BUSY)
             text = done + (later if reply.code == m.BUSY else "")
             on_result(is_heard, text if is_heard else reply.text or m.CODE_NAMES[reply.code])

@@ -84,7 +84,7 @@ class RobotFaults:
             robot.hang()
         else:
             robot.device.silent = not robot.body.powered
-            self._tell("its computer has started anew")
+            self._tell("its computer has restarted")
 
     def lose_camera(self, on: bool) -> None:
         """Let it take no pictures, or take them again."""

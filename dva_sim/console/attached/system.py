@@ -95,13 +95,13 @@ class AttachedSystem:
         def answered(reply: m.Reply) -> None:
             was_gone, self._heard = not self.answers, self.clock.now
             if reply.code == m.NOT_REGISTERED or (was_gone and self.is_told):
-                self._ask_anew()  # it may know nothing of an earlier life
+                self._ask_again()  # it may know nothing of an earlier life
             if isinstance(reply.content, m.DeviceList):
                 self.told.list(reply.content.devices)
 
         self.agent.ask(m.GetDeviceList(), answered)
 
-    def _ask_anew(self) -> None:
+    def _ask_again(self) -> None:
         """Nothing of what was told of events counts until the DVA has told all there are."""
         self.is_told = False
         self.agent.events.clear()

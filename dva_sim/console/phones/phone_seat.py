@@ -106,7 +106,7 @@ class PhoneSeat:
         """
         self._profile = self._profile_of(settings)
         self.settings = settings
-        self._show_anew()
+        self._show_again()
 
     def new_tilt(self) -> TiltSources:
         """Return what makes the commands of the next drive."""
@@ -134,9 +134,9 @@ class PhoneSeat:
         """Its screen is turned."""
         if orientation != self.orientation:
             self.orientation = orientation
-            self._show_anew()
+            self._show_again()
 
-    def _show_anew(self) -> None:
+    def _show_again(self) -> None:
         if self.driven is None:
             self.new_tilt()
 

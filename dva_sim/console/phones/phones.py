@@ -34,7 +34,7 @@ MOST_IDS: Final = 250
 FIRST_SEAT: Final = 1000  # number of the seat of the first phone
 RESTS: Final = FORGET_AFTER + 60.0  # from the end of a phone until its id is given out again [s]
 TYPES: Final = {"Robot": ROBOT, "Remote Control": REMOTE, "Teleoperation": OPERATOR}
-"""What a device calls itself on the wire, by the word on the screen."""
+"""Device types on the wire, by the word on the screen."""
 
 
 class Phones:

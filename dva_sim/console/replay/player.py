@@ -202,13 +202,13 @@ class Player:
         """Tell the messages since the last time; after a jump, all of them again."""
         run, now = self.run, self.now
         for name, entry in self._told.items() if run is not None else ():
-            log, anew = self._log(name), entry < 0
+            log, is_again = self._log(name), entry < 0
             end = log.until(now)
             lines = log.batches(name, max(0, entry), end)
-            if anew and not lines:
+            if is_again and not lines:
                 lines = [{"k": "log", "log": name, "lines": []}]
-            if anew:
-                lines[0]["anew"] = True
+            if is_again:
+                lines[0]["replaces"] = True
             for line in lines:
                 self.tell(line)
             self._told[name] = end

@@ -78,7 +78,7 @@ class RobotWindow:
     loop: Latencies = field(default_factory=Latencies)
     replies: Latencies = field(default_factory=Latencies)
     newest: int = 0  # of the messages that it has heard
-    over: float = -1.0  # the newest emergency after which it was ordered anew [s]
+    over: float = -1.0  # the newest emergency after which it was ordered again [s]
     _sensed: tuple[float, list[SensorShown]] = field(default_factory=lambda: (-math.inf, []))
 
     def sensors(self, now: float) -> list[SensorShown]:

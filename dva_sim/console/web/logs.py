@@ -197,7 +197,7 @@ class KeptLogs:
             if entry.kind == "RegMsg" and entry.code == m.OK:
                 self.meet({entry.header["SourceID"]: entry.label})
         log = self.of(str(line["log"]))
-        if line.get("anew"):
+        if line.get("replaces"):
             log.begin(entries[0].number - 1 if entries else 0)
         log.take(entries)
 

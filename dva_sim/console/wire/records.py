@@ -11,7 +11,7 @@ class ExchangesLine(TypedDict):
     k: Literal["log"]
     log: str
     lines: list[list[Any]]
-    anew: NotRequired[bool]
+    replaces: NotRequired[bool]
 
 
 class ShelfEntry(TypedDict):

@@ -196,7 +196,7 @@ def _span(events: Table, measure: str, value: float) -> Span | None:
 
 
 def agents_of(moments: Table) -> list[str]:
-    """Whose ways are known, in order."""
+    """Agents whose ways are known, in order."""
     return sorted({str(name) for name in moments["agent"]})
 
 

@@ -15,7 +15,7 @@ from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT
 from dva_sim.simulation.labels import measure_called, measure_name
 from dva_sim.statistics import VarianceReduction, band, variance_reduction
 
-_FEW = 6  # persons: with fewer nothing can be drawn anew
+_FEW = 6  # persons: with fewer nothing can be drawn again
 
 
 def remarks(reading: Reading) -> list[str]:

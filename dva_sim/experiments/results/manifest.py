@@ -134,7 +134,7 @@ def status_of(manifest: Mapping[str, Any]) -> Status:
             why = ("the study is not finished", *status.why)
             found = {"kind": "exploratory", "why": why, "reproducible": False}
             status = status.model_copy(update=found)
-        return _judged_anew(_without(manifest.get("failures", []), status))
+        return _judged_again(_without(manifest.get("failures", []), status))
     given = manifest.get("set", [])  # each a pair, or a list of its words
     changes = [text if isinstance(text, str) else "=".join(map(str, text)) for text in given]
     if not changes:
@@ -142,7 +142,7 @@ def status_of(manifest: Mapping[str, Any]) -> Status:
     return Status(kind="exploratory", why=(f"changed on the command line: {', '.join(changes)}",))
 
 
-def _judged_anew(status: Status) -> Status:
+def _judged_again(status: Status) -> Status:
     """The status, with a word if hypotheses are judged by another program than was registered."""
     meant = (status.registration or {}).get("judged_with")
     if not meant or meant == (now := fingerprint_of_judges()):

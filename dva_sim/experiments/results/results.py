@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 Told = Mapping[str, Mapping[str, Mapping[str, Any]]]
-"""What a results folder tells itself of columns that are none of ours, by table and name."""
+"""Meanings of users' own columns, kept in the results folder, by table and name."""
 
 
 class Column(NamedTuple):

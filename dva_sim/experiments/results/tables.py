@@ -94,7 +94,7 @@ def _write(folder: Path, jobs: Sequence[StudyRun], tables_of: TablesOf) -> list[
                 tables[name] = stack.enter_context(_Table(folder, name, design))
             tables[name].add(rows)
         again = {
-            name: stack.enter_context(table.anew())
+            name: stack.enter_context(table.emptied())
             for name, table in tables.items()
             if not table.is_whole()
         }
@@ -158,7 +158,7 @@ class _Table:
         self._pass_on()
         return self._fits
 
-    def anew(self) -> _Table:
+    def emptied(self) -> _Table:
         """Return an empty table for all columns and types seen so far."""
         return _Table(self._folder, self._name, self._seen)
 

@@ -73,7 +73,7 @@ _CODE = (
 )
 # Of these, what holds words that people read, and no run does.
 _WORDS = ("agents/operator/published.py", "simulation/labels.py")
-# What says whether a hypothesis held: a registration fixes it, other results may be judged anew.
+# What says whether a hypothesis held: a registration fixes it, other results may be judged again.
 _JUDGES = (
     "experiments/analysis/hypothesis_tests.py",
     "experiments/analysis/run_grid.py",

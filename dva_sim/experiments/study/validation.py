@@ -30,7 +30,7 @@ from dva_sim.simulation.models import measured_names
 
 SAME = 1e-9  # relative difference of two levels that are meant as one
 Problem = tuple[str, KeyPath]
-"""What is wrong, and the key at which that is said."""
+"""Description of a problem, and the key it is reported at."""
 
 
 def of_design(study: Study) -> Iterator[Problem]:

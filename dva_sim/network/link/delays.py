@@ -32,7 +32,7 @@ _SDS = 3.0  # a normal law keeps so many standard deviations above zero
 
 
 Wobble = Callable[[float], float]
-"""How much later than usual a packet arrives that is sent at a time [s]; less than 0 is sooner."""
+"""Extra delay of a packet sent at a time [s]; below 0 it arrives sooner than usual."""
 
 
 def by_quantile(quantile: Quantile, uniforms: UniformNumbers) -> Wobble:

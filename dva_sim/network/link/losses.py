@@ -16,7 +16,7 @@ Seconds = Annotated[float, Field(ge=0, le=1e7)]
 PositiveSeconds = Annotated[float, Field(gt=0, le=1e7)]
 
 Fate = Callable[[float, float], bool]
-"""Whether a packet sent at a time [s], which left the queue at another [s], is lost."""
+"""True if a packet is lost, given when it was sent and when it left the queue [s]."""
 
 
 class Bursts(Config):

@@ -41,7 +41,7 @@ class Replay:
 
     def _at(self, now: float) -> int:
         index = bisect_right(self._ends, (now + self._offset) % self._period)
-        return index if index < len(self._ends) else 0  # nearer to where the log begins anew
+        return index if index < len(self._ends) else 0  # nearer to where the log begins again
 
 
 def period_of(log: DelayLog) -> float:

@@ -170,7 +170,7 @@ def next_on_grid(now: float, wait: float, tick: float) -> float:
 
 
 SOONEST_S = 0.002
-"""What Linux adds to the waits for a probe and for a segment in doubt (TCP_TIMEOUT_MIN)."""
+"""Time that Linux adds to the waits for a probe and for a segment in doubt (TCP_TIMEOUT_MIN)."""
 TIMEOUT, PROBE, REORDER, WINDOW = "timeout", "probe", "reorder", "window"
 
 

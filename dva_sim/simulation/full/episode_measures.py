@@ -127,7 +127,7 @@ RUN_COLUMNS = (
     *_OF_PEOPLE,
     *_OF_BYSTANDERS,
     *workload.COLUMNS,
-    Measure("replans", "ways that were planned anew"),
+    Measure("replans", "ways that were planned again"),
     Measure("messages", "messages on the network"),
     Measure("traffic_bytes", "size of all messages on the network"),
     Measure("refused", "requests that were refused"),
@@ -140,7 +140,7 @@ RUN_COLUMNS = (
     Measure("simulated_s", "virtual time simulated"),
     *dispatch_measures.RUN_COLUMNS,
 )
-"""What a row of `run_row` may hold; what is a number, a study may ask for."""
+"""Columns of `run_row`; a study may ask for those that are numbers."""
 _STEPS = {
     "detected": "when it was detected",
     "assigned": "when it was assigned",

@@ -39,7 +39,7 @@ _ORDERED: Final = (
     *(b"<Order>", b"<TaskAward>", b"<OrderProgress>"),
     *(b"<PermissionRevocation>", b"<Permission>"),
 )
-"""What of the DVA's messages is looked at, beside answers that are waited for."""
+"""Messages of the DVA that are read, besides replies that are waited for."""
 OF_NO_EVENT: Final = m.Heartbeat, m.RobotStatus  # the most of what reaches the DVA
 Broken = tuple[str, str]
 

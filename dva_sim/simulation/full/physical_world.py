@@ -30,7 +30,7 @@ DANGEROUS = Conditions(
     water=0.1,
     explosive=0.2,
 )
-"""What makes a place dangerous, by the limits of `danger_radius` (docs/explanation/hazards.md)."""
+"""Causes of danger at a place, by the limits of `danger_radius` (docs/explanation/hazards.md)."""
 REPORT_AGAIN = 2.0  # after a report that was not answered, or refused [s]
 
 

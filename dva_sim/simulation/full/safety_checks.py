@@ -71,7 +71,7 @@ CHECKED: Final = {
     "S7": "the times of every event are in order, and those at which they were noted; "
     f"slack: {STEP_SLACK:g} s",
 }
-"""What the audit checks of each rule, at every message and twice a second."""
+"""Checks of each rule, made at every message and twice a second."""
 CHECKED_IN_SHORT: Final = (
     "S1 to S7 checked twice a second; slack a tick of the motors, and until a robot can brake; "
     f"{SLACK - 1:.0%} of speed, {PENDING_SLACK:g} s of deadlines, {OBEYS_WITHIN:g} s to obey"
@@ -335,7 +335,7 @@ class SafetyAudit:
             return
         key = message.source, message.message_id
         if isinstance(message.body, m.SetTeleOp):
-            # Whoever has started anew numbers from 1 again, and has other sessions.
+            # Whoever has restarted numbers from 1 again, and has other sessions.
             copies = deque[float](maxlen=MOST_COPIES)
             witness.arrivals.setdefault((*key, message.session), copies).append(now)
             if len(witness.arrivals) > MOST_KEPT:
@@ -521,7 +521,7 @@ class SafetyAudit:
             witness.stands(now)
         else:
             if witness.stopped > witness.ordered:
-                found.append(("S3", "obeys a hand after an emergency, before it is taken anew"))
+                found.append(("S3", "obeys a hand after an emergency, before it is taken again"))
             elif witness.hand != done.who:
                 found.append(("S1", "obeys a hand that has not taken it, or has let it go"))
             witness.allowed, witness.heard = now + self._watchdog, now

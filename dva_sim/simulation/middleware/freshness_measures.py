@@ -60,7 +60,7 @@ RUN_COLUMNS = (
     Measure("disturbed", "whether the last of them was disturbed, too: 1 or 0", low=0, high=1),
     Measure("load", "runnable processes of the machine when the run began, one-minute mean"),
 )
-"""What a row of a run holds, and so what a study may ask for."""
+"""Columns of a run, which a study may ask for."""
 COMMAND_COLUMNS = (
     Measure("number", "number of the command or picture"),
     Measure("made_s", "when it was made, in the time of the run"),

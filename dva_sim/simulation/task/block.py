@@ -203,4 +203,4 @@ NAMES = {
     "heading_step": ("heading_error_deg", "width_m"),
     "reach": ("length_m", "width_m"),
 }
-"""What the two numbers of a condition are, by kind of task."""
+"""Meanings of the two numbers of a condition, by kind of task."""

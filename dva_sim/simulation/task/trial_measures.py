@@ -33,7 +33,7 @@ DRIVEN_COLUMNS = (
         title="delay as the person takes it",
     ),
 )
-"""What is measured of whatever is driven, here and over a congested link."""
+"""Measures of any driven vehicle, here and over a congested link."""
 _AVERAGED = (
     *DRIVEN_COLUMNS,
     Measure("error", "1 if a selection missed or a wall was crossed, else 0", low=0, high=1),
@@ -122,7 +122,7 @@ RUN_COLUMNS = (
     _FAILURES,
     Measure("simulated_s", "virtual time simulated"),
 )
-"""What a row of `run_row` may hold, and so what a study may ask for."""
+"""Columns of `run_row`, which a study may ask for."""
 
 _OF_KINDS = {
     "error_share": _AIMED,

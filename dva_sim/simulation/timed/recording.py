@@ -67,7 +67,7 @@ OUTCOMES = (
     "escalated",
     "expired",
 )
-"""What has become of an event; a confirmed one may still be open where containment is needed."""
+"""State of an event; a confirmed one stays open while it needs containment."""
 
 STEPS_IN_ORDER = ("detected", "assigned", "departed", "arrived", "confirmed", "contained", "closed")
 CODES = {name: code for code, name in enumerate(OUTCOMES)}

@@ -123,7 +123,7 @@ RUN_COLUMNS = (
     ),
     Measure("simulated_s", "virtual time simulated"),
 )
-"""What a row of `run_row` may hold, and so what a study may ask for."""
+"""Columns of `run_row`, which a study may ask for."""
 EVENT_COLUMNS = (
     Measure("event_id", "number of the event in its run, from 1"),
     text("stream", "stream of the demand that it belongs to"),

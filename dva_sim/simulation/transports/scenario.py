@@ -108,7 +108,7 @@ def _complete(scenario: TransportScenario, error: Fail) -> TransportScenario:
 
 
 DRIVEN = (*names_of(DRIVEN_COLUMNS), "plugin_failures")
-"""What is taken over of a drive."""
+"""Settings taken from a drive."""
 
 
 class SessionRecording(NamedTuple):

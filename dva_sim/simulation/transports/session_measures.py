@@ -94,7 +94,7 @@ RUN_COLUMNS = (
     Measure("plugin_failures", "times that a class of the user's gave no answer that is one"),
     Measure("simulated_s", "virtual time simulated"),
 )
-"""What a row of a run holds, and so what a study may ask for."""
+"""Columns of a run, which a study may ask for."""
 FLOW_COLUMNS = (
     text("way", "up is towards the robot"),
     text("flow", "session, or a TCP flow beside it"),

@@ -97,7 +97,7 @@ def _choice(
 
 
 Deviations = Iterator[tuple[str, float]]
-"""What was looked at, and how far it is from what it should be: always 0."""
+"""Quantities checked, and their distance from the right value: always 0."""
 
 SLACK_S = 1e-3  # what the clock's whole microseconds may add up to
 TIMES = ("detected", "assigned", "departed", "arrived", "confirmed", "closed")

@@ -226,7 +226,7 @@ WITHOUT: dict[str, dict[str, Any]] = {
     "granularity of timers": {"tick": 0.0},
     "cost of the handshake": {"handshake": False},
 }
-"""What a mechanism of TCP is left out by."""
+"""Change that leaves a mechanism of TCP out."""
 
 
 def predict(

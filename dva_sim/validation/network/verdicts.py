@@ -160,7 +160,7 @@ MEASURES = (
 )
 BY_NAME = {measure.name: measure for measure in MEASURES}
 JUDGED_EXACTLY = MEASURES[:7]
-"""What has a band without loss; the rest is shown there."""
+"""Results with a band in runs without loss; the rest are only shown there."""
 
 
 def values_of(row: Row) -> dict[str, float]:

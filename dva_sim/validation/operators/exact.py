@@ -29,7 +29,7 @@ from dva_sim.worlds.hazards.detectors import CoAlarm
 from dva_sim.worlds.hazards.fire import FULL_GROWTH_KW
 from dva_sim.worlds.hazards.gas_plume import sigma_y
 
-"""What a loop does with a parameter: the error at each step."""
+"""Response of a loop to a parameter: the error at each step."""
 
 
 Values = dict[str, float]
@@ -127,4 +127,4 @@ EXACT: dict[str, Callable[[int], Values]] = {
     "S16d": walkers,
     "S16e": lambda seed: plumes(),
 }
-"""How each exact check is simulated, given the random seed."""
+"""Simulation of each exact check, given the random seed."""

@@ -43,7 +43,7 @@ BY = {
     "moving": "added lag [s], speed of the target [m/s]",
     "click": "added lag [s]",
 }
-"""What the names of the cells of an experiment mean, where they do not say it."""
+"""Meanings of cell names that do not explain themselves, by experiment."""
 
 
 def evidence(

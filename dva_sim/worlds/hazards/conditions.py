@@ -50,7 +50,7 @@ QUANTITIES: Final = {
     "gas": Quantity("gas", "1"),
     "water": Quantity("water", "m"),
 }
-"""What a hazard may show over the floor, and pictures and recordings know how to."""
+"""Fields over the floor that pictures and recordings can show."""
 
 
 def together(a: Conditions, b: Conditions) -> Conditions:

@@ -45,7 +45,7 @@ def test_while_nothing_changes_the_guess_is_what_was_learnt_before():
     assert guess.value == pytest.approx(1.7)
 
 
-def test_a_delay_that_changes_is_learnt_anew_within_half_a_minute():
+def test_a_delay_that_changes_is_learnt_again_within_half_a_minute():
     guess = DelayEstimate(0.0, 0.6)
     asked = np.random.default_rng(2).uniform(0.0, 0.5, 200)
     values = []

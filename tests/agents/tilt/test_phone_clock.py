@@ -55,7 +55,7 @@ def test_a_batch_is_set_by_its_newest_sample():
     assert times == pytest.approx([0.96, 0.98, 1.0])
 
 
-def test_who_begins_to_count_anew_is_believed_and_what_is_a_little_old_is_not():
+def test_who_begins_to_count_again_is_believed_and_what_is_a_little_old_is_not():
     clock = PhoneClock()
     clock.times_of([100.0], 1.0)
     assert clock.is_old(99.0)

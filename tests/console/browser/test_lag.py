@@ -59,7 +59,7 @@ def test_silence_makes_the_page_look_old(fake, page):
     expect(page.locator(".age.old")).to_be_visible()
 
 
-def test_a_hole_in_what_was_heard_is_filled_by_asking_anew(fake, page):
+def test_a_hole_in_what_was_heard_is_filled_by_asking_again(fake, page):
     asked, skipped = list[str](), list[str]()
 
     def hole(text: str) -> str | None:

@@ -124,7 +124,7 @@ def test_a_page_that_is_gone_for_good_leaves_the_dva_and_its_robot(driving):
     assert driving.seat()["phone"] is None
 
 
-def test_who_registers_anew_has_one_device_and_its_drive_is_over(driving):
+def test_who_registers_again_has_one_device_and_its_drive_is_over(driving):
     old = driving.phone()["id"]
     assert driving.register(label="renamed")["ok"]
     driving.let(2.0)

@@ -198,7 +198,7 @@ def test_it_is_played_within_bounds(recorded, factor, playing):
     assert not lines.ask("pace", factor=factor)["ok"]
 
 
-def test_at_its_end_it_stands_and_play_begins_anew(recorded, playing):
+def test_at_its_end_it_stands_and_play_begins_again(recorded, playing):
     lines = playing(recorded)
     lines.ask("seek", "1", t_ms=10**9)
     assert lines.player.now == recorded.duration
@@ -270,13 +270,13 @@ def test_a_recording_that_is_damaged_is_told_and_the_one_before_goes_on(files, t
 # --- logs and windows ----------------------------------------------------------------------
 
 
-def test_a_log_is_told_up_to_the_moment_and_anew_after_a_jump(recorded, playing):
+def test_a_log_is_told_up_to_the_moment_and_again_after_a_jump(recorded, playing):
     lines = playing(recorded)
     lines.ask("seek", "1", t_ms=80_000)
     lines.logs.clear()
     lines.player.take({"do": "look", "logs": {"dva": False}, "tables": []})
     late = [row for line in lines.logs for row in line["lines"]]
-    assert lines.logs[0]["anew"]
+    assert lines.logs[0]["replaces"]
     assert late[-1][1] <= 80_000
     assert [row[0] for row in late] == list(range(1, len(late) + 1))
 
@@ -284,7 +284,7 @@ def test_a_log_is_told_up_to_the_moment_and_anew_after_a_jump(recorded, playing)
     lines.ask("seek", "2", t_ms=10_000)
     lines.player._tell_logs()
     early = [row for line in lines.logs for row in line["lines"]]
-    assert lines.logs[0]["anew"]
+    assert lines.logs[0]["replaces"]
     assert early == late[: len(early)]
     assert 0 < len(early) < len(late)
 

@@ -123,7 +123,7 @@ def test_an_authority_that_may_not_sign_for_this_machine_is_renewed(tmp_path, ho
 
 @pytest.mark.parametrize("name", [AUTHORITY, LEAF])
 @pytest.mark.parametrize("damage", [b"", b"rubbish", b"-----BEGIN CERTIFICATE-----\nAAAA\n"])
-def test_a_broken_file_is_made_anew_and_told_in_a_line(tmp_path, name, damage):
+def test_a_broken_file_is_made_again_and_told_in_a_line(tmp_path, name, damage):
     certificates(tmp_path, HOSTS, NOW)
     (tmp_path / name).write_bytes(damage)
     kept = certificates(tmp_path, HOSTS, NOW)

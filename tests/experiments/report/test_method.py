@@ -65,5 +65,5 @@ def test_without_claims_no_test_is_told(tmp_path):
     assert "permutation" not in text
 
 
-def test_with_fewer_than_six_persons_nothing_is_drawn_anew(tmp_path):
+def test_with_fewer_than_six_persons_nothing_is_drawn_again(tmp_path):
     assert "it is Student's alone" in " ".join(remarks(reading(tmp_path)))

@@ -214,7 +214,7 @@ def test_other_code_that_judges_is_told_whenever_verdicts_are(tmp_path, monkeypa
     assert unnamed(*reported.why, "judges", "now another)") == []
 
 
-def test_registering_anew_has_to_be_meant_and_is_told(tmp_path):
+def test_registering_again_has_to_be_meant_and_is_told(tmp_path):
     path = registered(tmp_path)
     first = load_registration(load_yaml(beside(path)))
     with pytest.raises(ConfigError, match="--again"):

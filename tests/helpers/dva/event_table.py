@@ -31,7 +31,7 @@ STATES = {
     "ACTOR_TAKEN_UP": ("SEND", "TAKE_UP", "DEPART", "ARRIVE", "CONFIRM", "END", "SEND", "TAKE_UP"),
     "CLOSED": ("ESCALATE",),
 }
-"""How an event gets into each state."""
+"""Steps that bring an event into each state."""
 TO_CONFIRM = frozenset({"TAKEN_UP", "UNDER_WAY", "ON_SCENE"})
 """States in which the attempt that is going on has been counted."""
 HAPPENINGS = (
@@ -122,7 +122,7 @@ def outcome(state: str, what: str, late: bool, last: bool) -> tuple[str, ...]:
         f"into({case.state})": case.state != state,
         "attempt()": event.attempts > before,
         "no_attempt()": event.attempts < before,
-        "wait_anew()": event.waiting_since > BEGAN and event.open,
+        "wait_again()": event.waiting_since > BEGAN and event.open,
     }
     return tuple(name for name, is_so in done.items() if is_so)
 

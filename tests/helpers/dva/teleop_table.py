@@ -25,7 +25,7 @@ STATES = {
     "OTHER_HELD": (OTHER, Mode.IDLE),
     "OTHER_DRIVES": (OTHER, Mode.TELEOPERATION),
 }
-"""Who holds the robot, and its mode: the sender, or the one whom a claim or an answer names."""
+"""Holder and mode of the robot; the holder is the sender, or whom a claim or an answer names."""
 
 FACTS = {
     "START": ("right", "newer", "still", "later"),
@@ -36,7 +36,7 @@ FACTS = {
     "REVOKE": ("right",),
     "ANSWER": ("somebody", "right", "current"),
 }
-"""What may matter besides: the session, the order, the wheels, the last emergency, the age."""
+"""Other facts that may matter: session, order, wheels, last emergency, age."""
 
 Facts = Mapping[str, bool]
 

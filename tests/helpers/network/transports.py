@@ -53,7 +53,7 @@ VIRTUAL: dict[str, Callable[[], Connector]] = {
     "virtual segments": lambda: Connector(depth="segment"),
     "virtual datagrams": lambda: Connector("datagrams"),
 }
-"""What carries messages in virtual time."""
+"""Transports in virtual time."""
 
 NO_MQTT = MqttTransport().lacks()
 """A line that says what is missing for MQTT; empty where nothing is."""

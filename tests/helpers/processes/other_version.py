@@ -15,7 +15,7 @@ from typing import Any
 from helpers.paths import ROOT
 
 RUNNING: list[subprocess.Popen[Any]] = []
-"""What ends with this program; each leads a session of its own."""
+"""Processes that end with this program; each leads a session of its own."""
 
 
 @contextmanager

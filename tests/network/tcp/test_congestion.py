@@ -117,7 +117,7 @@ def test_hystart_forgives_one_short_round_trip_among_the_long():
     assert not any(hystart.ends(16.0, sample, 0.1, 0, 20) for sample in samples)
 
 
-def test_hystart_starts_anew_with_each_round_and_not_below_sixteen_segments():
+def test_hystart_restarts_with_each_round_and_not_below_sixteen_segments():
     hystart = HyStart()
     for _ in range(7):
         hystart.ends(16.0, 0.3, 0.1, 0, 20)

@@ -34,7 +34,7 @@ def test_without_the_probe_the_timeout_does_it_and_doubles():
     assert pair.opener.sender.timeouts == 3
 
 
-def test_after_a_lost_probe_the_timeout_starts_anew_and_doubles():
+def test_after_a_lost_probe_the_timeout_restarts_and_doubles():
     pair = lost_at([1.0], {1, 2, 3, 4})
     assert pair.sent(1.0) == pytest.approx([1.0, 1.3, 1.6, 2.2, 3.4])
 

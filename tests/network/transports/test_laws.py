@@ -61,7 +61,7 @@ def test_three_terms_are_a_constant_a_line_and_a_square_of_the_round_trips_since
     assert rates == pytest.approx([10 + (0.5 * n + 0.25 * n * n) / R for n in (1, 2, 3, 4)])
 
 
-def test_after_a_loss_the_three_terms_begin_anew_from_what_is_left():
+def test_after_a_loss_the_three_terms_begin_again_from_what_is_left():
     law = ThreeTerms(linear=0.5, square=0.25, decrease=0.25)
     law.begin(R)
     for _ in range(4):

@@ -484,7 +484,7 @@ def test_a_sensor_that_is_shown_to_somebody_who_may_not_read_it_breaks_s5():
 
 
 @pytest.mark.invariant("S5")
-def test_a_robot_that_has_restarted_shows_its_sensors_to_nobody_until_it_is_asked_anew():
+def test_a_robot_that_has_restarted_shows_its_sensors_to_nobody_until_it_is_asked_again():
     thermometer = {"robot.sensors": [{"name": "temperature"}]}
     run, shown = staged(**thermometer), list[float]()
     topic = sensor_topic("temperature", DVA)
@@ -611,7 +611,7 @@ def test_a_robot_that_obeys_a_tick_from_the_future_or_an_old_one_breaks_s1(
 
 
 @pytest.mark.invariant("S6")
-def test_a_wait_that_begins_anew_for_ever_breaks_s6(monkeypatch):
+def test_a_wait_that_begins_again_for_ever_breaks_s6(monkeypatch):
     """Nobody is sent; the DVA sets back what it escalates by."""
     alone = {"dispatch.escalate_after_s": 20}
     monkeypatch.setattr(Dispatcher, "_decide", lambda *_: [])
@@ -628,7 +628,7 @@ def test_a_wait_that_begins_anew_for_ever_breaks_s6(monkeypatch):
 
 
 @pytest.mark.invariant("S6")
-def test_an_order_that_begins_anew_for_ever_breaks_s6(monkeypatch):
+def test_an_order_that_begins_again_for_ever_breaks_s6(monkeypatch):
     honest = Orders.take_back
 
     def patient(self: Orders, now: float) -> Any:

@@ -35,7 +35,7 @@ def test_half_a_row_of_a_killed_writer_is_cut_off(path):
         assert path.read_text() == whole
 
 
-def test_half_a_header_is_written_anew(path):
+def test_half_a_header_is_written_again(path):
     path.write_text("cell,a")
     with Table(path, COLUMNS) as table:
         assert table.rows == []

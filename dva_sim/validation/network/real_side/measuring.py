@@ -99,7 +99,7 @@ Row = dict[str, str]
 _NOTES_PER_TURN = 8  # a command or an attempt
 _DECIMALS = 4
 COLUMNS = (*Condition("pub", 1).to_row(), *RESULTS, *EMULATOR_RESULTS, "realtime")
-"""What a measurement tells: the condition, the results, the emulator, real-time priority."""
+"""Contents of a measurement: condition, results, emulator, real-time priority."""
 
 
 def measure(condition: Condition, seed: int, link: str = PACKETS) -> Row:

@@ -200,4 +200,4 @@ PROBES = (
     Probe(_fast(loss=0.1, bursts=Bursts(mean_packets=4.0)), 4000, 5e-4, 100, find_bursts),
     Probe(LinkConfig(rate_bps=1e6, queue_packets=400), 250, 4e-3, 1000, find_rate),
 )
-"""What the link is asked; light enough for a slow machine."""
+"""Load on the link; light enough for a slow machine."""

@@ -151,7 +151,7 @@ def test_kept_bands_are_taken_before_any_are_made(results, monkeypatch):
     assert {row.band for row in found.rows} == {PredictedBand(1, 2, 3)}
 
 
-def test_runs_of_a_scenario_that_is_another_one_today_are_not_predicted_anew(results):
+def test_runs_of_a_scenario_that_is_another_one_today_are_not_predicted_again(results):
     made = Results.load(results())
     runs = measured_in(made)
     for row in made.manifest["cells"]:

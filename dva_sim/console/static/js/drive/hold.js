@@ -76,7 +76,7 @@ export function interrupt(why) {
   interrupted.value = why;
 }
 
-/** Whatever is held counts for nothing until it has been let go and taken anew. */
+/** Whatever is held counts for nothing until it has been let go and taken again. */
 export function forget() {
   sources.clear();
   for (const release of releases) release();
@@ -91,7 +91,7 @@ export function forget() {
 function watchEnds() {
   let before = '';
   return effect(() => {
-    if (!seat.value) return; // told anew in a moment: no end of a drive
+    if (!seat.value) return; // sent again in a moment: no end of a drive
     const now = seat.value.phase;
     const failed = before === 'starting' && now !== 'starting' && now !== 'driving';
     if (failed || (before === 'driving' && now !== 'driving')) forget();

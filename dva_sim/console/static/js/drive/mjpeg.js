@@ -8,7 +8,7 @@ const WAIT_MS = 1000;
  */
 
 /**
- * Read a stream until `signal` says to stop; begin anew when it ends.
+ * Read a stream until `signal` says to stop; begin again when it ends.
  * @param {string} url
  * @param {(frame: Frame) => void} show
  * @param {(text: string) => void} tell what is wrong, or nothing

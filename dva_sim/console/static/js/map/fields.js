@@ -26,7 +26,7 @@ export class Fields {
       .map((field) => ({ field, picture: paint(field, colours) }));
   }
 
-  /** Only when they are told anew. */
+  /** Only when they are told again. */
   isMoving() {
     return false;
   }

@@ -39,7 +39,7 @@ function Events() {
 /** @param {SiteEvent} event */
 const ageOf = (event) => (isOpen(event) ? ageText(worldNow() - event.since_ms) : '');
 
-/** @param {{event: SiteEvent, age: string}} props a row is drawn anew when one of them changes */
+/** @param {{event: SiteEvent, age: string}} props a row is drawn again when one of them changes */
 function EventRow({ event, age }) {
   const open = isOpen(event);
   return html`<li><button type="button" class=${open ? 'row' : 'row over'}

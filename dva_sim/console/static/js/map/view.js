@@ -137,7 +137,7 @@ export class MapView {
   }
 
   /**
-   * Draw a layer anew, though nothing on it has moved.
+   * Draw a layer again, though nothing on it has moved.
    * @param {number} layer
    */
   refresh(layer) {

@@ -12,7 +12,7 @@ const ENDS = ['stop', 'release'];
 /** @type {Map<string, (done: {ok: boolean, text: string}) => void>} */
 const waiting = new Map();
 
-/** Counts how often the socket for driving was lost: who drives has to begin anew. */
+/** Counts how often the socket for driving was lost: who drives has to begin again. */
 export const driveLost = signal(0);
 
 /** An id that nobody else makes. */

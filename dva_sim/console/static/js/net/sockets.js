@@ -81,7 +81,7 @@ function receive(line) {
   apply(line);
 }
 
-/** Ask for everything anew; not more often than it helps. */
+/** Ask for everything again; not more often than it helps. */
 export function resync() {
   const now = performance.now();
   if (now - asked < RESYNC_EVERY_MS) return;
