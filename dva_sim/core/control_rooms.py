@@ -319,7 +319,7 @@ class ControlRooms:
         looks = (body.task or "confirm") == "confirm"
         before = event.responder if looks and event.state is State.ASSIGNED else None
         before = before if looks else event.actor
-        sends = orders.recall(event, before, now) if before else []
+        sends = orders.recall(event, before, now, replaced=True) if before else []
         event.handling.taken_off.discard(device)
         self._dispatcher.situations.forget_move(device)
         self._dispatcher.auctions.running.pop(event.number, None)

@@ -31,6 +31,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.control_room import ControlRoomBody
 
 Reaction = tuple[m.Reply, list[Send]]
+FOUND_WITHIN = 20.0  # of its event a finding has to be [m]
 
 
 class Dva:
@@ -461,6 +462,10 @@ class Dva:
             return self._refuse(message, m.UNKNOWN_EVENT, f"no event {body.event_id}")
         if message.source not in event.sent:
             return self._refuse(message, m.NOT_PERMITTED, f"was not sent to event {event.number}")
+        if body.kind != event.kind or apart(body.position, event.position) > FOUND_WITHIN:
+            # A life of the DVA that could keep nothing may have given its number to another event.
+            text = f"event {event.number} is another one, a {event.kind} elsewhere"
+            return self._refuse(message, m.UNKNOWN_EVENT, text)
         sends = self.orders.found(event, message.source, body.finding, now)
         if event.waits_for is not None:
             sends = sends + self.dispatcher.decide(now)

@@ -393,12 +393,18 @@ class Orders:
 
     # --- decided by people -------------------------------------------------------------
 
-    def recall(self, event: Event, device: str, now: float) -> list[Send]:
-        """Recall a device from an event; this is neither an attempt nor a failure."""
+    def recall(self, event: Event, device: str, now: float, replaced: bool = False) -> list[Send]:
+        """Recall a device from an event; this is neither an attempt nor a failure.
+
+        An event whose actor is replaced at once stays open, however long it has waited.
+        """
         if device == event.actor:
             over = Send(device, m.OrderProgress(event.number, OVER))
             if event.act_taken_up:
                 event.act_taken_up, event.waiting_since = False, now
+            if replaced:
+                self._free_actor(event)
+                return [over]
             return [over, *self._actor_gone(event, now)]
         taken_up, event.attempts = event.taken_up, event.attempts - event.taken_up
         sends = self._called_off(event)
@@ -492,16 +498,20 @@ class Orders:
 
     def _actor_gone(self, event: Event, now: float) -> list[Send]:
         """Replace a device that should have contained an event and did not."""
-        taken_up, event.act_taken_up = event.act_taken_up, False
-        self._free(event, event.actor)
-        event.actor = None
-        self.book.touch(event)
+        taken_up = event.act_taken_up
+        self._free_actor(event)
         if event.state is State.CONFIRMED and event.open:
             event.attempts += taken_up
             if not self._goes_on(event, taken_up, now):
                 self._ruled(event, "escalate", "orders came to nothing", now)
                 self.book.move(event, State.ESCALATED, now)
         return []
+
+    def _free_actor(self, event: Event) -> None:
+        event.act_taken_up = False
+        self._free(event, event.actor)
+        event.actor = None
+        self.book.touch(event)
 
     def _stand_down(self, event: Event, but: str | None = None) -> list[Send]:
         """Release devices that stood by at, or were to contain, an event that no longer needs them.

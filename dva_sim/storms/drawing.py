@@ -34,6 +34,8 @@ PROFILES: Final[dict[str, tuple[str, ...]]] = {
     "none": (),
 }
 """Kinds of faults that each profile draws from."""
+SLOW_LINK = 1.0  # so much delay and more [s]; a link on which TCP sends its first segment twice
+SLOW_TIMEOUT = 12.0  # there the first answer over a new connection takes 9.1 s [s]
 
 
 def draw(seed: int, profile: str = "all") -> StormPlan:
@@ -50,6 +52,8 @@ def draw(seed: int, profile: str = "all") -> StormPlan:
         raise ConfigError(unknown("profile", profile, PROFILES))
     chance = random.Random(f"storm {seed}")
     scenario = _scenario(chance)
+    if scenario["link"]["delay_s"] >= SLOW_LINK:
+        scenario["request"]["timeout_s"] = SLOW_TIMEOUT
     counts = {kind: scenario[kind]["count"] for kind in ("robot", "guard", "operator")}
     counts["driver"] = drivers = chance.randint(1, min(3, counts["robot"]))
     kinds = PROFILES[profile]

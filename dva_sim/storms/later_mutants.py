@@ -194,8 +194,8 @@ LATER_MUTANTS: Final[dict[str, Mutant]] = {
     "reads-on": Mutant(
         "S5",
         "who may read a sensor no longer gets its values",
-        "dva_sim.agents.robot.sensors:SensorSubscriptions.end",
-        skipped(lambda self, subscriber: any(k[1] == subscriber for k in self._subscribed)),
+        "dva_sim.agents.robot.controller:RobotController.may_read",
+        afterwards(lambda self, may, device, sensor: None if may else True),
     ),
     "refusals-ignored": Mutant(
         "S5",

@@ -79,7 +79,7 @@ class StormPlan:
 
     @property
     def horizon_s(self) -> float:
-        """End of the storm, after recovery and probes [s]."""
+        """End of the storm, after recovery and probes [s]; it lasts longer where these are late."""
         return self.calm_s + RECOVERS_WITHIN + PROBES_LAST
 
     def built(self) -> Scenario:

@@ -49,6 +49,7 @@ class RecoveryProbes:
         self._open: dict[str, str] = {}
         self._used: dict[str, float] = {}
         self._session: dict[str, int] = {}
+        self._granted: dict[str, float] = {}
         self._missing, self._listed = set[str](), 0
         self._beats: dict[str, float] = {}
         self._place = m.Position(0.0, 0.0)
@@ -90,6 +91,15 @@ class RecoveryProbes:
         if source in self._beats:
             self._beats[source] = now
 
+    def due(self) -> float:
+        """Return when the last probe must have succeeded [s].
+
+        A robot that its holder kept until then is granted late: its probe takes as long as any.
+        """
+        begins = self._calm + RECOVERS_WITHIN
+        late = max((self._granted.get(who, begins) for who in self._open), default=begins)
+        return min(late, begins + PROBES_LAST) + PROBES_LAST
+
     def end(self) -> None:
         """Tell what has not recovered."""
         for device, when in self._beats.items():
@@ -97,7 +107,7 @@ class RecoveryProbes:
                 text = f"has not heard the heartbeat of {self._stage.labels[device]}"
                 text += f" for {self._clock.now - when:.0f} s"
                 self._recorder.violated("S8", self._clock.now, self._stage.labels[DVA], text)
-        after = f"{RECOVERS_WITHIN + PROBES_LAST:.0f} s after the last fault"
+        after = f"{self._clock.now - self._calm:.0f} s after the last fault"
         for who, what in self._open.items():
             label = self._stage.labels[DVA if who == LIST else who]
             missing = ", ".join(sorted(self._missing)) if who == LIST else ""
@@ -151,6 +161,7 @@ class RecoveryProbes:
         def answered(reply: m.Reply) -> None:
             if isinstance(reply.content, m.Permission):
                 self._open[robot] = "does not start for who holds it"
+                self._granted[robot] = self._clock.now
                 self._start(robot, reply.content.session)
             else:
                 again()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -50,6 +51,9 @@ class Shrinker:
 
     def shrink(self) -> StormPlan:
         """Return the smallest storm that still breaks one of the same rules."""
+        broken = [b.time for b in self.outcome.breaches if b.rule in self._wanted]
+        before = (f for f in self.plan.faults if f.at_s <= min(broken, default=math.inf))
+        self._try(self.plan.with_faults(tuple(before)))
         self._drop_faults()
         for smaller in self._simpler():
             self._try(smaller)
@@ -62,13 +66,27 @@ class Shrinker:
             return False
         self.left -= 1
         try:
-            outcome = play(plan, self._before)
+            outcome = self._play(plan)
         except ConfigError:
             return False  # nobody is left to act, for example
         if not outcome.signature & self._wanted:
             return False
         self.plan, self.outcome = plan, outcome
         return True
+
+    def _play(self, plan: StormPlan) -> StormOutcome:
+        """Play a storm until one of the rules is broken."""
+        storms = list[Storm]()
+
+        def begins(storm: Storm) -> None:
+            storms.append(storm)
+            self._before(storm)
+
+        def is_broken() -> bool:
+            broken = storms[0].recorder.broken.values()
+            return any(breach.rule in self._wanted for breach in broken)
+
+        return play(plan, begins, is_broken)
 
     def _drop_faults(self) -> None:
         """Drop halves, then quarters, down to single faults, as long as the failure remains."""

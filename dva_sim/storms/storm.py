@@ -118,11 +118,13 @@ class Storm(StormScene):
         Args:
             enough: Returns True once a broken rule need not be waited for any longer.
         """
-        began, now = time.process_time(), 0.0
-        while now < self.plan.horizon_s and not (self.recorder.broken and enough()):
-            now = min(now + 1.0, self.plan.horizon_s)
+        began, now, end = time.process_time(), 0.0, self.plan.horizon_s
+        while now < end and not (self.recorder.broken and enough()):
+            now = min(now + 1.0, end)
             self.dva.survive(now)
-        if now == self.plan.horizon_s:
+            if now == end:
+                end = self._recovery.due()
+        if now == end:
             self._recovery.end()
         self._look_at_bounds()
         return StormOutcome(

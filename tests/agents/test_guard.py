@@ -142,6 +142,16 @@ def test_the_same_order_again_is_answered_ok_and_changes_nothing(dva, guard):
     assert dva.when(1, "departed") < 12.0
 
 
+def test_a_number_that_is_given_to_another_event_makes_another_order(dva, guard):
+    """A DVA that could write nothing and was killed gives the same numbers again."""
+    dva.order(1, FAR)
+    dva.run_for(15.0)
+    assert dva.order(1, NEAR) == m.OK
+    dva.run_for(40.0)
+    assert dva.progress(1)[-3:] == ["arrived", "refuted", "done"]
+    assert at(guard) == pytest.approx(NEAR, abs=2.5)
+
+
 def test_the_newest_order_holds_even_for_who_is_at_work_at_an_event(dva, guard):
     dva.there = {"fire"}
     dva.order(1, NEAR, "contain")

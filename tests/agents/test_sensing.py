@@ -37,7 +37,13 @@ class Bench:
             "slow": SensorPort("s", lambda now: (now,), fastest=2.0),
             "lagging": SensorPort("s", self._note, lags=True),
         }
-        self.desk = SensorSubscriptions(device, ports, lambda now: round(now * 1000))
+        self.over = set[str]()  # whose permission is
+        self.desk = SensorSubscriptions(
+            device,
+            ports,
+            lambda now: round(now * 1000),
+            lambda who, sensor: who not in self.over,
+        )
         self.got: list[tuple[float, m.SensorValue]] = []
         topic = sensor_topic("time", READER)
         self.run.network.subscribe(READER, ROBOT, topic, self._hear)
@@ -68,6 +74,19 @@ def test_values_come_as_often_as_asked_for(bench):
     arrived, value = bench.got[0]
     assert (value.sensor, value.unit, value.tick) == ("time", "s", round(value.values[0] * 1000))
     assert 0.0 <= arrived - value.values[0] < 0.1
+
+
+def test_values_end_with_the_permission_however_that_has_ended(bench):
+    bench.subscribe(4.0)
+    bench.clock.run(3.0)
+    bench.over.add(READER)
+    bench.clock.run(4.0)  # one may have been on its way
+    known = len(bench.got)
+    bench.clock.run(20.0)
+    assert len(bench.got) == known > 4
+    bench.over.clear()
+    bench.clock.run(25.0)
+    assert len(bench.got) == known  # it has to subscribe again
 
 
 def test_another_frequency_takes_the_place_of_the_first(bench):

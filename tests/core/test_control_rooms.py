@@ -245,6 +245,19 @@ def test_a_guard_stands_by_and_deals_with_it_as_a_control_room_wants():
     assert office.event().state is State.CONTAINED
 
 
+def test_who_sends_another_to_deal_with_an_event_does_not_close_it_however_long_it_has_waited():
+    office = staffed(ask_first=True, rules=CONTAINING)
+    office.fire(12)
+    decide(office, m.Assign(1, ROBOT), 1.0)
+    office.finds(OPERATOR, "confirmed", 9.0)
+    decide(office, m.Assign(1, GUARD, None, "contain"), 10.0)  # who does not answer
+    seen = office.event().handling.decisions
+    late = 10.0 + CONTAINING.escalate_after + 1.0
+    reply, sends = decide(office, m.Assign(1, OTHER_GUARD, None, "contain", decisions=seen), late)
+    assert (reply.code, office.event().state) == (m.OK, State.CONFIRMED)
+    assert sends == [Send(GUARD, OVER), Send(OTHER_GUARD, order(1, task="contain"))]
+
+
 def test_where_nothing_is_contained_nobody_is_sent_to():
     office = staffed(ask_first=True)
     office.fire(12)

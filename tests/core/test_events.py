@@ -244,6 +244,16 @@ def test_of_an_event_that_there_never_was_nobody_can_tell(office):
     assert office.finds(OPERATOR, "confirmed", event=5)[0].code == m.UNKNOWN_EVENT
 
 
+@pytest.mark.parametrize(("kind", "metres"), [("gas_leak", 12), ("fire", 60)])
+def test_a_finding_of_another_event_that_had_the_number_is_refused(office, kind, metres):
+    """A DVA that could write nothing and was killed gives the same numbers again."""
+    office.fire(12)
+    found = m.EventReport(1, kind, east(metres), 0.5, 0.9, "confirmed")
+    assert office.say(OPERATOR, found, 2.0)[0].code == m.UNKNOWN_EVENT
+    assert office.event().state is State.ASSIGNED
+    assert office.finds(OPERATOR, "confirmed", 3.0)[0].code == m.OK
+
+
 def test_what_somebody_found_who_was_sent_earlier_counts_even_late(office):
     office.fire(12)
     office.progress(OPERATOR, "failed", 5.0)

@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from helpers.dva.permissions import enter
 from storms.test_storms import SMALL
 
 from dva_sim.core.handovers import STOP_WITHIN
@@ -204,3 +205,20 @@ def test_what_works_has_recovered():
 )
 def test_what_does_not_work_has_not_recovered(spoil, who):
     assert ("S8", who) in unrecovered(spoil)
+
+
+def test_a_robot_that_its_holder_keeps_for_long_is_probed_as_long_as_any_other():
+    """It is given back 5 s before the storm would end; its operator is silent, and no rival."""
+
+    def keeps(storm: Storm):
+        desk, robot = storm.run.dva.desk, storm.robots[0].id
+        for device in storm.run.stage.devices:
+            device.silent |= device.id_tag in storm.operators
+        enter(desk, robot, m.PermissionGrant(OTHER, "both", 1 << 33))
+        given_back = storm.plan.horizon_s - 5.0
+        storm.run.clock.call_at(given_back, desk.sessions.permissions.end, 1 << 33)
+
+    plan = replace(StormPlan(1, SMALL, (), 0.0), calm_s=60.0)
+    outcome = play(plan, lambda storm: storm.run.clock.call_at(90.0, keeps, storm))
+    assert ("S8", "robot-1") not in {(breach.rule, breach.who) for breach in outcome.breaches}
+    assert outcome.simulated_s > plan.horizon_s

@@ -121,7 +121,7 @@ class OperatorAgent:
         return begun + [order for _, order in self._waiting]
 
     def _on_order(self, order: m.Order) -> None:
-        if (order.event_id, order.device) in {(o.event_id, o.device) for o in self._orders}:
+        if order in self._orders:
             return  # the DVA says again what it has said before
         self._make_room(order)
         self._waiting.append((self.device.clock.now, order))

@@ -219,8 +219,7 @@ class PersonAgent:
         return m.Reply(message.message_id, m.OK, "")
 
     def _on_order(self, order: m.Order) -> None:
-        known = self.order
-        if known is not None and (known.event_id, known.device) == (order.event_id, order.device):
+        if order == self.order:
             return  # the DVA says again what it has said before
         self.order, self._arrived = order, False
         robot = self.device.label_of(order.device or "")

@@ -103,8 +103,7 @@ class GuardProtocol:
         self.errand = None
 
     def _ordered(self, order: m.Order, now: float) -> GuardDecision:
-        held = self.order
-        if held is not None and (held.event_id, held.task) == (order.event_id, order.task):
+        if order == self.order:
             return GuardDecision(m.OK, "has it already")
         return self._set_out(Errand(order.position, order), now)
 

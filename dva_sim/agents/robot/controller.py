@@ -375,8 +375,7 @@ class RobotController:
 
     def _subscription(self, message: m.Message, body: m.DevSub) -> Decision:
         """Decide on a subscription to a sensor: each one is permitted by name (S5)."""
-        grants = (self.grant, self.observers.get(message.source))
-        held = [g for g in grants if g is not None and g.holder == message.source]
+        held = self._grants_of(message.source)
         if body.sensor not in {sensor.name for sensor in self.sensors}:
             return Decision(m.UNKNOWN_SENSOR, f"no sensor of that name; {self._what_there_is()}")
         if not any(body.sensor in grant.sensors for grant in held):
@@ -406,9 +405,13 @@ class RobotController:
             return "somebody at the robot"
         return self.owner or (self.grant.holder if self.grant is not None else "nobody")
 
-    def may_read(self, device: str) -> bool:
-        """Return True if a device holds any permission to read sensors."""
-        return device in self.observers or (self.grant is not None and self.grant.holder == device)
+    def may_read(self, device: str, sensor: str) -> bool:
+        """Return True if a device holds a permission to read a sensor."""
+        return any(sensor in grant.sensors for grant in self._grants_of(device))
+
+    def _grants_of(self, device: str) -> list[m.PermissionGrant]:
+        grants = (self.grant, self.observers.get(device))
+        return [grant for grant in grants if grant is not None and grant.holder == device]
 
     def _what_there_is(self) -> str:
         names: Iterable[str] = (sensor.name for sensor in self.sensors)

@@ -158,7 +158,9 @@ class RobotAgent:
             self._happened,
         )
         self.sensors = dict(setup.sensors)
-        self._sensing = SensorSubscriptions(device, self.sensors, controller.tick)
+        self._sensing = SensorSubscriptions(
+            device, self.sensors, controller.tick, controller.may_read
+        )
         controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
         self._pattern = setup.pattern
         self._commands: Subscription | None = None
@@ -458,9 +460,6 @@ class RobotAgent:
                 return Decision(*self._sensing.subscribe(message.source, wish))
             case m.TaskAnnouncement() as announced if self.controller.free:
                 self.device.clock.call_after(0.0, self._bid, announced)
-            case m.PermissionRevocation(holder=holder):
-                if not self.controller.may_read(holder):
-                    self._sensing.end(holder)
         return decision
 
     def _bid(self, announced: m.TaskAnnouncement) -> None:

@@ -76,12 +76,18 @@ class SensorSubscriptions:
         device: The robot.
         sensors: Sensors by name.
         tick: The robot's own clock [ms], at a time [s].
+        may_read: Return True if a device may read a sensor now, by its id and the sensor's name.
     """
 
     def __init__(
-        self, device: AgentDevice, sensors: Mapping[str, SensorPort], tick: Callable[[float], int]
+        self,
+        device: AgentDevice,
+        sensors: Mapping[str, SensorPort],
+        tick: Callable[[float], int],
+        may_read: Callable[[str, str], bool],
     ) -> None:
         self._device, self._sensors, self._tick_of = device, sensors, tick
+        self._may_read = may_read
         self._subscribed: dict[tuple[str, str], _Subscribed] = {}
         self._ticking = False
 
@@ -95,7 +101,7 @@ class SensorSubscriptions:
         fastest = min(self._sensors[wish.sensor].fastest, FASTEST)
         if not SLOWEST <= wish.frequency <= fastest:
             return m.NOT_SUPPORTED, f"a value is given {SLOWEST:g} to {fastest:g} times a second"
-        self._forget_who_vanished(now)
+        self._forget(now)
         known = self._subscribed.get(key)
         if known is None and len(self._subscribed) >= MOST:
             return m.BUSY, f"{MOST} subscriptions are all that this robot serves"
@@ -107,23 +113,20 @@ class SensorSubscriptions:
             self._device.clock.every(1.0 / FASTEST, self._tick)
         return m.OK, ""
 
-    def end(self, subscriber: str) -> None:
-        """End all subscriptions of one device."""
-        for key in [key for key in self._subscribed if key[1] == subscriber]:
-            del self._subscribed[key]
-
     def end_all(self) -> None:
         """End all subscriptions, as after a restart."""
         self._subscribed.clear()
 
-    def _forget_who_vanished(self, now: float) -> None:
-        for key in [key for key, held in self._subscribed.items() if held.until < now]:
-            del self._subscribed[key]
+    def _forget(self, now: float) -> None:
+        """End subscriptions that were not renewed, or whose permission is over however it ended."""
+        for (sensor, subscriber), held in list(self._subscribed.items()):
+            if held.until < now or not self._may_read(subscriber, sensor):
+                del self._subscribed[sensor, subscriber]
 
     def _tick(self) -> bool:
         """Publish what is due. One timer for all: nobody can fill the clock with wishes."""
         now = self._device.clock.now
-        self._forget_who_vanished(now)
+        self._forget(now)
         for sensor in dict.fromkeys(sensor for sensor, _ in self._subscribed):
             if self._sensors[sensor].lags:
                 self._sensors[sensor].read(now)

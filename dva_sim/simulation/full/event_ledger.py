@@ -28,7 +28,7 @@ TOLD_WITHIN = (
     90.0  # a robot that is heard is told of the end of a session, whatever waits before [s]
 )
 HEARD_LATE = 25.0  # of a place that a device has told, over a bad link [s]
-STIRRED = 0.5  # who has moved less has not moved [m]
+STIRRED = 0.25  # who has moved less has not moved: half of the DVA's own limit [m]
 MOVED = 25.0  # an event that a robot has felt is moved to where it is seen, but no farther [m]
 FELT_LATELY = 10.0  # a value of a robot's sensor may have confirmed an event [s]
 MOST_KEPT = 1000  # reports and orders that wait for an answer, and events
@@ -143,6 +143,7 @@ class EventLedger:
         self._seen: dict[int, Seen] = {}
         self._open: dict[int, tuple[str, m.Position]] = {}
         self._promised: dict[int, None] = {}
+        self._lost: dict[int, tuple[str, m.Position, Word]] = {}
         self._now, self._was_down, self._not_kept = 0.0, False, 0.0
 
     # --- what is said --------------------------------------------------------------------
@@ -315,6 +316,8 @@ class EventLedger:
         for number in self._open.keys() - book.open.keys() - book.closed.keys():
             yield "S6", f"event {number} was open, but the DVA does not list it"
         self._promised = {n: None for n in self._promised if n in book.open}
+        for number in self._lost.keys() & book.open.keys():
+            self._find_again(book.open[number])
         known, self._open = self._open, {n: (e.kind, e.position) for n, e in book.open.items()}
         for number in known.keys() & self._open.keys():
             (kind, place), (was, before) = self._open[number], known[number]
@@ -338,8 +341,16 @@ class EventLedger:
             event, (kind, place) = book.open.get(number), self._open[number]
             if event is None or event.kind != kind or apart(event.position, place) > MOVED:
                 del self._open[number]
-                self._words.pop(number, None)
+                self._lost[number] = kind, place, self._words.pop(number, Word())
                 self._seen.pop(number, None)
+                _keep_newest(self._lost)
+
+    def _find_again(self, event: Event) -> None:
+        """Who was sent to a lost event knows the new one of its number, kind and place as well."""
+        kind, place, word = self._lost.pop(event.number)
+        if event.kind == kind and apart(event.position, place) <= MOVED:
+            new = self._word(event.number)
+            new.ordered = word.ordered | new.ordered
 
     def _fitting(self, report: m.EventReport) -> Iterator[int]:
         """Yield the numbers of the events, open or closed, that fit a report."""
@@ -432,7 +443,9 @@ class EventLedger:
     def _of_debt(self, event: Event, debt: Debt, now: float) -> Iterator[Broken]:
         """Yield somebody who has not set out, or does not move, and still has the order."""
         rules, owed = self._rules, now - debt.since
-        within = rules.still_within + HEARD_LATE if debt.step else rules.depart_within
+        # A robot that creeps may pass the DVA's limit once more from where it stood before.
+        still = 2 * rules.still_within + HEARD_LATE
+        within = still if debt.step else rules.depart_within
         if debt.who is not None and owed > within + PENDING_SLACK:
             what = "has not moved" if debt.step else "has not set out"
             yield "S6", f"event {event.number}: {self._name(debt.who)} {what} for {owed:.0f} s"

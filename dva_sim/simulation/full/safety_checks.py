@@ -199,6 +199,12 @@ class Witness:
         """Return True while somebody drives it by hand who was heard within the lease."""
         return self.hand is not None and now - self.heard <= LEASE
 
+    def hears(self, now: float) -> None:
+        """Note a message that counts; a hand that was silent for the lease has let go before."""
+        if not self.in_hand(now):
+            self.hand = None
+        self.heard = now
+
     def registers(self, registration: tuple[int, str], now: float) -> None:
         """Note a registration; one whose number goes back shows that its program has restarted.
 
@@ -462,7 +468,8 @@ class SafetyAudit:
         another = witness.owner not in (None, message.source)
         if another and _goes(motion) and not _pushed(motion, limits, now):
             yield "S2", f"changed its driver to {message.source} while moving at {_pace(motion)}"
-        witness.owner, witness.ordered, witness.heard = message.source, asked.at, now
+        witness.owner, witness.ordered = message.source, asked.at
+        witness.hears(now)
         witness.stood_before = witness.stood
         does = Doing(message.source, message.session, level)
         if does != witness.does:  # who drives, and starts once more, goes on
@@ -488,7 +495,8 @@ class SafetyAudit:
         speaker, known = witness.newest
         if speaker == (source, session) and number <= known:
             found.append(("S1", "obeys a command again, or after a newer one"))
-        witness.newest, witness.heard = ((source, session), number), command.time
+        witness.newest = (source, session), number
+        witness.hears(command.time)
         copies = witness.arrivals.pop((source, number, session), (command.arrived,))
         # Where newer commands replace those that wait, a copy replaces the one that came first.
         known_by = (when for when in copies if when <= command.arrived + ROUNDED)

@@ -166,7 +166,9 @@ class Office:
     def finds(
         self, who: str, finding: str, now: float = 0.0, event: int = 1
     ) -> tuple[m.Reply, list[Send]]:
-        return self.say(who, m.EventReport(event, "fire", east(12), 0.5, 0.9, finding), now)
+        known = self.desk.book.get(event)
+        kind, place = ("fire", east(12)) if known is None else (known.kind, known.position)
+        return self.say(who, m.EventReport(event, kind, place, 0.5, 0.9, finding), now)
 
     def progress(
         self, who: str, state: str, now: float = 0.0, event: int = 1

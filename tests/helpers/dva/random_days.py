@@ -232,7 +232,8 @@ class Walk:
         if event is not None and event.sent and self.dice.random() < 0.8:
             device = self.dice.choice(sorted(event.sent))
         finding = self.dice.choice(["confirmed", "confirmed", "refuted", "contained", "detected"])
-        return self.say(device, m.EventReport(number, "fire", self._place(), 0.5, 0.9, finding))
+        kind, place = ("fire", self._place()) if event is None else (event.kind, event.position)
+        return self.say(device, m.EventReport(number, kind, place, 0.5, 0.9, finding))
 
     def _bid(self) -> list[Send]:
         running = self.desk.dispatcher.auctions.running
@@ -400,7 +401,9 @@ class Walk:
         for state in ("departed", "arrived"):
             self._take(self.say(who, m.OrderProgress(event, state)))
         finding = "contained" if task == "contain" else "confirmed"
-        self._take(self.say(who, m.EventReport(event, "fire", east(0), 0.5, 1.0, finding)))
+        known = self.desk.book.get(event)
+        kind, place = ("fire", east(0)) if known is None else (known.kind, known.position)
+        self._take(self.say(who, m.EventReport(event, kind, place, 0.5, 1.0, finding)))
         self._take(self.say(who, m.OrderProgress(event, "done")))
 
 

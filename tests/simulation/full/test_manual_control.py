@@ -4,6 +4,7 @@ import pytest
 from helpers.dva.permissions import enter
 
 from dva_sim.agents.robot.controller import (
+    LEASE_S,
     PATIENCE,
     STAND,
     Decision,
@@ -42,11 +43,12 @@ class InHand:
             self.let(0.1)
         return codes
 
-    def asks(self, body: m.Body, session: int = 0) -> None:
-        """Somebody sends the robot a request, and it is answered."""
+    def asks(self, *bodies: m.Body, session: int = 0) -> None:
+        """Somebody sends the robot requests, and each is answered."""
         device = self.run.stage.device("operator", 9)
-        device.ask(ROBOT, body, session=session)
-        self.let(1.0)
+        for body in bodies:
+            device.ask(ROBOT, body, session=session)
+            self.let(1.0)
 
     def is_held(self) -> None:
         """The DVA gives the robot to an operator."""
@@ -97,6 +99,17 @@ def test_a_robot_that_keeps_its_holder_over_a_restart_breaks_s2(bench):
         bench.restarts_alone()
         bench.asks(m.StartTeleOp(), session=1 << 33)
     assert bench.broken == {"S2"}
+
+
+@pytest.mark.invariant("S2")
+def test_a_hand_that_was_silent_for_the_lease_has_let_go(bench):
+    bench.hand.take(HAND)
+    bench.drive(2.0)
+    bench.let(LEASE_S + 5.0)
+    bench.is_held()
+    bench.asks(m.StartTeleOp(), m.SetTeleOp(0.2, 0.0), session=1 << 33)
+    assert bench.robot.body.speed > 0.0
+    assert bench.broken == set()
 
 
 @pytest.mark.invariant("S1")
