@@ -20,6 +20,7 @@ from generators import (
     python_api,
     recordings,
     results,
+    samples,
 )
 
 PAGES: dict[str, Callable[[], str]] = {
@@ -37,6 +38,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "reference/console.md": console.page,
     "reference/protocol.md": protocol.page,
     "reference/messages.md": messages.page,
+    "reference/samples.md": samples.page,
     "reference/glossary.md": glossary.page,
 }
 """Pages by their path below docs, each with the function that returns its Markdown."""

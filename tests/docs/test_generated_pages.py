@@ -130,6 +130,11 @@ def test_every_element_of_the_schema_is_there():
     assert elements - shown - kinds == set()
 
 
+def test_every_sample_is_there():
+    files = {path.name for path in (ROOT / "protocol/samples").rglob("*.xml")}
+    assert files - set(re.findall(r"`([\w-]+\.xml)`", page("samples"))) == set()
+
+
 @pytest.mark.parametrize(
     ("element", "since"),
     [

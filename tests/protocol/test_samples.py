@@ -1,5 +1,6 @@
 """The samples and the specification, read as someone writing another implementation would."""
 
+import csv
 import re
 from contextlib import suppress
 from typing import get_args
@@ -16,9 +17,9 @@ from dva_sim.protocol.errors import ProtocolError
 PROTOCOL = ROOT / "protocol"
 VALID = sorted((PROTOCOL / "samples" / "valid").glob("*.xml"))
 INVALID = sorted((PROTOCOL / "samples" / "invalid").glob("*.xml"))
-ROW = re.compile(r"^\| `([\w-]+\.xml)` \| `(\w+)` \| (.+) \| (XML|schema|rule) \|$", re.MULTILINE)
-ROWS = ROW.findall((PROTOCOL / "samples/README.md").read_text())
-FOUND_BY = {name: by for name, _, _, by in ROWS}
+FAULTS = (PROTOCOL / "samples/invalid.csv").read_text(encoding="utf-8")
+ROWS = list(csv.DictReader(FAULTS.splitlines()))
+FOUND_BY = {row["sample"]: row["found by"] for row in ROWS}
 
 NEW = {
     "1.4": {
@@ -80,10 +81,11 @@ def test_there_is_a_valid_sample_of_every_body_and_content():
 
 def test_every_invalid_sample_is_explained():
     assert [path.name for path in INVALID] == sorted(FOUND_BY)
+    assert [row["sample"] for row in ROWS if not row["fault"]] == []
 
 
 def test_there_is_an_invalid_sample_of_every_message_and_it_is_of_that_message():
-    named = {name: element for name, element, _, _ in ROWS}
+    named = {row["sample"]: row["message"] for row in ROWS}
     assert set(named.values()) >= BODY_ELEMENTS
     misspelt = {"cancel-mission-misspelt.xml"}
     for path in INVALID:
