@@ -19,7 +19,7 @@ def read_yaml(path):
 
 
 @pytest.mark.parametrize(
-    ("page", "most"), [("CONTRIBUTING.md", 800), ("RELEASING.md", 300), ("SECURITY.md", 750)]
+    ("page", "most"), [("CONTRIBUTING.md", 700), ("RELEASING.md", 250), ("SECURITY.md", 650)]
 )
 def test_a_page_has_a_readable_length(page, most):
     assert len(TEXT[page].split()) <= most
@@ -33,9 +33,7 @@ def test_the_changelog_has_every_version_once_newest_first_and_sections_of_the_u
     kinds = set(re.findall(r"^### (.+)$", TEXT["CHANGELOG.md"], re.MULTILINE))
     assert kinds <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
     sections = TEXT["CHANGELOG.md"].split("\n## ")
-    assert (
-        max(len(section.split()) for section in sections if not section.startswith("[0.9")) <= 500
-    )
+    assert max(len(section.split()) for section in sections) <= 600
 
 
 def release_check():
