@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -9,8 +10,11 @@ from typing import Any
 from lxml import etree
 
 from dva_sim.protocol.limits import schema_file
-from generators.markdown import code, prose, table
+from generators.markdown import ROOT, code, prose, table
 from generators.markdown import page as page_of
+
+USES = ROOT / "protocol/messages.csv"
+"""Sender, receiver, meaning and manner of sending of each message, and who is obeyed."""
 
 Node = Any  # elements and comments; the stubs of lxml know elements alone
 _XS = "{http://www.w3.org/2001/XMLSchema}"
@@ -38,7 +42,8 @@ def page() -> str:
     """Return the page in Markdown."""
     schema: Node = etree.parse(str(schema_file())).getroot()
     types = {each.get("name"): each for each in schema if each.tag == f"{_XS}complexType"}
-    blocks = [_HEAD.format(version=schema.get("version"))]
+    head = ["message", "from → to", "meaning", "sent as", "obeyed"]
+    blocks = [_HEAD.format(version=schema.get("version")), "## Overview", table(head, _uses())]
     for title, names in (
         ("Kinds of messages", _KINDS),
         ("Payloads of `SimpleMsg`", _PAYLOADS),
@@ -49,6 +54,16 @@ def page() -> str:
             blocks += _section(name, types[name], schema)
     blocks += ["## Values", table(["type", "form", "since"], _values(schema))]
     return page_of("Messages", *blocks)
+
+
+def _uses() -> Iterator[list[str]]:
+    """Yield a row of the overview for each message; directions are paired in their order."""
+    with USES.open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            pairs = zip(row["from"].split("; "), row["to"].split("; "), strict=True)
+            directions = "; ".join(f"{sender} → {receiver}" for sender, receiver in pairs)
+            texts = (prose(row[name]) for name in ("meaning", "sent as", "obeyed"))
+            yield [code(row["message"]), directions, *texts]
 
 
 def names() -> set[str]:

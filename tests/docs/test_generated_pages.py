@@ -7,7 +7,8 @@ from collections import Counter
 
 import generators
 import pytest
-from generators import plugins, python_api, recordings, results
+from generators import messages, plugins, python_api, recordings, results
+from helpers.messages.message_oracle import BODY_ELEMENTS
 from helpers.paths import ROOT
 from mcap.reader import make_reader
 from typer import Context
@@ -128,6 +129,16 @@ def test_every_element_of_the_schema_is_there():
     shown = {name for cell in first_cells(text) for name in cell.split(" / ")}
     kinds = set(re.findall(r"^### (\w+)$", text, re.MULTILINE))
     assert elements - shown - kinds == set()
+
+
+def test_every_message_has_a_row_that_says_who_sends_it_to_whom_and_how():
+    bodies = BODY_ELEMENTS - {"reply"}
+    with messages.USES.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert Counter(row["message"] for row in rows) == Counter(bodies)
+    assert [row for row in rows if not all(row[k] for k in row if k != "obeyed")] == []
+    asked = [row for row in rows if not row["sent as"].startswith("publication")]
+    assert [row["message"] for row in asked if not row["obeyed"]] == []
 
 
 def test_every_sample_is_there():
