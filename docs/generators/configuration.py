@@ -182,7 +182,7 @@ class Keys:
     def _row(self, key: str, value: Schema, model: Schema) -> list[str]:
         default = "required" if key in model.get("required", ()) else _default(value)
         meaning = sentence(self._meaning(key, value))
-        return [code(key), unit_of(key), self._type(value), default, meaning]
+        return [code(key), unit_of(key), self.type_of(value), default, meaning]
 
     def _meaning(self, key: str, value: Schema) -> str:
         """Return what a key says of itself, else what its part is, else what its name means."""
@@ -199,12 +199,12 @@ class Keys:
         part = self._defs.get(str(value.get("$ref", "")).rpartition("/")[2], {})
         return dict(part.get("properties", {}))
 
-    def _type(self, value: Schema) -> str:
+    def type_of(self, value: Schema) -> str:
         """Return the type with its bounds; a part as a link to its table."""
         if "$ref" in value:
             name = value["$ref"].rpartition("/")[2]
             if "properties" not in self._defs[name]:
-                return self._type(self._defs[name])
+                return self.type_of(self._defs[name])
             return f"[{name}](#{self._page}-{name.lower()})"
         if "enum" in value:
             return ", ".join(code(each) for each in value["enum"])
@@ -214,18 +214,18 @@ class Keys:
             options = [each for each in options if each.get("type") != "null"]
             laws = [each for each in options if "law" in self._keys_of(each)]
             if len(laws) > _MANY:
-                rest = [self._type(each) for each in options if each not in laws]
+                rest = [self.type_of(each) for each in options if each not in laws]
                 first = laws[0]["$ref"].rpartition("/")[2].lower()
                 return " or ".join([*rest, f"a [law](#{self._page}-{first})"])
-            kinds = [self._type(each) for each in options]
+            kinds = [self.type_of(each) for each in options]
             return " or ".join(dict.fromkeys(kind for kind in kinds if kind))
         kind = value.get("type", "")
         if kind == "array":
             items: Schema = value.get("items") or next(iter(value.get("prefixItems", [])), {})
-            return f"list of {self._type(items)}" if items else "list"
+            return f"list of {self.type_of(items)}" if items else "list"
         if kind == "object":
             inner = value.get("additionalProperties")
-            return f"map to {self._type(inner)}" if isinstance(inner, dict) and inner else "map"
+            return f"map to {self.type_of(inner)}" if isinstance(inner, dict) and inner else "map"
         return " ".join([kind, _bounds(value)]).strip()
 
 

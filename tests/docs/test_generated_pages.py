@@ -28,6 +28,8 @@ from dva_sim.simulation.run_measures import PLUGINS as COVARIATES
 from dva_sim.simulation.scenario.assumptions import all_assumptions
 from dva_sim.testing.files import schema_text
 from dva_sim.testing.promises import TRIALS
+from dva_sim.worlds.drawn_features import KINDS
+from dva_sim.worlds.site_parts import QUALITIES
 
 
 def page(name):
@@ -83,6 +85,14 @@ def test_every_key_is_there_once_for_each_part_that_has_it(kind, name):
 def test_every_key_has_a_meaning():
     pages = "".join(map(page, ("scenario-keys", "study-keys", "profile-keys")))
     assert re.findall(r"^\| `.*\|  \|$", pages, re.MULTILINE) == []
+
+
+def test_every_kind_and_property_of_a_feature_on_a_plan_is_there():
+    text = page("plan-features")
+    found = first_cells(text)
+    assert {*KINDS, *QUALITIES} - set(found) == set()
+    named = {name for kind in KINDS.values() for name in kind.model.model_fields}
+    assert [name for name in named if f"`{name}`: " not in text] == []
 
 
 def test_every_measure_is_there():
