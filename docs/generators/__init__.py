@@ -11,6 +11,7 @@ from generators import (
     command_line,
     configuration,
     console,
+    correspondences,
     exit_codes,
     glossary,
     measures,
@@ -40,6 +41,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "reference/console.md": console.page,
     "reference/protocol.md": protocol.page,
     "reference/messages.md": messages.page,
+    "reference/correspondences.md": correspondences.page,
     "reference/samples.md": samples.page,
     "reference/glossary.md": glossary.page,
 }

@@ -7,7 +7,7 @@ from collections import Counter
 
 import generators
 import pytest
-from generators import messages, plugins, python_api, recordings, results
+from generators import correspondences, messages, plugins, python_api, recordings, results
 from helpers.messages.message_oracle import BODY_ELEMENTS
 from helpers.paths import ROOT
 from mcap.reader import make_reader
@@ -149,6 +149,16 @@ def test_every_message_has_a_row_that_says_who_sends_it_to_whom_and_how():
     assert [row for row in rows if not all(row[k] for k in row if k != "obeyed")] == []
     asked = [row for row in rows if not row["sent as"].startswith("publication")]
     assert [row["message"] for row in asked if not row["obeyed"]] == []
+
+
+def test_messages_with_counterparts_elsewhere_are_of_the_schema():
+    with correspondences.FILE.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    named = {name for row in rows for name in re.findall(r"`([A-Z]\w+)`", row["ours"])}
+    modes = {"Idle", "Mission", "Teleoperation"}
+    assert len(named) > 20
+    assert named - modes - messages.names() == set()
+    assert named - set(re.findall(r"`(\w+)`", page("correspondences"))) == set()
 
 
 def test_every_sample_is_there():
