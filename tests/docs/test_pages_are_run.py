@@ -76,7 +76,7 @@ def test_every_block_says_its_language_and_every_exception_its_reason(page):
     text = page.read_text(encoding="utf-8")
     assert len(re.findall(r"^```", text, re.MULTILINE)) == 2 * len(page_runs.blocks_of(page))
     for block in page_runs.blocks_of(page):
-        assert re.fullmatch(r"(parse, \S.*|exit \d+|add \S.*|)", block.order, re.DOTALL)
+        assert re.fullmatch(r"(parse, \S.*|exit \d+|add \S.*|copy \S+|)", block.order, re.DOTALL)
 
 
 def test_a_line_that_is_not_printed_is_found():

@@ -7,8 +7,9 @@ A page is Markdown. Its fenced blocks are taken in order:
 - `text` is what the block before printed: each line, in this order, with `...` for anything.
 
 A comment in front of a block changes that: `<!-- test: exit 4 -->` names the exit code,
-`<!-- test: add --jobs 2 -->` adds words to the command, and `<!-- test: parse, REASON -->` only
-looks whether the program has these commands and options.
+`<!-- test: add --jobs 2 -->` adds words to the command, `<!-- test: copy FILE -->` copies a file of
+the repository instead, and `<!-- test: parse, REASON -->` only looks whether the program has these
+commands and options.
 
 A command with `&` at its end runs until the page is done. The ports 5600 to 5603 of a page become
 free ones.
@@ -18,6 +19,7 @@ import ast
 import os
 import re
 import shlex
+import shutil
 import signal
 import socket
 import subprocess
@@ -136,6 +138,8 @@ class _Runner:
             path.write_text(self._with_ports(block.text), encoding="utf-8")
         elif block.is_parsed_only:
             _parse_block(block)
+        elif block.order.startswith("copy "):
+            shutil.copy(ROOT / block.order.removeprefix("copy "), self.folder)
         elif block.language in ("sh", "python"):
             self.printed = self._execute(block)
             self.everything += self.printed.text

@@ -1,4 +1,4 @@
-"""The client that the specification prints, run as it stands there against real sockets."""
+"""The clients beside the specification, run as they are against real sockets."""
 
 import re
 import shutil
@@ -24,6 +24,7 @@ from dva_sim.simulation.full.stage import Stage, id_of, team_of
 pytestmark = pytest.mark.system
 
 SPECIFICATION = ROOT / "protocol" / "README.md"
+CLIENTS = ROOT / "protocol" / "clients"
 ROBOT = id_of("robot", 1)
 
 
@@ -55,32 +56,35 @@ def live_until(clock, condition):
     clock.run(clock.now + PATIENCE_S)
 
 
-def programs_of_the_specification():
-    """The client, the control room, and others; last what the client may have besides.
+def client():
+    """The text of the operator."""
+    return (CLIENTS / "client.py").read_text()
 
-    That is what listens to the DVA's heartbeats, and what gives sockets their keys.
-    """
-    beats, lock, *others = re.findall(r"```python\n(.*?)```", SPECIFICATION.read_text(), re.DOTALL)
+
+def additions():
+    """What a client may have besides: ears for the DVA's heartbeats, and keys for its sockets."""
+    beats, lock = re.findall(r"```python\n(.*?)```", SPECIFICATION.read_text(), re.DOTALL)
     assert "def silence(" in beats
     assert "def lock(" in lock
-    return [*others, beats, lock]
+    return beats, lock
 
 
 def run(code, dva, folder):
     """Output of a program that gets the address of a DVA."""
-    program = folder / "client.py"
+    program = folder / "program.py"
     program.write_text(code)
-    client = subprocess.Popen(
+    shutil.copy(CLIENTS / "client.py", folder)
+    process = subprocess.Popen(
         [sys.executable, str(program), dva.device.address],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
     try:
-        live_until(dva.device.clock, lambda: client.poll() is not None)
+        live_until(dva.device.clock, lambda: process.poll() is not None)
     finally:
-        client.kill()
-        out, err = client.communicate()
+        process.kill()
+        out, err = process.communicate()
     return out, err
 
 
@@ -89,9 +93,7 @@ def test_the_client_of_the_specification_drives_a_robot(network, tmp_path):
     robot = field.robots[ROBOT]
     live_until(network.clock, lambda: dva.beats[ROBOT] > 0)
 
-    code = programs_of_the_specification()[0]
-    assert len(code.splitlines()) <= 30
-    out, err = run(code, dva, tmp_path)
+    out, err = run(client(), dva, tmp_path)
     assert (out.endswith("code 0\n"), err) == (True, "")
     assert robot.applied == 20
     assert robot.controller.without_tick == 20
@@ -102,8 +104,7 @@ def test_the_client_of_the_specification_drives_a_robot(network, tmp_path):
 
 @pytest.mark.parametrize("is_known", [True, False])
 def test_a_client_of_another_make_drives_with_keys_and_not_without(tmp_path, is_known):
-    code = programs_of_the_specification()
-    me = re.search(r'ME, DVA, sent = "(.*?)"', code[0])[1]
+    me = re.search(r'ME, DVA, sent = "(.*?)"', client())[1]
     scenario, folder = scenario_of(), tmp_path / "keys"
     ended = call("keys", folder, "dva", "robot-1", *team_of(scenario), *([me] if is_known else []))
     assert ended.returncode == 0, ended.stderr
@@ -116,9 +117,10 @@ def test_a_client_of_another_make_drives_with_keys_and_not_without(tmp_path, is_
     try:
         dva, field = a_dva(network, scenario)
         live_until(network.clock, lambda: dva.beats[ROBOT] > 0)
-        program = code[0].replace("def ask(", f"{code[-1]}\ndef ask(")
+        _, lock = additions()
+        program = client().replace("def ask(", f"{lock}\ndef ask(")
         for name, server in (("dva", "DVA"), ("robot", "it")):
-            locked = f"lock({name}, {str(own)!r}, {server})\n{name}.connect("
+            locked = f"lock({name}, {str(own)!r}, {server}); {name}.connect("
             program = program.replace(f"{name}.connect(", locked)
         if not is_known:
             program = program.replace("dva.connect(", "dva.rcvtimeo = 1000; dva.connect(")
@@ -136,7 +138,7 @@ def test_a_client_of_another_make_drives_with_keys_and_not_without(tmp_path, is_
 def test_the_control_room_of_the_specification_acknowledges_and_sends_as_proposed(
     network, tmp_path
 ):
-    client, control_room = programs_of_the_specification()[:2]
+    control_room = (CLIENTS / "control_room.py").read_text()
     me = re.search(r'ME = "(.*?)"', control_room)[1]
     changes = {
         "events": [{"kind": "fire", "at_s": 0, "reported": True}],
@@ -148,8 +150,7 @@ def test_the_control_room_of_the_specification_acknowledges_and_sends_as_propose
     guards = [id_of("guard", 1), id_of("guard", 2)]
     live_until(network.clock, lambda: all(dva.desk.registry.entries.get(g) for g in guards))
     live_until(network.clock, lambda: dva.desk.registry.located("Guard"))
-    code = client.partition("dva, robot =")[0] + control_room
-    out, err = run(code, dva, tmp_path)
+    out, err = run(control_room, dva, tmp_path)
     assert (out.startswith("code 0"), err) == (True, "")
     event = dva.desk.book.get(1)
     assert event.handling.acknowledged.author == me
@@ -157,23 +158,22 @@ def test_the_control_room_of_the_specification_acknowledges_and_sends_as_propose
 
 
 def test_a_client_of_another_make_hears_the_heartbeats_of_the_dva(network, tmp_path):
-    client, *_, beats, _ = programs_of_the_specification()
+    beats, _ = additions()
     dva, _ = a_dva(network, scenario_of())
     dva.start()
-    code = client.partition("dva, robot =")[0] + beats
+    code = client().partition("if __name__")[0] + beats
     code += "while True:\n    before = heard\n    if silence() < 1 and heard != before: break\n"
     code += "    time.sleep(0.01)\nprint('it is there')\n"
     assert run(code, dva, tmp_path) == ("it is there\n", "")
 
 
 def test_two_lives_of_the_client_within_a_second_differ_in_their_bytes(monkeypatch):
-    code = programs_of_the_specification()[0]
     lives = []
     for now in (1000.25, 1000.5):
         monkeypatch.setattr("time.time", lambda now=now: now)
         reported = []
         life = {}
-        exec(code.partition("dva, robot =")[0], life)
+        exec(client().partition("if __name__")[0], life)
         socket = SimpleNamespace(send_string=reported.append, recv_string=lambda: "")
         life["ask"](socket, "02:00:00:00:00:01", "<Access><GetDeviceList/></Access>")
         lives += reported

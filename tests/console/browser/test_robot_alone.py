@@ -6,7 +6,6 @@ import re
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 from helpers.console.accessibility import faults
 from helpers.paths import ROOT
@@ -18,7 +17,8 @@ from dva_sim.console.robots.robot_station import two_free_ports
 
 # The client sends no heartbeats: a robot that takes seconds for each message would lose it.
 QUICK = "--set", "robot.processing_s=0.05"
-SPECIFICATION = ROOT / "protocol" / "README.md"
+CLIENT = ROOT / "protocol" / "clients" / "client.py"
+"""The one beside the specification: ZeroMQ and text, and nothing of this program."""
 
 
 def a_dva(programs: Programs) -> str:
@@ -38,23 +38,11 @@ def a_robot(programs: Programs, visit, *words: str) -> tuple[Program, Page, str]
     return robot, page, re.findall(r"^Robot: +(\S+)", robot.said, re.MULTILINE)[0]
 
 
-def client(folder: Path) -> Path:
-    """The one in the specification: ZeroMQ and text, and nothing of this program."""
-    text = SPECIFICATION.read_text(encoding="utf-8")
-    code = re.search(r"```python\n(import re, sys, time, zmq\n.*?)```", text, re.DOTALL)
-    assert code is not None
-    file = folder / "client.py"
-    file.write_text(code[1], encoding="utf-8")
-    return file
-
-
 def state(page: Page) -> str:
     return page.get_by_role("list", name="State").locator("[aria-current]").inner_text()
 
 
-def test_a_robot_is_registered_opened_driven_by_a_strange_client_and_switched_off(
-    tmp_path, visit, programs
-):
+def test_a_robot_is_registered_opened_driven_by_a_strange_client_and_switched_off(visit, programs):
     dva = a_dva(programs)
     robot, page, address = a_robot(programs, visit)
     assert state(page) == "off"
@@ -71,7 +59,7 @@ def test_a_robot_is_registered_opened_driven_by_a_strange_client_and_switched_of
     expect(page.locator(".picture-age")).to_contain_text("old")
 
     ended = subprocess.run(
-        [sys.executable, client(tmp_path), dva], capture_output=True, text=True, timeout=PATIENCE_S
+        [sys.executable, CLIENT, dva], capture_output=True, text=True, timeout=PATIENCE_S
     )
     assert "code 0" in ended.stdout, ended.stderr
     log = page.get_by_role("table", name="Messages")
@@ -95,7 +83,7 @@ def test_a_robot_is_registered_opened_driven_by_a_strange_client_and_switched_of
 
 
 def test_a_robot_that_registers_at_once_is_driven_by_hand_and_busy_for_a_client_meanwhile(
-    tmp_path, visit, programs
+    visit, programs
 ):
     dva = a_dva(programs)
     robot, page, _ = a_robot(programs, visit, "pibot", "--dva", dva, *QUICK)
@@ -109,7 +97,7 @@ def test_a_robot_that_registers_at_once_is_driven_by_hand_and_busy_for_a_client_
     expect(page.get_by_role("region", name="Side view")).to_contain_text("100 % PWM")
     page.keyboard.up("ArrowUp")
 
-    other = subprocess.Popen([sys.executable, client(tmp_path), dva], stdout=subprocess.PIPE)
+    other = subprocess.Popen([sys.executable, CLIENT, dva], stdout=subprocess.PIPE)
     log = page.get_by_role("table", name="Messages")
     expect(log).to_contain_text("busy: driven by hand", timeout=1000 * PATIENCE_S)
     page.get_by_role("button", name="Emergency stop").click()
