@@ -62,7 +62,7 @@ def client():
 
 
 def additions():
-    """What a client may have besides: ears for the DVA's heartbeats, and keys for its sockets."""
+    """Parts that a client may add: ears for the heartbeats of the DVA, and keys for its sockets."""
     beats, lock = re.findall(r"```python\n(.*?)```", SPECIFICATION.read_text(), re.DOTALL)
     assert "def silence(" in beats
     assert "def lock(" in lock
