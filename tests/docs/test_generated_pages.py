@@ -147,7 +147,7 @@ def test_every_message_has_a_row_that_says_who_sends_it_to_whom_and_how():
         rows = list(csv.DictReader(file))
     assert Counter(row["message"] for row in rows) == Counter(bodies)
     assert [row for row in rows if not all(row[k] for k in row if k != "obeyed")] == []
-    asked = [row for row in rows if not row["sent as"].startswith("publication")]
+    asked = [row for row in rows if not row["sent as"].startswith("published")]
     assert [row["message"] for row in asked if not row["obeyed"]] == []
 
 

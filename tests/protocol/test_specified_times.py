@@ -18,7 +18,7 @@ FULL = Scenario()
 def passage(opening):
     """The row or the item of a list that begins so, on one line."""
     found = re.search(
-        rf"^(?:\| |- \*\*){re.escape(opening)}.*?(?=^\||^- |^$|\Z)", PAGE, re.M | re.S
+        rf"^(?:\| |- (?:\*\*)?){re.escape(opening)}.*?(?=^\||^- |^$|\Z)", PAGE, re.M | re.S
     )
     assert found is not None, opening
     return " ".join(found[0].split())
