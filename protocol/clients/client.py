@@ -1,11 +1,13 @@
 """Operator that uses nothing but ZeroMQ: registers, drives the first robot for two seconds, stops.
 
-Run it with the address of the DVA: `python client.py 127.0.0.1:5600`.
+Run it with the address of the DVA, and with a folder of keys if the DVA has keys:
+`python client.py 127.0.0.1:5600 keys`.
 """
 
 import re
 import sys
 import time
+from pathlib import Path
 
 import zmq
 
@@ -15,6 +17,20 @@ ME, DVA, sent = "56:2B:04:E4:56:D8", "02:00:00:00:00:01", 0
 def field(name, xml):
     """Return the text of the first element of that name."""
     return re.search(f"<{name}>(.*?)</{name}>", xml)[1]
+
+
+def key(file, name):
+    """Return a key from a certificate of ZeroMQ."""
+    certificate = Path(file).read_text(encoding="utf-8")
+    return re.search(f'{name} = "(.*?)"', certificate)[1].encode()
+
+
+def lock(socket, folder, server):
+    """Give a socket the keys of this device and of the server to which it will connect."""
+    mine = f"{folder}/secret/{ME.replace(':', '-')}.key_secret"
+    socket.curve_publickey = key(mine, "public-key")
+    socket.curve_secretkey = key(mine, "secret-key")
+    socket.curve_serverkey = key(f"{folder}/public/{server.replace(':', '-')}.key", "public-key")
 
 
 def message(to, content, session=0, kind="SimpleMsg"):
@@ -53,6 +69,8 @@ def tele_op(socket, robot, content, session):
 
 if __name__ == "__main__":
     dva, robot = (zmq.Context.instance().socket(zmq.REQ) for _ in range(2))
+    for folder in sys.argv[2:]:
+        lock(dva, folder, DVA)
     dva.connect(f"tcp://{sys.argv[1]}")
     register(dva, "client", "TeleOp")
     while not (robots := registered(dva, "Robot")):
@@ -62,6 +80,8 @@ if __name__ == "__main__":
     wish = f"<Access><PermissionRequest>{wish}</PermissionRequest></Access>"
     permission = ask(dva, DVA, wish)
     session = field("Session", permission)
+    for folder in sys.argv[2:]:
+        lock(robot, folder, it)
     robot.connect(f"tcp://{field('IpAddr', permission)}")
     while tele_op(robot, it, "<StartTeleOp/>", session) != "0":
         time.sleep(0.5)

@@ -23,7 +23,6 @@ from dva_sim.simulation.full.stage import Stage, id_of, team_of
 
 pytestmark = pytest.mark.system
 
-SPECIFICATION = ROOT / "protocol" / "README.md"
 CLIENTS = ROOT / "protocol" / "clients"
 ROBOT = id_of("robot", 1)
 
@@ -61,21 +60,13 @@ def client():
     return (CLIENTS / "client.py").read_text()
 
 
-def additions():
-    """Parts that a client may add: ears for the heartbeats of the DVA, and keys for its sockets."""
-    beats, lock = re.findall(r"```python\n(.*?)```", SPECIFICATION.read_text(), re.DOTALL)
-    assert "def silence(" in beats
-    assert "def lock(" in lock
-    return beats, lock
-
-
-def run(code, dva, folder):
+def run(code, dva, folder, *words):
     """Output of a program that gets the address of a DVA."""
     program = folder / "program.py"
     program.write_text(code)
     shutil.copy(CLIENTS / "client.py", folder)
     process = subprocess.Popen(
-        [sys.executable, str(program), dva.device.address],
+        [sys.executable, str(program), dva.device.address, *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -117,14 +108,10 @@ def test_a_client_of_another_make_drives_with_keys_and_not_without(tmp_path, is_
     try:
         dva, field = a_dva(network, scenario)
         live_until(network.clock, lambda: dva.beats[ROBOT] > 0)
-        _, lock = additions()
-        program = client().replace("def ask(", f"{lock}\ndef ask(")
-        for name, server in (("dva", "DVA"), ("robot", "it")):
-            locked = f"lock({name}, {str(own)!r}, {server}); {name}.connect("
-            program = program.replace(f"{name}.connect(", locked)
+        program = client()
         if not is_known:
             program = program.replace("dva.connect(", "dva.rcvtimeo = 1000; dva.connect(")
-        out, err = run(program, dva, tmp_path)
+        out, err = run(program, dva, tmp_path, str(own))
     finally:
         network.close()
     if is_known:
@@ -158,13 +145,15 @@ def test_the_control_room_of_the_specification_acknowledges_and_sends_as_propose
 
 
 def test_a_client_of_another_make_hears_the_heartbeats_of_the_dva(network, tmp_path):
-    beats, _ = additions()
     dva, _ = a_dva(network, scenario_of())
     dva.start()
-    code = client().partition("if __name__")[0] + beats
-    code += "while True:\n    before = heard\n    if silence() < 1 and heard != before: break\n"
-    code += "    time.sleep(0.01)\nprint('it is there')\n"
-    assert run(code, dva, tmp_path) == ("it is there\n", "")
+    code = (CLIENTS / "heartbeats.py").read_text()
+    once = code.replace("    while True:\n", "    for _ in range(4):\n")
+    assert once != code
+    out, err = run(once, dva, tmp_path)
+    silences = [float(line.split()[2]) for line in out.splitlines()]
+    assert (len(silences), err) == (4, "")
+    assert min(silences[1:]) < 0.5
 
 
 def test_two_lives_of_the_client_within_a_second_differ_in_their_bytes(monkeypatch):

@@ -1,0 +1,29 @@
+"""Listener that prints how long the DVA has been silent.
+
+Run it with the address of the DVA: `python heartbeats.py 127.0.0.1:5600`.
+"""
+
+import sys
+import time
+
+import zmq
+from client import DVA, field
+
+
+def listen(address):
+    """Return a socket that gets the heartbeats of the DVA at that address."""
+    socket = zmq.Context.instance().socket(zmq.SUB)
+    host, port = address.split(":")
+    socket.connect(f"tcp://{host}:{int(port) + 1}")
+    socket.subscribe("heartbeat|")
+    return socket
+
+
+if __name__ == "__main__":
+    beats, heard = listen(sys.argv[1]), time.monotonic()
+    while True:
+        if beats.poll(1000):
+            _, message = beats.recv_multipart()
+            if field("SourceID", message.decode()) == DVA:
+                heard = time.monotonic()
+        print(f"silent for {time.monotonic() - heard:.1f} s", flush=True)
