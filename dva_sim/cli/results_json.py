@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.compare import Comparison
 from dva_sim.experiments.analysis.compare_rows import Difference
 from dva_sim.experiments.analysis.gate_verdicts import GateVerdict
@@ -34,7 +33,7 @@ def shown(results: Results) -> Data:
         "answer": {
             "lead": reading.answer.lead,
             "notes": list(reading.answer.notes),
-            "finding": _finding(reading.finding),
+            "finding": _finding(reading),
         },
         "warnings": list(reading.warnings),
         "runs": results.runs.rows,
@@ -106,13 +105,14 @@ def compared(
     }
 
 
-def _finding(found: Finding | None) -> Data | None:
-    if found is None:
+def _finding(reading: Reading) -> Data | None:
+    found = reading.finding
+    if found is None or reading.view is None:
         return None
     numbers = zip(found.levels, found.mean, found.low, found.high, strict=True)
     keys = ("measure", "unit", "factor", "first", "second", "over")
     return {key: getattr(found, key) for key in keys} | {
-        "within": dict(found.within),
+        "within": dict(reading.view.panels[0]),
         "in_excess_of_reference": found.in_excess,
         "differences": [
             {"level": level, "mean": float(mean), "low": float(low), "high": float(high)}

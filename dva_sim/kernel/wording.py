@@ -34,6 +34,11 @@ def quantity(value: float, unit: str) -> str:
     return f"{number(value)}\N{NO-BREAK SPACE}{unit}" if unit else number(value)
 
 
+def signed(value: float, unit: str) -> str:
+    """A difference with its sign: `+4.5 s`; zero has none."""
+    return f"{'+' if value > 0 and number(value) != '0' else ''}{quantity(value, unit)}"
+
+
 def percent(share: float) -> str:
     """A share as a whole percentage; small ones keep a decimal so that they are not zero."""
     if not math.isfinite(share):

@@ -29,6 +29,23 @@ class Missed:
 
 
 @dataclass(frozen=True)
+class OtherRuns:
+    """The contrast in other runs than the answer's, at the stop the answer leads with.
+
+    Attributes:
+        low: Least mean.
+        high: Greatest mean.
+        count: Number of settings or of models.
+        turns: True if the opposite of the answer is shown in some of them.
+    """
+
+    low: float
+    high: float
+    count: int
+    turns: bool
+
+
+@dataclass(frozen=True)
 class Finding:
     """A declared contrast as measured: all that the sentences are made from.
 
@@ -52,6 +69,11 @@ class Finding:
         everywhere: Place of a contrast that has no x axis.
         failed: Runs that are missing because they failed.
         part: Part of the study that was looked at.
+        outside: Stops at which a side is extrapolated, beyond the delays people were watched at.
+        models: Difference under other models of the persons; None if no other was tried.
+        elsewhere: Difference in the other settings that were run; None without others.
+        only_model: The one model of the persons that was tried; empty if several were, or where
+            nobody drives.
     """
 
     measure: str
@@ -76,6 +98,10 @@ class Finding:
     everywhere: str = ""
     failed: int = 0
     part: str = ""
+    outside: tuple[int, ...] = ()
+    models: OtherRuns | None = None
+    elsewhere: OtherRuns | None = None
+    only_model: str = ""
 
     @property
     def unit(self) -> str:
@@ -122,7 +148,7 @@ class Answer:
     """A study's answer: its main sentence, conditions and notes.
 
     Attributes:
-        lead: The answer in two sentences.
+        lead: The answer in at most two sentences.
         depends: Conditions of the answer, by subject: `Persons`, `Measured` ...
         notes: Other findings, and facts needed to read it fairly.
     """

@@ -1,4 +1,4 @@
-"""The answer to a study's question, in sentences that claim no more than the runs support."""
+"""The answer to a study's question, in at most two sentences that claim no more than was shown."""
 
 from __future__ import annotations
 
@@ -8,74 +8,163 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.answer import Answer, Finding, too_few
+from dva_sim.experiments.analysis.answer import Answer, Finding, OtherRuns
 from dva_sim.experiments.analysis.level_phrases import at, condition, is_ordered, places
-from dva_sim.kernel.wording import capital, listing, number, percent, quantity
-from dva_sim.simulation.labels import factor_name, level_name, measure_called, measure_name
+from dva_sim.kernel.wording import capital, listing, number, percent, quantity, signed
+from dva_sim.simulation.labels import factor_name, level_name, measure_called, measure_name, named
 
 _LEAST = 0.01  # that is not printed as zero
+EXTRAPOLATED = "extrapolated"
 
 
 def answer(finding: Finding) -> Answer:
-    """Say how large the difference is, where it differs from zero, and what is ruled out."""
+    """Say which side is ahead and by how much, then where it holds and what it depends on."""
     measured = {"Measured": " ".join([_what_is_measured(finding), *_misses(finding)])}
     if not np.isfinite(finding.low).any():
         return Answer(_without_band(finding), measured)
-    return Answer(f"{_effect(finding)} {_reach(finding)}".strip(), measured)
+    first, rest = _effect(finding)
+    clauses = [*rest, *dependence(finding)]
+    second = f" {capital('; '.join(clauses))}." if clauses else ""
+    return Answer(f"{capital(first)}.{second}", measured)
 
 
-def _effect(f: Finding) -> str:
-    """`A takes 4.5 s longer than B at 1 s (95 % band 3.0 to 6.0 s).`, or that there is none."""
+def dependence(f: Finding) -> Iterator[str]:
+    """Yield what else the difference depends on: other settings, and models of the persons."""
+    if f.elsewhere is not None and not f.elsewhere.turns:
+        count = f.elsewhere.count
+        others = "the other setting" if count == 1 else f"the {count} other settings"
+        yield f"in {others} tried it is {_reaches(f, f.elsewhere)}"
+    if f.only_model:
+        yield f"only one model of the persons was tried ({f.only_model})"
+
+
+def _effect(f: Finding) -> tuple[str, list[str]]:
+    """The first sentence, and the clauses of the second that go with it."""
     where = np.flatnonzero(f.low > 0) if (f.low > 0).any() else np.flatnonzero(f.high < 0)
     if len(where):
-        return capital(f"{condition(f)}{_size(f, _telling_level(f, where))}.")
-    first, second = level_name(f.factor, f.first), level_name(f.factor, f.second)
+        return _difference(f, where)
     if f.has_too_few:
-        place = f", {condition(f, inside=True)}".removesuffix(", ")
-        few = f"{too_few(f.persons, f.cluster)} whether {first} and {second} differ"
-        return capital(f"{few}{place} (95 % {_interval_name(f)}).")
-    anywhere = f" at any {factor_name(f.over)} tried" if f.over else ""
-    return capital(
-        f"{condition(f)}no difference between {first} and {second} was found{anywhere} "
-        f"(95 % {_interval_name(f)})."
+        return _too_small(f), list(_elsewhere(f, but=f.is_open))
+    anywhere = f" at any {factor_name(f.over)} tried" if f.over else _after(f.everywhere)
+    none = f"no difference between {_first(f)} and {_second(f)} was found{anywhere}"
+    is_settled = f.holds_zero & (f.bounds > 0)
+    if not is_settled.any():
+        return f"{none}{_settings(f)}: both are equal", list(_elsewhere(f, but=f.holds_zero))
+    bound = max(float(f.bounds[is_settled].max(initial=0.0)), _LEAST)
+    excluded = f"differences above {quantity(bound, f.unit)} are excluded{_less_than_matters(f)}"
+    sure = _sure(f, f.holds_zero)
+    return f"{none}{_settings(f)}: {excluded} ({sure})", list(_elsewhere(f, but=is_settled))
+
+
+def _difference(f: Finding, where: NDArray[np.intp]) -> tuple[str, list[str]]:
+    """`A is slower than B: +4.5 s at a delay of 1 s (95 % band 3.0 to 6.0 s)`, and where."""
+    stop = _telling_level(f, where)
+    compared, there = _compared(f, f.mean[stop]), at(f, [stop])
+    beyond = f", {EXTRAPOLATED}" if stop in f.outside else ""
+    reach = [*_differs(f, where), *_elsewhere(f)]
+    if f.elsewhere is not None and f.elsewhere.turns:
+        over = f"{_reaches(f, f.elsewhere, own=f.mean[stop])}{_after(there)}"
+        first = f"{_depends(f)} on the setting: {over} over {f.elsewhere.count + 1} settings"
+        return f"{first}{beyond}", [f"{condition(f)} it is {_size(f, stop)}", *reach]
+    if f.models is not None:
+        over = f"{_reaches(f, f.models, own=f.mean[stop])}{_after(there)}{_settings(f)}"
+        who = f"{_depends(f)} on the persons" if f.models.turns else compared
+        first = f"{who}: {over} over {f.models.count + 1} models of the persons{beyond}"
+        return first, [f"with the study's own persons it is {_size(f, stop)}", *reach]
+    size = _size(f, stop, there=f"{_after(there)}{_settings(f)}", beyond=beyond)
+    return f"{compared}{_remark_on_size(f, where)}: {size}", reach
+
+
+def _depends(f: Finding) -> str:
+    return f"whether {_first(f)} or {_second(f)} is {_better(f)} depends"
+
+
+def _too_small(f: Finding) -> str:
+    """`the study is too small to tell whether A or B is faster: ...`."""
+    bound = float(f.bounds[f.is_open].max())
+    if bound >= f.widest:
+        left = f"{f.persons} {f.cluster}s exclude nothing"
+    else:
+        most = quantity(bound, f.unit)
+        left = f"with {f.persons} {f.cluster}s, up to {most} either way is possible"
+    there = _after(places(f, np.flatnonzero(f.is_open)))
+    sides = f"{_first(f)} or {_second(f)} is {_better(f)}"
+    return (
+        f"the study is too small to tell whether {sides}: {left}{there}{_settings(f)} "
+        f"({_sure(f, f.is_open)})"
     )
 
 
-def _size(f: Finding, stop: int) -> str:
-    """`A takes 4.5 s longer than B at a one-way delay of 1 s (95 % band 3.0 to 6.0 s)`.
-
-    The band of `4.5 s less` is given as `3.0 to 6.0 s`.
-    """
-    side = -1 if f.mean[stop] < 0 else 1
-    low, high = sorted((side * float(f.low[stop]), side * float(f.high[stop])))
-    ends = f"{number(low)} to {quantity(high, f.unit)}"
-    comparison = f"{_comparison(f, f.mean[stop])}{_after(at(f, [stop]))}"
-    return f"{comparison} (95 % {_interval_name(f)} {ends})"
+def _compared(f: Finding, difference: float) -> str:
+    """`A is slower than B`, or `with A the path length is higher than with B`."""
+    word = _word(f, difference)
+    if measure_called(f.measure).awaits:
+        return f"{_first(f)} is {word} than {_second(f)}"
+    return f"with {_first(f)} the {measure_name(f.measure)} is {word} than with {_second(f)}"
 
 
-def _interval_name(f: Finding) -> str:
+def _word(f: Finding, difference: float) -> str:
+    """`slower` or `faster`, `longer` or `shorter`, `higher` or `lower`."""
+    if measure_called(f.measure).awaits:
+        return "slower" if difference > 0 else "faster"
+    if f.unit == "s":
+        return "longer" if difference > 0 else "shorter"
+    return "higher" if difference > 0 else "lower"
+
+
+def _better(f: Finding) -> str:
+    return _word(f, -1.0)
+
+
+def _first(f: Finding) -> str:
+    return _side(f, f.first)
+
+
+def _second(f: Finding) -> str:
+    return _side(f, f.second)
+
+
+def _side(f: Finding, level: str | float | bool | None) -> str:
+    """The name of a level; with its factor's where it is no word of its own."""
+    return level_name(f.factor, level) if isinstance(level, str) else named(f.factor, level)
+
+
+def _size(f: Finding, stop: int, *, there: str = "", beyond: str = "") -> str:
+    """`+4.5 s at a delay of 1 s (95 % band 3.0 to 6.0 s)`."""
+    band = f"{number(float(f.low[stop]))} to {quantity(float(f.high[stop]), f.unit)}"
+    return f"{signed(float(f.mean[stop]), f.unit)}{there} (95 % {_interval(f)} {band}{beyond})"
+
+
+def _sure(f: Finding, chosen: NDArray[np.bool_]) -> str:
+    """`95 % band, extrapolated`, of the chosen stops."""
+    is_beyond = set(f.outside) & set(np.flatnonzero(chosen).tolist())
+    return f"95 % {_interval(f)}{f', {EXTRAPOLATED}' if is_beyond else ''}"
+
+
+def _interval(f: Finding) -> str:
     """A band covers several levels at once."""
     return "band" if len(f.levels) > 1 else "interval"
 
 
-def _reach(f: Finding) -> str:
-    """One sentence: where it differs from zero, and what holds elsewhere."""
-    clauses = [*_differs(f), *_elsewhere(f)]
-    return capital("; ".join(clauses)) + "." if clauses else ""
+def _reaches(f: Finding, others: OtherRuns, own: float | None = None) -> str:
+    """`+41.1 to +115 s`: the range over other runs, and the study's own mean."""
+    means = [others.low, others.high, *([] if own is None else [float(own)])]
+    if others.count == 1 and own is None:
+        return signed(others.low, f.unit)
+    return f"{signed(min(means), '')} to {signed(max(means), f.unit)}"
 
 
-def _differs(f: Finding) -> list[str]:
+def _differs(f: Finding, where: NDArray[np.intp]) -> Iterator[str]:
     """Say at which stops the contrast differs from zero, main direction first."""
-    found = [np.flatnonzero(chosen) for chosen in (f.low > 0, f.high < 0) if chosen.any()]
-    if not found:
-        return []
-    where = found[0]
-    there = "only there" if len(where) == 1 < len(f.levels) else places(f, where)
-    clauses = [f"it differs from zero{_after(there)}{_remark_on_size(f, where)}"]
-    if len(found) > 1:
-        stop = _telling_level(f, found[1])
-        clauses.append(f"it is the other way round {places(f, found[1])}: {_size(f, stop)}")
-    return clauses
+    if len(f.levels) == 1:
+        return
+    word, there = _word(f, f.mean[where[0]]), places(f, where)
+    yield f"it is {word} {'only there' if len(where) == 1 else there}"
+    other = np.flatnonzero(f.high < 0)
+    if (f.low > 0).any() and len(other):
+        stop = _telling_level(f, other)
+        peak = f" at {level_name(f.over, f.levels[stop])}" if len(other) > 1 else ""
+        yield f"it is {_word(f, -1.0)} {places(f, other)}: {_size(f, stop)}{peak}"
 
 
 def _remark_on_size(f: Finding, where: NDArray[np.intp]) -> str:
@@ -83,11 +172,16 @@ def _remark_on_size(f: Finding, where: NDArray[np.intp]) -> str:
     bound = float(np.maximum(abs(f.low[where]), abs(f.high[where])).max())
     if f.smallest_effect is None or bound >= f.smallest_effect:
         return ""
-    return f", but stays below the {_declared(f)} declared to matter"
+    return f", but by less than the {_declared(f)} that matter"
 
 
-def _elsewhere(f: Finding) -> Iterator[str]:
-    """Describe the stops where the band includes zero: equal, effect ruled out, or open."""
+def _elsewhere(f: Finding, but: NDArray[np.bool_] | None = None) -> Iterator[str]:
+    """Describe the stops where the band includes zero: equal, effect excluded, or undecided.
+
+    Args:
+        f: The finding.
+        but: Stops of which the first sentence speaks.
+    """
     is_equal = f.holds_zero & (f.bounds == 0)
     is_settled = f.holds_zero & ~is_equal & ~f.is_open
     kinds: list[tuple[NDArray[np.bool_], Callable[[float], str]]] = [
@@ -97,23 +191,25 @@ def _elsewhere(f: Finding) -> Iterator[str]:
         (~np.isfinite(f.low), lambda _: "runs are missing"),
     ]
     for chosen, clause in kinds:
-        where = np.flatnonzero(chosen)
+        where = np.flatnonzero(chosen if but is None else chosen & ~but)
         if len(where):
             yield f"{places(f, where)} {clause(float(f.bounds[where].max()))}".lstrip()
 
 
 def _ruled_out(f: Finding, bound: float) -> str:
-    matters = f", less than the {_declared(f)} declared to matter" if f.smallest_effect else ""
-    return f"any effect is below {quantity(max(bound, _LEAST), f.unit)}{matters}"
+    return f"differences above {quantity(max(bound, _LEAST), f.unit)} are excluded"
+
+
+def _less_than_matters(f: Finding) -> str:
+    """Said of a null result; where a difference that matters is left, the study is too small."""
+    return f", less than the {_declared(f)} that matter" if f.smallest_effect else ""
 
 
 def _left_open(f: Finding, bound: float) -> str:
-    """Say how large an effect could still be, or that the data rule out nothing."""
+    """Say how large an effect could still be, or that the data exclude nothing."""
     if bound >= f.widest:
-        why = f"{f.persons} {f.cluster}s rule out nothing at all, more are needed"
-    else:
-        why = f"up to {quantity(bound, f.unit)} is not ruled out, so more {f.cluster}s are needed"
-    return f"the question stays open: {why}"
+        return f"it is undecided ({f.persons} {f.cluster}s exclude nothing)"
+    return f"it is undecided (up to {quantity(bound, f.unit)} either way is possible)"
 
 
 def _declared(f: Finding) -> str:
@@ -127,12 +223,14 @@ def _without_band(f: Finding) -> str:
         return "No pair of runs is complete, so the question stays open."
     stop = int(there[-1])
     if f.persons < 2:
-        why = f"Too few {f.cluster}s to answer: an interval needs at least two, here is one."
+        why = f"The study is too small to tell: an interval needs two {f.cluster}s, here is one."
     else:
-        why = f"The difference is the same for every {f.cluster}, so that no interval can be given."
-    place = _after(at(f, [stop]))
-    seen = f"{condition(f, inside=True)}{_comparison(f, f.mean[stop])}{place}"
-    return f"{why} In the runs that were made, {seen}."
+        why = f"The difference is the same for every {f.cluster}, so no interval can be given."
+    size, place = signed(float(f.mean[stop]), f.unit), f"{_after(at(f, [stop]))}"
+    seen = f"{_compared(f, f.mean[stop])}: {size}"
+    if f.mean[stop] == 0:
+        seen = f"{_first(f)} equals {_second(f)}"
+    return f"{why} In its runs {seen}{place}{_settings(f)}."
 
 
 def _misses(f: Finding) -> list[str]:
@@ -159,6 +257,11 @@ def _after(where: str) -> str:
     return f" {where}" if where else ""
 
 
+def _settings(f: Finding) -> str:
+    """`, with phone default`: levels of the other factors; nothing without any."""
+    return f", {condition(f)}" if f.within else ""
+
+
 def _what_misses_count(f: Finding) -> str:
     if measure_called(f.measure).awaits != "confirmation":
         return "Such a run counts with what was measured until it ended."
@@ -170,17 +273,6 @@ def _what_is_measured(f: Finding) -> str:
     part = f"in part {f.part}, " if f.part else ""
     excess = f", beyond that of the {f.cluster}'s own reference run" if f.in_excess else ""
     return capital(f"{part}the {measure_name(f.measure)}{excess}.")
-
-
-def _comparison(f: Finding, difference: float) -> str:
-    first, second = level_name(f.factor, f.first), level_name(f.factor, f.second)
-    if difference == 0:
-        return f"{first} equals {second}"
-    size = quantity(abs(difference), f.unit)
-    if measure_called(f.measure).awaits:
-        return f"{first} takes {size} {'longer' if difference > 0 else 'less'} than {second}"
-    side = "above" if difference > 0 else "below"
-    return f"{first} lies {size} {side} {second}"
 
 
 def _telling_level(f: Finding, where: NDArray[np.intp]) -> int:

@@ -12,17 +12,17 @@ from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import listing
 from dva_sim.simulation.labels import absent_at_zero, factor_name, level_name, named, setting
 
+_MOST_SPACES = 2  # in a name that reads well before `of 250 ms`
+
 
 def place_of(finding: Finding, stop: int) -> str:
     """Describe one stop of a finding: `with profile default, at a one-way delay of 1 s`."""
-    return f"{condition(finding, inside=True)}{at(finding, [stop])}".removesuffix(", ")
+    return ", ".join(filter(None, (condition(finding), at(finding, [stop]))))
 
 
-def condition(f: Finding, inside: bool = False) -> str:
-    """`With profile default, `: the levels of the other factors; nothing without any."""
-    if not f.within:
-        return ""
-    return f"{'with' if inside else 'With'} {setting(f.within)}, "
+def condition(f: Finding) -> str:
+    """`with profile default`: the levels of the other factors; nothing without any."""
+    return f"with {setting(f.within)}" if f.within else ""
 
 
 def at(f: Finding, where: Sequence[int]) -> str:
@@ -33,6 +33,8 @@ def at(f: Finding, where: Sequence[int]) -> str:
         return spoken
     names = listing([level_name(f.over, f.levels[i]) for i in where])
     name = factor_name(f.over)
+    if name.count(" ") > _MOST_SPACES:
+        return f"where the {name} is {names}"
     vowel = name[0] in "aeiou" and not name.startswith("one")
     article = "" if len(where) > 1 else "an " if vowel else "a "
     of = "of " if unit_of(f.over) or is_ordered(f) else ""

@@ -89,9 +89,8 @@ def _assumptions(reading: ResultsReading, finding: Finding) -> str:
     if not effects:
         return f"{told} Which of them move such an answer: dva-sim screen {MAIN}."
     clear = [effect.key for effect in effects if effect.is_clear]
-    sure = f"clear of chance {listing(clear)}" if clear else "none of them clear of chance"
-    keys = listing([effect.key for effect in effects])
-    return f"{told} In the screening of {MAIN} the largest effects were those of {keys}; {sure}."
+    moved = f"{listing(clear)} moved" if clear else "none of them moved"
+    return f"{told} In the screening of {MAIN} {moved} the answer by more than chance."
 
 
 def _how(view: StudyView, finding: Finding) -> str:

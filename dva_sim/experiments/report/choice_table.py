@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from dva_sim.experiments.analysis.answer_sentences import EXTRAPOLATED
 from dva_sim.experiments.analysis.choice_map import ChoiceMap
 from dva_sim.experiments.analysis.run_grid import Floats
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.report.prose import note
 from dva_sim.kernel.wording import listing, quantity
-from dva_sim.simulation.labels import factor_name, level_name
+from dva_sim.simulation.labels import factor_name, level_name, named
 
 NEVER = "never done"
 
@@ -81,24 +82,49 @@ def lead_of(found: ChoiceMap) -> str:
     names = [level_name(found.choice.name, level) for level in found.choice.levels]
     best = [name for name, worse in zip(names, found.is_worse.T, strict=True) if not worse.any()]
     given = factor_name(found.given.name)
+    over = f"over {len(found.models.levels)} models of the persons{_beyond(found)}"
     if len(best) == len(names):
-        return f"Nothing differs by more than matters, on any {given} tried."
+        return f"No difference that matters was found on any {given} tried, {over}."
     if best:
-        return f"On every {given} tried, none is better than {listing(best)}."
-    order = np.argsort(found.overall, kind="stable").tolist()
-    costs = [f"{names[c]} {_cost(found, c)}" for c in order]
+        return f"Nothing is better than {listing(best)} on any {given} tried, {over}."
+    first, *rest = np.argsort(found.overall, kind="stable").tolist()
+    others = "; ".join(
+        f"{names[c]} {_cost(found, c)}, "
+        f"{level_name(found.given.name, found.given.levels[_hardest(found, c)])}"
+        for c in rest
+    )
+    where = named(found.given.name, found.given.levels[_hardest(found, first)])
     return (
-        f"Nothing is best on every {given} tried. The most that each costs beyond the best one, "
-        f"for the same {given} and persons: {'; '.join(costs)}."
+        f"No {factor_name(found.choice.name)} is best on every {given} tried; nearest to it: "
+        f"{names[first]}, at most {_cost(found, first)} behind the best one, with {where}, {over}. "
+        f"The others are behind by up to: {others}."
     )
 
 
+def _beyond(found: ChoiceMap) -> str:
+    """`, extrapolated`, for all situations or some of them."""
+    marked = [
+        level
+        for level, outside in zip(found.given.levels, found.outside, strict=True)
+        if outside.any()
+    ]
+    if not marked:
+        return ""
+    if found.is_beyond:
+        return f", {EXTRAPOLATED}"
+    names = listing([level_name(found.given.name, level) for level in marked])
+    return f", {EXTRAPOLATED} on {names}"
+
+
+def _hardest(found: ChoiceMap, choice: int) -> int:
+    """The situation in which a choice is farthest behind the best one."""
+    return int(np.argmax(found.clear_worst[:, choice]))
+
+
 def _cost(found: ChoiceMap, choice: int) -> str:
-    """`14.6 s, slow robot`."""
-    where = int(np.argmax(found.clear_worst[:, choice]))
-    is_never = found.never[where, choice]
-    cost = NEVER if is_never else quantity(float(found.overall[choice]), found.unit)
-    return f"{cost}, {level_name(found.given.name, found.given.levels[where])}"
+    """`14.6 s`: the most that a choice costs beyond the best one."""
+    is_never = found.never[_hardest(found, choice), choice]
+    return NEVER if is_never else quantity(float(found.overall[choice]), found.unit)
 
 
 def _best(found: ChoiceMap, situation: int) -> str:

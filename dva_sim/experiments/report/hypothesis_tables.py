@@ -7,11 +7,12 @@ from collections import Counter
 from collections.abc import Sequence
 
 from dva_sim.experiments.analysis.answer import too_few
+from dva_sim.experiments.analysis.answer_sentences import EXTRAPOLATED
 from dva_sim.experiments.analysis.hypothesis_tests import Compared, Judgement, Tested, Verdict
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.report.prose import note
 from dva_sim.kernel.units import unit_of
-from dva_sim.kernel.wording import number, quantity
+from dva_sim.kernel.wording import capital, number, quantity, signed
 from dva_sim.simulation.labels import level_name, measure_of, setting
 from dva_sim.statistics import LEVEL, Interval
 
@@ -59,30 +60,69 @@ def _are_few(found: Interval, smallest: float | None) -> bool:
 
 _SETTLED: dict[Verdict, str] = {
     "held": "held",
-    "did not hold": "did not hold",
-    "open": "stays open",
+    "did not hold": "was refuted",
+    "open": "is undecided",
     "not run": "was not run",
 }
+_ORDER: tuple[Verdict, ...] = ("did not hold", "open", "not run", "held")
+_MOST_TOLD = 2  # hypotheses, before the rest are only counted
 
 
-def verdict_sentences(tested: Sequence[Tested], cluster: str = "person") -> list[str]:
-    """The verdict on each hypothesis in its own words, for the top of a report."""
-    return [f"{_settled(t, cluster)}{_found(t)}" for t in tested]
+def verdict_lead(
+    tested: Sequence[Tested], cluster: str, *, is_extrapolated: bool, only_model: str
+) -> str:
+    """The verdicts on registered hypotheses in at most two sentences, refuted ones first.
+
+    Args:
+        tested: The hypotheses as they came out; at least one.
+        cluster: Unit of resampling.
+        is_extrapolated: True if any lies beyond the delays at which people were watched.
+        only_model: The one model of the persons that was tried; empty if several were.
+    """
+    ranked = sorted(tested, key=lambda claim: _ORDER.index(claim.verdict))
+    told = [t for t in ranked if t.verdict == ranked[0].verdict][:_MOST_TOLD]
+    beyond = f" ({EXTRAPOLATED})" if is_extrapolated else ""
+    first = f"{_counted(ranked)}{beyond}: {'; '.join(_told(t, cluster) for t in told)}."
+    rest = Counter(t.verdict for t in ranked)
+    del rest[ranked[0].verdict]
+    clauses = [f"{n} of the others {_SETTLED[verdict]}" for verdict, n in rest.items()]
+    if only_model:
+        clauses.append(f"only one model of the persons was tried ({only_model})")
+    return f"{first} {capital('; '.join(clauses))}." if clauses else first
 
 
-def _settled(tested: Tested, cluster: str) -> str:
-    """`Registered hypothesis waiting held: Waiting costs.`"""
-    verdict = ", ".join(filter(None, (_SETTLED[tested.verdict], _few(tested, cluster))))
-    text = (tested.hypothesis.text or _claim(tested)).strip().removesuffix(".")
-    return f"Registered hypothesis {tested.name} {verdict}: {text}."
+def _counted(ranked: Sequence[Tested]) -> str:
+    """`Both registered hypotheses held`, `1 of 3 registered hypotheses was refuted`."""
+    verdict, count = ranked[0].verdict, len(ranked)
+    same = sum(t.verdict == verdict for t in ranked)
+    if count == 1:
+        return f"The registered hypothesis {_SETTLED[verdict]}"
+    settled = _SETTLED[verdict]
+    if same > 1:
+        settled = settled.replace("was ", "were ").replace("is ", "are ")
+    some = f"{same} of {count}" if same < count else "Both" if count == 2 else f"All {count}"
+    return f"{some} registered hypotheses {settled}"
 
 
-def _found(tested: Tested) -> str:
-    """` Found: 4.0 s (3.0 to 5.0 s), claimed: above 2.0 s; p 0.003 by Holm.`, if it was run."""
+def _inside(text: str) -> str:
+    """A sentence as a clause of another: without its full stop, and small unless it is a name."""
+    clause = text.strip().removesuffix(".")
+    return clause[:1].lower() + clause[1:] if clause[1:2].islower() else clause
+
+
+def _told(tested: Tested, cluster: str) -> str:
+    """`Waiting costs (4.0 s, 95 % interval 3.0 to 5.0 s, claimed above 2.0 s)`."""
+    text = _inside(tested.hypothesis.text or _claim(tested))
     if tested.difference is None:
-        return ""
-    found = _interval(tested.difference, tested.contrast.measure)
-    return f" Found: {found}, claimed: {bound_of(tested)}; p {_p(tested.adjusted)} by Holm."
+        return text
+    found, unit = tested.difference, unit_of(tested.contrast.measure)
+    facts = [
+        f"{signed(found.mean, unit)}",
+        f"95 % interval {number(found.low)} to {quantity(found.high, unit)}",
+        f"claimed {bound_of(tested)}",
+        _few(tested, cluster),
+    ]
+    return f"{text} ({', '.join(filter(None, facts))})"
 
 
 def comparison_table(found: Judgement, cluster: str = "person") -> CellTable:

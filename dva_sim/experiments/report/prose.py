@@ -13,8 +13,10 @@ if TYPE_CHECKING:
 
 
 def caption(name: str, **facts: Any) -> str:
-    """Render a macro of `captions.txt.j2`."""
-    return _in_a_line(str(getattr(_template("captions").module, name)(**facts)))
+    """Render a macro of `captions.txt.j2`: a line that is shown, and one that is folded away."""
+    text = str(getattr(_template("captions").module, name)(**facts))
+    shown, _, folded = text.strip().partition("\n\n")
+    return "\n".join(filter(None, map(_in_a_line, (shown, folded))))
 
 
 def note(name: str, **facts: Any) -> str:

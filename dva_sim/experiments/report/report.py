@@ -68,9 +68,9 @@ if TYPE_CHECKING:
 WORDS = "Words"
 MOST_FIGURES = 7  # design: that are not folded away, the answering one among them
 _KINDS = {
-    "confirmatory": "Confirmatory: run as registered beforehand",
-    "declared": "Declared: run as its file says, not registered beforehand",
-    "exploratory": "Exploratory: no test of what it found",
+    "confirmatory": "Confirmatory: registered before the run",
+    "declared": "Declared: not registered before the run",
+    "exploratory": "Exploratory: not a test of what it found",
 }
 
 
@@ -137,15 +137,12 @@ def _claims(reading: Reading) -> Iterator[Block]:
         yield Folded("The registration, and what was run", (Printed(registered, is_words=True),))
     predictions = judge_all(reading.study, reading.view)
     if predictions:
+        if not hypotheses:
+            yield Heading("Predictions made before the run")
+        counts = Counter(p.verdict for p in predictions)
+        verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
         table = Printed(_prediction_table(predictions, reading.cluster), is_words=True)
-        title = "Predictions made before the run"
-        if hypotheses:
-            counts = Counter(p.verdict for p in predictions)
-            verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
-            yield Folded(f"{title}: {verdicts}", (table,))
-        else:
-            yield Heading(title)
-            yield table
+        yield Folded(f"Predictions made before the run: {verdicts}", (table,))
 
 
 def _whose_claims(status: Status) -> str:
@@ -197,11 +194,13 @@ def _found(reading: Reading) -> Iterator[Block]:
         yield Printed(choice_table(reading.map, part), is_words=True)
         yield Folded("What drives are like", (Printed(beside_table(reading.map, part)),))
     table = answer_table(reading)
-    if table is not None or reading.answer.notes:
+    shown: list[Block] = [Printed(table)] if table is not None else []
+    numbers = [*shown, *map(Words, reading.answer.notes)]
+    if reading.map is not None and numbers:
+        yield Folded("One pair of choices in numbers", tuple(numbers))
+    elif numbers:
         yield Heading("The answer in numbers")
-    if table is not None:
-        yield Printed(table)
-    yield from map(Words, reading.answer.notes)
+        yield from numbers
     if reading.robustness is not None:
         yield Heading("Under other models of the persons")
         for sentence in sentences(reading.robustness):
@@ -218,10 +217,14 @@ def _what_varied(reading: Reading) -> Iterator[Block]:
         f"{with_unit(k)} from {number(r['low'])} to {number(r['high'])}" for k, r in ranges.items()
     ]
     if lines:
+        names = [f"{factor_name(f.name)} ({len(f.levels)})" for f in factors]
+        names += [with_unit(name) for name in ranges]
+        levels = Words(f"{capital(_how(design, len(factors)))}: {'; '.join(lines)}.")
+        changes = tuple(f"{level}: {text}" for level, text in _treatments(reading.study))
         yield Heading("What was varied")
-        yield Words(f"{capital(_how(design, len(factors)))}: {'; '.join(lines)}.")
-    if treatments := _treatments(reading.study):
-        yield Items(tuple(f"{level}: {changes}" for level, changes in treatments))
+        yield Folded(
+            f"Levels of {listing(names)}", (levels, Items(changes)) if changes else (levels,)
+        )
 
 
 def _how(design: Mapping[str, Any], factors: int) -> str:
@@ -251,7 +254,9 @@ def _figures(reading: Reading, drawn: Sequence[Drawn]) -> Iterator[Block]:
     yield Heading("Figures")
     reads = dict.fromkeys(chain.from_iterable(figure.reads for figure in drawn))
     part = f"All are of part {reading.view.part.name} unless the title names another one."
-    yield Words(" ".join([part, *reads]))
+    yield Words(part)
+    if reads:
+        yield Folded("How to read the figures", (Words(" ".join(reads)),))
     shown = leading(drawn, MOST_FIGURES - 1)
     yield from map(FigureBlock, shown)
     if rest := [figure for figure in drawn if figure not in shown]:
@@ -306,7 +311,8 @@ def _words(blocks: Sequence[Block]) -> Iterator[Block]:
     """Glossary of the terms used in the report."""
     if terms := terms_in(texts_of(blocks)):
         yield Heading(WORDS)
-        yield Terms(tuple((term.key, term.name, f"{term.means}.") for term in terms))
+        entries = tuple((term.key, term.name, f"{term.means}.") for term in terms)
+        yield Folded(f"What {len(terms)} words in this report mean", (Terms(entries),))
 
 
 def _manifest(reading: Reading) -> Iterator[Block]:
@@ -419,6 +425,7 @@ def _template(marker: Marker) -> jinja2.Template:
         "kind": lambda block: type(block).__name__,
         "key": _key,
     }
+    environment.filters["sentences"] = _sentences
     return environment.get_template("report.html.j2")
 
 
@@ -432,6 +439,12 @@ def _explained(text: str, marker: Marker) -> Markup:
         for piece, term in marker.split(text)
     ]
     return Markup("").join(pieces)
+
+
+def _sentences(lead: str) -> tuple[str, str]:
+    """The first sentence of an answer, and the rest; the rest begins with a capital letter."""
+    first, *rest = re.split(r"(?<=[.]) (?=[A-Z])", lead, maxsplit=1)
+    return first, "".join(rest)
 
 
 def _key(text: str) -> str:

@@ -114,8 +114,16 @@ class ResultsReading:
     @cached_property
     def finding(self) -> Finding | None:
         """The declared contrast as measured; None, too, where it is withheld."""
-        found = finding_of(self.view) if self.view is not None else None
-        return replace(found, failed=len(self.results.failures)) if found is not None else None
+        view = self.view
+        if view is None or (found := finding_of(view)) is None:
+            return None
+        several = {factor.name for factor in view.part.factors if len(factor.levels) > 1}
+        return replace(
+            found,
+            failed=len(self.results.failures),
+            within={name: level for name, level in found.within.items() if name in several},
+            outside=tuple(view.stops_outside(view.panels[0], view.contrast)),
+        )
 
     @property
     def told(self) -> Finding | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from dva_sim import statistics
 from dva_sim.experiments.analysis.answer import Answer
-from dva_sim.experiments.analysis.hypothesis_tests import Judgement, judged
+from dva_sim.experiments.analysis.hypothesis_tests import Judgement, Tested, judged
 from dva_sim.experiments.analysis.run_grid import (
     RunGrid,
     Table,
@@ -24,10 +25,11 @@ from dva_sim.experiments.analysis.study_view import (
 )
 from dva_sim.experiments.analysis.support import support_of_part
 from dva_sim.experiments.report.answer_conditions import depends
+from dva_sim.experiments.report.answer_context import in_context, only_model
 from dva_sim.experiments.report.cell_table import CellTable, cell_table
 from dva_sim.experiments.report.choice_table import lead_of
 from dva_sim.experiments.report.heavy_runs import few_that_weigh
-from dva_sim.experiments.report.hypothesis_tables import verdict_sentences
+from dva_sim.experiments.report.hypothesis_tables import verdict_lead
 from dva_sim.experiments.report.results_reading import ResultsReading
 from dva_sim.experiments.report.tuning_table import tuning_warning
 from dva_sim.experiments.results.manifest import status_of
@@ -46,17 +48,33 @@ class Reading(ResultsReading):
             return Answer("No run was completed, so there is nothing to answer with.")
         if why := self.distrusted.get(self.view.part.name):
             return Answer(f"The answer is withheld: {why}. Mend it, and run the study again.")
-        found = self.page.answer(self.finding)
+        found = self.page.answer(in_context(self))
         tested = self.judgement.tested if self._confirms else []
-        verdicts = verdict_sentences(tested, self.cluster)
-        if verdicts:
+        if tested:
             rest = f"Not registered, over all levels at once: {found.lead}"
-            found = replace(found, lead=" ".join(verdicts), notes=[rest, *found.notes])
+            found = replace(found, lead=self._verdicts(tested), notes=[rest, *found.notes])
         if self.map is not None:
             found = replace(found, lead=lead_of(self.map), notes=[found.lead, *found.notes])
         weighed = [few_that_weigh(self.finding, self.view)] if self.finding is not None else []
         notes = [*found.notes, *filter(None, weighed)]
         return replace(found, depends=found.depends | depends(self), notes=notes)
+
+    def _verdicts(self, tested: Sequence[Tested]) -> str:
+        """The registered hypotheses in at most two sentences, and what they depend on."""
+        beyond = any(self._is_extrapolated(claim) for claim in tested)
+        model = only_model(self, tested[0].contrast.part)
+        return verdict_lead(tested, self.cluster, is_extrapolated=beyond, only_model=model)
+
+    def _is_extrapolated(self, claim: Tested) -> bool:
+        """True if a side of a hypothesis lies beyond the delays people were watched at."""
+        name, factor = claim.contrast.part, claim.contrast.factor
+        table, factors = layout_of(self.study, self.runs)
+        part = RunGrid(table, name, factors)
+        support = support_of_part(part, self.scenario_of(name)) if self.page.has_support else None
+        if support is None:
+            return False
+        sides = [claim.at | {factor: level} for level in claim.contrast.contrast]
+        return any(part.where(support.outside.astype(float), side).any() for side in sides)
 
     @property
     def _confirms(self) -> bool:

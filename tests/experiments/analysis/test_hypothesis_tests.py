@@ -6,7 +6,7 @@ from dva_sim.experiments.analysis.hypothesis_tests import judged
 from dva_sim.experiments.report.hypothesis_tables import (
     comparison_table,
     hypothesis_table,
-    verdict_sentences,
+    verdict_lead,
 )
 
 PLAIN = {"part": "drive", "measure": "drive_time_s", "factor": "pattern"}
@@ -67,7 +67,8 @@ def test_what_is_not_shown_is_for_want_of_persons_or_else_there_is_little(
     found = judged(
         study(comparisons={"same": same}, hypotheses=claims), synthetic_results.columns(rows)
     )
-    assert ("too few" in verdict_sentences(found.tested)[0]) == ("few" in told[0])
+    lead = verdict_lead(found.tested, "person", is_extrapolated=False, only_model="")
+    assert ("too few" in lead) == ("few" in told[0])
     cells = [hypothesis_table(found.tested).rows[0][-1], comparison_table(found).rows[0][-1]]
     assert [word for cell, word in zip(cells, told, strict=True) if word not in cell] == []
     assert [len(cell) > len("? not shown") for cell in cells] == ["few" in word for word in told]

@@ -2,7 +2,7 @@ import re
 
 import pytest
 from helpers.studies import synthetic_results
-from helpers.studies.report_text import words, words_of
+from helpers.studies.report_text import blank_pictures, visible_words, words, words_of
 from helpers.wording import unnamed
 
 from dva_sim.experiments.analysis.conditions import conditions
@@ -71,13 +71,13 @@ def text(report):
 
 
 def test_the_report_finds_the_effect_that_was_put_in(text):
-    (found,) = re.findall(r"profile default, REQ/REP takes ([\d.]+) s .{0,60}delay of 1 s", text)
+    (found,) = re.findall(r"delay of 1 s .{0,60} own persons it is \+([\d.]+) s", text)
     assert float(found) > 30
 
 
 def test_the_report_says_how_many_events_were_missed(text):
     assert re.search(r"not confirmed .{0,30} 1 s: REQ/REP \d+ %", text)
-    assert re.search(r"to 250 ms .{0,60} [\d.]+ s is not", text)
+    assert re.search(r"to 250 ms it is undecided .{0,20} [\d.]+ s either", text)
 
 
 def test_predictions_stand_beside_what_was_found(text):
@@ -129,7 +129,7 @@ def test_the_question_and_the_answer_come_before_the_evidence_and_that_before_th
         for word in (
             "REQ/REP or PUB/SUB",
             "Declared:",
-            "REQ/REP takes",
+            "Whether REQ/REP",
             "Above zero",
             "What this depends on",
             "Below:",
@@ -178,8 +178,27 @@ def test_a_registered_study_is_called_confirmatory_and_its_hypotheses_stand_besi
     assert unnamed(rest, "waits above 2.0 s", "✓ held: ") == []
     assert "waits: It waits." in text
     beside = text.index("Not registered, over all levels")
-    assert text.index("hypothesis waits held: It waits. Found:") < beside
+    assert text.index("hypothesis held: it waits (+") < beside
     assert text.index("The answer in numbers") < beside
+
+
+MOST_WORDS = 1200  # that a reader sees before unfolding anything
+
+
+def test_the_report_of_a_large_registered_study_is_read_in_minutes(tmp_path):
+    facts = synthetic_results.manifest(8, 1)
+    texts = [f"At {delay:g} s each way waiting for replies costs time." for delay in DELAYS] * 2
+    claims = {f"claim-{n}": {"text": text, "direction": "above"} for n, text in enumerate(texts)}
+    predictions = [{"text": f"Number {n}, in a sentence of its own."} for n in range(12)]
+    treatments = {"way": {f"way {n}": {"link.delay_s": 0.1 * n} for n in range(12)}}
+    facts["study"] |= {"hypotheses": claims, "predictions": predictions, "treatments": treatments}
+    facts["status"] = {"kind": "confirmatory", "why": [], "registration": None}
+    tables = {"runs": synthetic_results.drive_rows(8, 1, effect_s=30.0)}
+    tables |= {"events": synthetic_results.story_rows(8), "tracks": synthetic_results.track_rows()}
+    with blank_pictures():
+        report = write_report(synthetic_results.write(tmp_path / "r", tables, facts))
+    assert "6 registered hypotheses" in words(report)
+    assert 300 < visible_words(report) <= MOST_WORDS
 
 
 def test_every_cell_has_its_row(page):
@@ -203,7 +222,7 @@ def test_a_poor_study_is_reported_for_what_it_is(tmp_path):
     )
     facts["study"]["factors"] |= {"link.delay_s": DELAYS}
     text = words_of(synthetic_results.write(tmp_path / "r", {"runs": runs}, facts))
-    why = ("Exploratory", "command line: replications=1, robot.count=1.", "Too few persons")
+    why = ("Exploratory", "command line: replications=1, robot.count=1.", "too small")
     lost = ("missing below: 1 (robot-1 left the world)", "in 1 run of part drive", "12 of 18")
     assert unnamed(text, *why, *lost) == []
 

@@ -35,14 +35,14 @@ def test_older_results_are_loaded(older):
     for pattern, times in CONFIRMED_S.items():
         rows = results.runs.where(results.runs["pattern"] == pattern)
         assert rows["drive_time_s"] == pytest.approx(times)
-    assert "Too few persons" in results.answer.lead
+    assert "too small to tell" in results.answer.lead
 
 
 @pytest.mark.parametrize(
     ("command", "told"),
     [
         ("show .", "dva-sim 0.7.0"),
-        ("show .", "Too few persons"),
+        ("show .", "too small to tell"),
         ("show . --columns", "somebody is on scene"),
         ("replay recordings/drive-0-0-0.mcap", "dva-sim 0.7.0"),
     ],

@@ -41,3 +41,13 @@ def words_of(folder: Path, **options: Any) -> str:
     """The words of a report on results, written with blank pictures."""
     with blank_pictures():
         return words(write_report(folder, **options))
+
+
+def visible_words(report: Path) -> int:
+    """Number of words of the page that a reader sees before unfolding anything."""
+    page = re.sub(r"<(style|title)>.*?</\1>", "", report.read_text(encoding="utf-8"), flags=re.S)
+    inner = r"(?:(?!<details).)*?"
+    folded = rf"<details[^>]*>\s*(<summary>{inner}</summary>){inner}</details>"
+    while (shorter := re.sub(folded, r"\1", page, flags=re.S)) != page:
+        page = shorter
+    return len(html.unescape(re.sub(r"<[^>]+>", " ", re.sub(_INLINE, "", page))).split())

@@ -75,7 +75,7 @@ class AnswerFigure(style.ReportFigure):
         unit = f" [{finding.unit}]" if finding.unit else ""
         ax.set_ylabel(style.wrapped(f"{capital(first)} minus {second}{unit}", 34))
         title = f"{capital(first)} minus {second}: {measure_name(finding.measure)}"
-        within = condition(finding, inside=True).removesuffix(", ")
+        within = condition(finding)
         title = f"{title}, {within}" if within else title
         few = too_few(finding.persons, finding.cluster) if finding.has_too_few else ""
         words = caption("answer", finding=finding, first=first, grey=grey, few=few)
