@@ -76,7 +76,14 @@ def _difference(f: Finding, where: NDArray[np.intp]) -> tuple[str, list[str]]:
 
 
 def _depends(f: Finding) -> str:
-    return f"whether {_first(f)} or {_second(f)} is {_better(f)} depends"
+    return f"whether {_sides(f)} depends"
+
+
+def _sides(f: Finding) -> str:
+    """`A or B is faster`, or `the path length is lower with A or with B`."""
+    if _is_of_sides(f):
+        return f"{_first(f)} or {_second(f)} is {_better(f)}"
+    return f"the {measure_name(f.measure)} is {_better(f)} with {_first(f)} or with {_second(f)}"
 
 
 def _too_small(f: Finding) -> str:
@@ -88,9 +95,8 @@ def _too_small(f: Finding) -> str:
         most = quantity(bound, f.unit)
         left = f"with {f.persons} {f.cluster}s, up to {most} either way is possible"
     there = _after(places(f, np.flatnonzero(f.is_open)))
-    sides = f"{_first(f)} or {_second(f)} is {_better(f)}"
     return (
-        f"the study is too small to tell whether {sides}: {left}{there}{_settings(f)} "
+        f"the study is too small to tell whether {_sides(f)}: {left}{there}{_settings(f)} "
         f"({_sure(f, f.is_open)})"
     )
 
@@ -98,18 +104,23 @@ def _too_small(f: Finding) -> str:
 def _compared(f: Finding, difference: float) -> str:
     """`A is slower than B`, or `with A the path length is higher than with B`."""
     word = _word(f, difference)
-    if measure_called(f.measure).awaits:
+    if _is_of_sides(f):
         return f"{_first(f)} is {word} than {_second(f)}"
     return f"with {_first(f)} the {measure_name(f.measure)} is {word} than with {_second(f)}"
 
 
 def _word(f: Finding, difference: float) -> str:
     """`slower` or `faster`, `longer` or `shorter`, `higher` or `lower`."""
-    if measure_called(f.measure).awaits:
+    if _is_of_sides(f):
         return "slower" if difference > 0 else "faster"
     if f.unit == "s":
         return "longer" if difference > 0 else "shorter"
     return "higher" if difference > 0 else "lower"
+
+
+def _is_of_sides(f: Finding) -> bool:
+    """True if the sides can be called faster: their names are words, and a time is awaited."""
+    return bool(measure_called(f.measure).awaits) and isinstance(f.first, str)
 
 
 def _better(f: Finding) -> str:
@@ -230,7 +241,7 @@ def _without_band(f: Finding) -> str:
     seen = f"{_compared(f, f.mean[stop])}: {size}"
     if f.mean[stop] == 0:
         seen = f"{_first(f)} equals {_second(f)}"
-    return f"{why} In its runs {seen}{place}{_settings(f)}."
+    return f"{why} In these runs {seen}{place}{_settings(f)}."
 
 
 def _misses(f: Finding) -> list[str]:

@@ -177,6 +177,11 @@ def bound_of(tested: Tested) -> str:
     }[claim.direction]
 
 
+def verdict_of_name(tested: Tested) -> str:
+    """`✓ held: waiting`, in two lines."""
+    return f"{_VERDICTS[tested.verdict]}\n{tested.name}"
+
+
 def verdict_with_interval(tested: Tested) -> str:
     """`✓ held: 4.0 s (3.0 to 5.0 s)`."""
     if tested.difference is None:

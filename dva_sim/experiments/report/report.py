@@ -137,12 +137,13 @@ def _claims(reading: Reading) -> Iterator[Block]:
         yield Folded("The registration, and what was run", (Printed(registered, is_words=True),))
     predictions = judge_all(reading.study, reading.view)
     if predictions:
-        if not hypotheses:
-            yield Heading("Predictions made before the run")
+        title = "Predictions made before the run"
         counts = Counter(p.verdict for p in predictions)
         verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
         table = Printed(_prediction_table(predictions, reading.cluster), is_words=True)
-        yield Folded(f"Predictions made before the run: {verdicts}", (table,))
+        if not hypotheses:
+            yield Heading(title)
+        yield Folded(f"{title}: {verdicts}" if hypotheses else capital(verdicts), (table,))
 
 
 def _whose_claims(status: Status) -> str:

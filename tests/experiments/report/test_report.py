@@ -172,6 +172,8 @@ def test_a_registered_study_is_called_confirmatory_and_its_hypotheses_stand_besi
     rows = synthetic_results.drive_rows(8, 1, effect_s=30.0, missed=0.0)
     runs = [r for r in fewer(rows, [1.0]) if r["link.delay_s"] == 1.0 or r["is_reference"]]
     text = words_of(synthetic_results.write(tmp_path / "r", {"runs": runs}, facts))
+    page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
+    assert page.index('<figure id="claims"') < page.index("</section>") < page.index('id="answer"')
     assert unnamed(text, "Confirmatory:", "hash 1234567812345678", "Registered hypotheses") == []
     size, _, rest = text.partition("persons x trials ")[2].partition(" hypothesis ")
     assert size.split() == ["8", "x", "1"] * 2

@@ -11,6 +11,7 @@ from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import (
     answer_figure,
     choice_map,
+    claims,
     commands,
     delay_budget,
     distribution,
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
 SHIPPED: Final[tuple[type[ReportFigure], ...]] = (
     choice_map.ChoiceMapFigure,
+    claims.ClaimsFigure,
     answer_figure.AnswerFigure,
     distribution.Distributions,
     effect.Differences,
