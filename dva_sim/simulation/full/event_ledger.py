@@ -346,7 +346,7 @@ class EventLedger:
                 _keep_newest(self._lost)
 
     def _find_again(self, event: Event) -> None:
-        """Who was sent to a lost event knows the new one of its number, kind and place as well."""
+        """Count those sent to a lost event for a new one of its number, kind and place as well."""
         kind, place, word = self._lost.pop(event.number)
         if event.kind == kind and apart(event.position, place) <= MOVED:
             new = self._word(event.number)
