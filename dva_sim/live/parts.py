@@ -110,16 +110,16 @@ class DvaPart:
         if options.state is not None:
             memory = Store(options.state)
         self._agent = add_dva(stage, permissions, memory, keep_events=False)
-        self._agent.desk.registry.most = devices_that_fit()
+        self._agent.core.registry.most = devices_that_fit()
         trace = _trace_of("dva", stage, options)
         if trace is not None:
-            self._agent.desk = traced(self._agent.desk, trace, stage, memory)
+            self._agent.core = traced(self._agent.core, trace, stage, memory)
         if isinstance(stage.recorder, LiveRecorder):
             self._observe(stage.recorder, stage)
         self._agent.start()
         self._dispatcher = add_dispatcher(stage)
         self._stage = stage
-        book = self._agent.desk.book
+        book = self._agent.core.book
         self._scripted = options.operators == "scripted"  # who follows a script settles no event
         self._settled_before = 0 if book.open else book.total
         self._beats: dict[str, Rate] = {}
@@ -140,13 +140,13 @@ class DvaPart:
 
     def rows(self) -> list[Row]:
         """See `LivePart`: what the first so many told the DVA, who is there before who is not."""
-        known = self._agent.desk.registry.entries
+        known = self._agent.core.registry.entries
         first = islice(sorted(known, key=lambda i: known[i].silent), MOST_ROWS)
         self._beats = {i: self._beats.get(i) or Rate() for i in first}
         return [self._row(i, known[i], rate) for i, rate in self._beats.items()]
 
     def _row(self, id_tag: str, entry: DeviceEntry, beats: Rate) -> Row:
-        now, engaged = self._stage.clock.now, self._agent.desk.orders.engaged
+        now, engaged = self._stage.clock.now, self._agent.core.orders.engaged
         return {
             "label": entry.device.label,
             "type": entry.device.device_type,
@@ -163,17 +163,17 @@ class DvaPart:
 
     def settled(self) -> bool:
         """Implement `LivePart`."""
-        book = self._agent.desk.book
+        book = self._agent.core.book
         return self._scripted or (book.total > self._settled_before and not book.open)
 
     def _events(self) -> list[Event]:
         """The last that were closed, and all that are open."""
-        book = self._agent.desk.book
+        book = self._agent.core.book
         return [*book.closed.values(), *book.open.values()]
 
     def has_company(self) -> bool:
         """See `LivePart`: some device has registered."""
-        return bool(self._agent.desk.registry.entries)
+        return bool(self._agent.core.registry.entries)
 
     def finish(self) -> None:
         """See `LivePart`: nobody drives any longer by our permission."""

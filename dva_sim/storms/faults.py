@@ -397,7 +397,7 @@ def _take_over(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     others = [device for device in storm.labelled if device.startswith(DRIVERS)]
     taker = storm.device(chance.choice(sorted(others)))
     dva.revoke(robot, taker.id_tag, chance.random() < 0.5)
-    grant = dva.desk.sessions.permissions.grants.get(robot)
+    grant = dva.core.sessions.permissions.grants.get(robot)
     if grant is None or grant.holder != taker.id_tag:
         return
     session, until = grant.session, storm.now + GIVEN_BACK

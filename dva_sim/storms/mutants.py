@@ -311,13 +311,13 @@ def _says_before_keeping(original: Original, bug: Bug) -> Original:
         )
         if now - vars(self).setdefault("kept_at", now) >= 5.0:
             for event in unkept.values():
-                self.desk.book.touch(event)
+                self.core.book.touch(event)
             unkept.clear()
             self.kept_at = now
             return original(self)
-        changed = self.desk.book.changes()
+        changed = self.core.book.changes()
         for event in changed:
-            self.desk.book.touch(event)
+            self.core.book.touch(event)
             unkept[event.number] = event
         self._memory = None
         original(self)

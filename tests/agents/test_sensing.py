@@ -38,7 +38,7 @@ class Bench:
             "lagging": SensorPort("s", self._note, lags=True),
         }
         self.over = set[str]()  # whose permission is
-        self.desk = SensorSubscriptions(
+        self.sensing = SensorSubscriptions(
             device,
             ports,
             lambda now: round(now * 1000),
@@ -59,7 +59,7 @@ class Bench:
         self.got.append((self.clock.now, body))
 
     def subscribe(self, frequency: float, who: str = READER, sensor: str = "time") -> int:
-        return self.desk.subscribe(who, m.DevSub(sensor, frequency))[0]
+        return self.sensing.subscribe(who, m.DevSub(sensor, frequency))[0]
 
 
 @pytest.fixture

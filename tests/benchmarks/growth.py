@@ -177,7 +177,7 @@ def the_dva(kind: str, size: int, folder: Path) -> Costs:
 
     costs, sent = Costs(), iter(range(1, 10**9))
     kinds = ["Sensor"] * 16 + ["Guard"] * 2 + ["Robot", "TeleOp"]
-    desk = Dva(
+    core = Dva(
         POLICIES["min_eta"](),
         lambda starts, goals: (np.full((len(goals), len(starts)), 10.0),) * 2,
         Rules(),
@@ -201,23 +201,23 @@ def the_dva(kind: str, size: int, folder: Path) -> Costs:
     with costs.of("join"):
         for number in range(size):
             name = kinds[number % 20]
-            desk.handle(message(number, m.Registration(name, name, "192.168.1.9")), 0.0)
+            core.handle(message(number, m.Registration(name, name, "192.168.1.9")), 0.0)
     with costs.of("second"):
         for number in range(size):
-            desk.note(message(number, m.Heartbeat()), 1.0)
+            core.note(message(number, m.Heartbeat()), 1.0)
             if kinds[number % 20] in ("Guard", "Robot"):
-                desk.note(message(number, status(number)), 1.0)
-        desk.tick(1.0)
+                core.note(message(number, status(number)), 1.0)
+        core.tick(1.0)
     with costs.of("100 ticks"):
         for _ in range(100):
-            desk.tick(1.0)
-            desk.next_deadline()
+            core.tick(1.0)
+            core.next_deadline()
     with costs.of("10 reports"):
         for number in range(0, 200, 20):
             report = m.EventReport(None, "fire", place(97 * number), 0.5, 0.9, "detected")
-            _, sends = desk.handle(message(number, report), 1.0)
+            _, sends = core.handle(message(number, report), 1.0)
             while sends:
-                sends += desk.delivered(sends.pop(0), 1.0)
+                sends += core.delivered(sends.pop(0), 1.0)
     return costs
 
 

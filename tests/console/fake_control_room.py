@@ -13,7 +13,7 @@ UNDECIDED = {"decisions": 0, "acknowledged": None, "decided": None, "note": None
 WHO = {"robot-2": 41.0, "robot-3": 58.0, "guard-1": 74.0}  # could go, and when they would be there
 
 
-class ControlRoomDesk:
+class FakeControlRoom:
     """Part of the fake world: events that people decide on.
 
     Attributes:
@@ -26,7 +26,7 @@ class ControlRoomDesk:
     more: Line
     hostile: bool
 
-    def open_desk(self, place: str) -> Path:
+    def open_audit_log(self, place: str) -> Path:
         """Begin, with an audit log in a file or a folder; where it is."""
         self.decided: dict[int, Line] = {}
         self.raised: list[Line] = []

@@ -67,7 +67,7 @@ class FakePhone:
         }
 
 
-class PhoneDesk:
+class FakePhones:
     """Requests of phones and guards in the fake world; `FakeWorld` has the rest."""
 
     def do_phone_register(self: Any, asked: dict[str, Any]) -> str:

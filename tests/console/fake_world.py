@@ -28,9 +28,9 @@ from PIL import Image, ImageDraw
 sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parent)]
 sys.path.append(str(Path(__file__).parents[1]))
 
-from fake_control_room import ControlRoomDesk  # noqa: E402
+from fake_control_room import FakeControlRoom  # noqa: E402
 from fake_dva import FakeDva  # noqa: E402
-from fake_phones import FakePhone, PhoneDesk  # noqa: E402
+from fake_phones import FakePhone, FakePhones  # noqa: E402
 from fake_scene import LINK, MODELLED, Scene, Walker  # noqa: E402
 from helpers.console.declared_lines import checked  # noqa: E402
 
@@ -90,7 +90,7 @@ class Seat:
         }
 
 
-class FakeWorld(PhoneDesk, ControlRoomDesk):
+class FakeWorld(FakePhones, FakeControlRoom):
     """The fake itself.
 
     Args:
@@ -117,7 +117,7 @@ class FakeWorld(PhoneDesk, ControlRoomDesk):
         words += ["--no-token"] if options.no_token else []
         self.folder = tempfile.TemporaryDirectory()
         self.hostile = options.hostile
-        words += ["--audit", str(self.open_desk(options.audit or self.folder.name))]
+        words += ["--audit", str(self.open_audit_log(options.audit or self.folder.name))]
         if options.phones:
             words += ["--phones-host", "127.0.0.1", "--phones-port", "0"]
             words += ["--certificates", self.folder.name]

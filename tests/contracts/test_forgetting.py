@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 import zmq
-from helpers.dva.dispatch_desk import Office
+from helpers.dva.dispatch_office import Office
 from helpers.network.transports import DVA, PHONE, ROBOT, SocketWorld, World, small_device
 from helpers.processes.memory import needs_proc, resident_bytes
 
@@ -27,13 +27,13 @@ class Site:
     def __init__(self, world: World, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(dva_server, "TICK", BEAT)
         self.world = world
-        desk = Office().new_desk()
-        self.registry = desk.registry
+        core = Office().new_core()
+        self.registry = core.registry
         self.be_patient()
-        self.dva = DvaAgent(small_device(world, DVA), desk)
+        self.dva = DvaAgent(small_device(world, DVA), core)
         self.dva.leave_after = 0.0
         self.dva.start()
-        self.entries = desk.registry.entries
+        self.entries = core.registry.entries
         self.beating: set[str] = set()
 
     def be_patient(self) -> None:

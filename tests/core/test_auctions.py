@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from helpers.dva.dispatch_desk import (
+from helpers.dva.dispatch_office import (
     DETECTOR,
     GUARD,
     OPERATOR,
@@ -48,7 +48,7 @@ def test_the_task_goes_to_the_earliest_arrival_when_all_have_bid(office):
 def test_when_the_time_is_up_the_best_of_those_who_have_bid_gets_it(office):
     office.bids(GUARD, 30.0, 0.5)
     assert office.tick(1.9) == []
-    assert office.desk.next_deadline() == 2.0
+    assert office.core.next_deadline() == 2.0
     assert office.tick(2.0) == [Send(GUARD, AWARD)]
 
 
@@ -98,7 +98,7 @@ def test_where_nobody_bids_the_task_is_offered_again_until_its_deadline(office):
         office.tick(now)
         assert now <= 60
     assert office.event().state is State.ESCALATED
-    assert office.desk.counters["auctions"] >= 15
+    assert office.core.counters["auctions"] >= 15
 
 
 def test_a_robots_award_is_followed_by_the_order_to_its_operator(office):
@@ -143,8 +143,8 @@ def test_an_auction_ends_with_its_event(office):
     assert office.event().state is State.EXPIRED
     assert office.bids(OTHER_GUARD, 1.0, 1.1)[1] == []
     office.tick(2.0)
-    assert office.desk.dispatcher.auctions.running == {}
-    assert office.desk.next_deadline() > 2.0
+    assert office.core.dispatcher.auctions.running == {}
+    assert office.core.next_deadline() > 2.0
 
 
 def test_an_auction_whose_only_bidder_has_gone_begins_again():
@@ -156,7 +156,7 @@ def test_an_auction_whose_only_bidder_has_gone_begins_again():
     office.register(OTHER_GUARD, "Guard", 80, now=0.6)
     office.event().state = State.PENDING
     office.beat(OTHER_GUARD, now=12.0)
-    sends = office.desk.tick(12.0)
+    sends = office.core.tick(12.0)
     assert sends == [Send(OTHER_GUARD, OFFER)]
 
 
@@ -166,7 +166,7 @@ def test_without_anybody_idle_an_auction_that_is_over_is_no_deadline():
     office.fire(12)
     office.busy(GUARD)
     office.tick(2.0)
-    assert office.desk.next_deadline() > 2.0
+    assert office.core.next_deadline() > 2.0
 
 
 def test_idle_devices_only_are_asked():
@@ -200,6 +200,6 @@ def test_a_task_is_announced_once_and_not_at_all_when_it_is_given():
     office.register(OTHER_OPERATOR, "TeleOp")
     sends = office.fire(12)
     assert [type(send.body) for send in sends] == [m.TaskAnnouncement] * 2 + [m.Order]
-    assert office.desk.counters["overruled"] == 2
-    assert office.desk.dispatcher.auctions.running == {}
+    assert office.core.counters["overruled"] == 2
+    assert office.core.dispatcher.auctions.running == {}
     assert office.bids(ROBOT, 1.0, 0.5)[0].code == m.UNKNOWN_EVENT

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from helpers.dva.dispatch_desk import DETECTOR, GUARD, OPERATOR, OTHER_GUARD, ROBOT, Office, east
+from helpers.dva.dispatch_office import DETECTOR, GUARD, OPERATOR, OTHER_GUARD, ROBOT, Office, east
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import Advice, Assignment, HazardTeam, Policy, Situation
@@ -163,7 +163,7 @@ def test_an_actor_that_declines_is_replaced_and_that_was_no_attempt():
 def test_an_actor_that_falls_silent_is_replaced():
     office = two_guards()
     office.beat(OTHER_GUARD, OPERATOR, ROBOT, now=11.0)
-    assert office.desk.tick(11.0) == [Send(OTHER_GUARD, order("contain"))]
+    assert office.core.tick(11.0) == [Send(OTHER_GUARD, order("contain"))]
     assert office.event().attempts == 2
 
 
@@ -243,7 +243,7 @@ def test_who_declines_to_stand_by_takes_nothing_from_who_looks():
 
 
 def test_who_stands_by_may_do_so_for_longer_than_an_order_takes(standing_by):
-    standing_by.desk.registry.silent_after = 1e9
+    standing_by.core.registry.silent_after = 1e9
     standing_by.event().times["assigned"] = 600.0
     assert standing_by.tick(1000.0) == []
     assert standing_by.event().actor == GUARD
@@ -256,7 +256,7 @@ def test_an_event_that_needs_no_containment_needs_nobody_to_stand_by():
     office = Office(Eager())
     office.fire(12)
     office.fire(80)
-    assert all(event.actor is None for event in office.desk.book.open.values())
+    assert all(event.actor is None for event in office.core.book.open.values())
 
 
 class Everything(Policy):
@@ -268,11 +268,11 @@ class Everything(Policy):
 
 
 def test_after_a_restart_every_order_that_stands_is_said_again(standing_by):
-    again = standing_by.desk.orders.again()
+    again = standing_by.core.orders.again()
     assert [(s.to, s.body.task) for s in again] == [(OPERATOR, "confirm"), (GUARD, "stand_by")]
     standing_by.finds(OPERATOR, "confirmed", 30.0)
     standing_by.progress(OPERATOR, "done", 31.0)
-    assert standing_by.desk.orders.again() == [Send(GUARD, order("contain"))]
+    assert standing_by.core.orders.again() == [Send(GUARD, order("contain"))]
 
 
 def test_a_detector_is_never_asked_to_do_anything(standing_by):

@@ -1,7 +1,7 @@
 """Control rooms: who may decide what, who wins, and what the rules hold whatever is decided."""
 
 import pytest
-from helpers.dva.dispatch_desk import (
+from helpers.dva.dispatch_office import (
     DVA,
     GUARD,
     OPERATOR,
@@ -31,7 +31,7 @@ def staffed(role: str = "dispatch", ask_first: bool = False, rules: Rules = RULE
     """Two control rooms are there: the first of this role, the other of role dispatch."""
     roles = {ROOM: role, OTHER_ROOM: "dispatch"}
     office = Office(rules=rules, roles=roles, ask_first=ask_first)
-    office.desk.sessions.permissions.own = DVA
+    office.core.sessions.permissions.own = DVA
     for room in (ROOM, OTHER_ROOM):
         office.register(room, "ControlRoom")
     office.register(OTHER_GUARD, "Guard", at=40.0)
@@ -50,7 +50,7 @@ def decide(
 
 def facts(office: Office) -> list[Fact]:
     """Decisions since the last call; each can be sent."""
-    taken = office.desk.trail.take()
+    taken = office.core.trail.take()
     for fact in taken:
         record = m.Message(DVA, 1, DVA, "12:00:00", 0, fact.record())
         assert decode(encode(record)) == record
@@ -283,7 +283,7 @@ def test_from_each_stage_an_event_is_ended_once_and_who_was_sent_hears_it(body, 
     assert office.event().state == stage
     _, sends = decide(office, body, 6.0)
     assert office.event().state is state
-    assert sum(office.desk.book.counts.values()) == office.desk.book.total == 1
+    assert sum(office.core.book.counts.values()) == office.core.book.total == 1
     kinds = {send.to for send in sends if send.body == OVER}
     assert kinds == {"pending": set(), "confirmed": {GUARD}}.get(stage, {OPERATOR})
     reply, sends = decide(office, m.Assign(1, GUARD), 8.0, OTHER_ROOM)
@@ -378,7 +378,7 @@ def test_what_nobody_has_decided_in_time_is_done_as_proposed():
     office = staffed(ask_first=True)
     office.fire(12, now=1.0)
     assert office.tick(60.0) == []
-    assert office.desk.next_deadline() <= 61.0
+    assert office.core.next_deadline() <= 61.0
     assert office.tick(61.0) == [Send(OPERATOR, order(1, ROBOT))]
     (fact,) = facts(office)
     assert (fact.author, fact.role, unnamed(fact.cause, "60 s")) == (DVA, None, [])
@@ -388,7 +388,7 @@ def test_a_question_does_not_wait_longer_because_another_is_proposed():
     office = staffed(ask_first=True)
     office.fire(12, now=1.0)
     office.silence(ROBOT, 30.0)
-    office.beat(*(d for d in office.desk.registry.entries if d != ROBOT), now=60.9)
+    office.beat(*(d for d in office.core.registry.entries if d != ROBOT), now=60.9)
     assert office.tick(61.0, alive=False) == [Send(GUARD, order(1))]
 
 

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from helpers.dva.dispatch_desk import (
+from helpers.dva.dispatch_office import (
     DETECTOR,
     GUARD,
     OPERATOR,
@@ -77,8 +77,8 @@ def test_the_newest_is_the_one_detected_last_even_if_an_older_one_waits_again():
     office.fire(40)
     office.busy(OPERATOR)  # it is kept from taking anything else
     office.idle(OPERATOR)
-    office.desk.orders.engaged.begin(OPERATOR, office.event(1))
-    office.desk.registry.entries[OPERATOR].free_from = 100.0
+    office.core.orders.engaged.begin(OPERATOR, office.event(1))
+    office.core.registry.entries[OPERATOR].free_from = 100.0
     office.progress(OPERATOR, "failed", 5.0)
     assert (state(office, 1), state(office, 2)) == (State.PENDING, State.ESCALATED)
 
@@ -106,7 +106,7 @@ def test_who_declines_an_order_is_not_asked_again_for_10_s(office):
     order = office.fire(12)[0]
     office.no([order], 1.0)
     assert office.tick(10.9) == []
-    assert office.desk.next_deadline() == pytest.approx(11.0)
+    assert office.core.next_deadline() == pytest.approx(11.0)
     assert [send.to for send in office.tick(11.0)] == [OPERATOR]
 
 
@@ -145,7 +145,7 @@ def test_fakes_that_never_answer_cannot_keep_an_event_from_its_deadline(office):
         now += 11.0
         fake = office.event().responder
         office.beat(*({GUARD, OTHER_GUARD, ROBOT, OPERATOR} - {fake}), now=now)
-        office.desk.tick(now)
+        office.core.tick(now)
         assert fake is not None
         office.register(fake, TEAM.get(fake, "Guard"), 5, now)
         assert now < 80
@@ -159,7 +159,7 @@ def test_a_fake_that_says_it_declines_cannot_keep_an_event_from_its_deadline(off
     for now in range(1, 80):
         office.beat(now=now)
         office.progress(GUARD, "declined", now)
-        office.desk.tick(now)
+        office.core.tick(now)
     assert state(office) is State.ESCALATED
 
 
@@ -171,7 +171,7 @@ def test_fakes_that_take_every_order_up_and_vanish_end_at_the_fourth_attempt(off
         office.ok(orders, now)
         now += 11.0
         office.beat(ROBOT, OPERATOR, now=now)
-        office.desk.tick(now)
+        office.core.tick(now)
         office.register(GUARD, "Guard", 0, now)
         orders = office.tick(now)
     assert (state(office), office.event().attempts) == (State.ESCALATED, 4)
@@ -198,7 +198,7 @@ def test_news_of_an_order_that_is_another_responders_by_now_takes_nothing_from_i
     late = office.fire(12)
     assert late[0].to == OPERATOR
     office.beat(GUARD, ROBOT, now=10.5)
-    orders = [send for send in office.desk.tick(11.0) if isinstance(send.body, m.Order)]
+    orders = [send for send in office.core.tick(11.0) if isinstance(send.body, m.Order)]
     assert [order.to for order in orders] == [GUARD]
     office.no(late, 27.0)
     assert state(office) is State.ASSIGNED
@@ -243,7 +243,7 @@ def test_who_has_not_settled_an_event_after_900_s_gives_it_back_and_is_told(offi
     sends = office.tick(900.0)
     assert sends[0] == Send(OPERATOR, m.OrderProgress(1, "done"))
     assert [send.to for send in sends] == [OPERATOR, GUARD]
-    assert office.desk.counters["order took too long"] == 1
+    assert office.core.counters["order took too long"] == 1
 
 
 @pytest.mark.parametrize("finding", ["confirmed", "refuted"])
@@ -276,7 +276,7 @@ def test_without_a_limit_an_order_stands_for_ever_and_pauses_are_forgotten_all_t
     office.ok(orders, 11.0)
     office.tick(1e6)
     assert state(office) is State.ASSIGNED
-    assert office.desk.orders._pauses == []
+    assert office.core.orders._pauses == []
 
 
 def test_a_robot_cannot_give_back_what_its_operator_was_ordered(office):
@@ -296,20 +296,20 @@ def test_who_has_no_order_or_another_cannot_say_how_one_stands(office):
 # --- when the next tick is due -------------------------------------------------------------
 
 
-def test_a_desk_that_knows_nobody_has_no_deadline():
-    assert Office().new_desk().next_deadline() == math.inf
+def test_a_core_that_knows_nobody_has_no_deadline():
+    assert Office().new_core().next_deadline() == math.inf
 
 
 def test_the_next_deadline_is_that_of_silence_of_a_wait_or_of_an_order(office):
-    desk = office.desk
-    assert desk.next_deadline() == pytest.approx(10.0)
-    desk.registry.silent_after = 1e9
-    assert desk.next_deadline() == pytest.approx(1e9)
+    core = office.core
+    assert core.next_deadline() == pytest.approx(10.0)
+    core.registry.silent_after = 1e9
+    assert core.next_deadline() == pytest.approx(1e9)
     office.fire(12, now=5.0)
-    assert desk.next_deadline() == 905.0
+    assert core.next_deadline() == 905.0
     office.busy(GUARD)
     office.fire(90, now=7.0)
-    assert desk.next_deadline() == 67.0
+    assert core.next_deadline() == 67.0
 
 
 def test_after_each_tick_the_next_deadline_lies_ahead(office):
@@ -317,8 +317,8 @@ def test_after_each_tick_the_next_deadline_lies_ahead(office):
     office.no(office.fire(12), 1.0)
     office.fire(90, now=2.0)
     ticks = 0
-    while (due := office.desk.next_deadline()) < math.inf:
-        office.desk.tick(due)
-        assert office.desk.next_deadline() > due
+    while (due := office.core.next_deadline()) < math.inf:
+        office.core.tick(due)
+        assert office.core.next_deadline() > due
         ticks += 1
     assert ticks < 10

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.dva.dispatch_desk import (
+from helpers.dva.dispatch_office import (
     DETECTOR,
     GUARD,
     OPERATOR,
@@ -73,7 +73,7 @@ def test_who_has_not_told_where_it_is_is_sent_nowhere():
 def test_a_silent_device_is_sent_nowhere():
     office = Office()
     office.beat(DETECTOR, OPERATOR, ROBOT, now=11.0)
-    office.desk.tick(11.0)
+    office.core.tick(11.0)
     office.busy(ROBOT)
     assert office.fire(12, now=11.0) == []
 
@@ -120,14 +120,14 @@ def everything(situation: Situation) -> list[Advice]:
     return [Assignment(t, r) for t in every for r in range(len(situation.responders))]
 
 
-def test_the_desk_enforces_the_rules_whatever_a_policy_returns():
+def test_the_core_enforces_the_rules_whatever_a_policy_returns():
     office = Office(Advising(everything))
     office.fire(12)
     office.fire(12, kind="gas_leak")
     office.fire(12, kind="flood")
-    held = [e.responder for e in office.desk.book.in_state(State.ASSIGNED)]
+    held = [e.responder for e in office.core.book.in_state(State.ASSIGNED)]
     assert len(held) == len(set(held)) == 2
-    counts = office.desk.book.counts
+    counts = office.core.book.counts
     assert (counts[State.ASSIGNED], counts[State.PENDING]) == (2, 1)
 
 
@@ -142,17 +142,17 @@ def test_the_desk_enforces_the_rules_whatever_a_policy_returns():
 def test_what_the_rules_do_not_allow_is_overruled_and_counted(advice, taken):
     office = advised(*advice)
     assert len(office.fire(12)) == taken
-    assert office.desk.counters["overruled"] == 1
-    assert office.desk.counters["policy failed"] == 0
+    assert office.core.counters["overruled"] == 1
+    assert office.core.counters["policy failed"] == 0
 
 
 def test_more_robots_than_operators_are_overruled():
     office = Office(Advising(lambda s: [Assignment(t, t + 1) for t in range(len(s.tasks))]))
     office.register(OTHER_ROBOT, "Robot", 10)
-    office.desk.book.add("fire", east(12), 0.5, 0.0)
-    office.desk.book.add("flood", east(50), 0.5, 0.0)
+    office.core.book.add("fire", east(12), 0.5, 0.0)
+    office.core.book.add("flood", east(50), 0.5, 0.0)
     assert [send.to for send in office.tick(1.0)] == [OPERATOR]
-    assert office.desk.counters["overruled"] == 1
+    assert office.core.counters["overruled"] == 1
 
 
 def test_nobody_is_sent_where_there_is_no_way():
@@ -161,9 +161,9 @@ def test_nobody_is_sent_where_there_is_no_way():
         return np.full_like(distance, np.inf), np.full_like(eta, np.inf)
 
     office = Office(Advising(everything))
-    office.desk.dispatcher.situations.travel = walled
+    office.core.dispatcher.situations.travel = walled
     assert office.fire(12) == []
-    assert office.desk.counters["overruled"] == 2
+    assert office.core.counters["overruled"] == 2
 
 
 # --- policies that fail --------------------------------------------------------------------
@@ -211,14 +211,14 @@ def mutates(situation: Situation) -> Any:
 def test_a_policy_that_fails_is_counted_and_the_earliest_arrival_goes(advice):
     office = Office(Advising(advice))
     assert [send.to for send in office.fire(12)] == [OPERATOR]
-    assert office.desk.counters["policy failed"] == 1
-    assert office.desk.dispatcher.last_failure
+    assert office.core.counters["policy failed"] == 1
+    assert office.core.dispatcher.last_failure
 
 
 def test_indices_of_numpy_are_as_good_as_any():
     office = Office(Advising(lambda s: [Assignment(np.int64(0), np.uint8(0))]))
     assert [send.to for send in office.fire(12)] == [GUARD]
-    assert office.desk.counters["policy failed"] == 0
+    assert office.core.counters["policy failed"] == 0
 
 
 @pytest.mark.parametrize("name", ["distance", "eta", "preference", "bids"])
@@ -238,7 +238,7 @@ def test_what_is_known_of_the_place_a_policy_cannot_change():
     ground = SiteKnowledge(None, (WaitingPlace("post", east(0)),), np.ones((1, 2)), np.full(2, 0.5))
     office = Office(Advising(spoil, relocates=True), ground=ground)
     office.tick(1.0)
-    assert office.desk.counters["policy failed"] == 1
+    assert office.core.counters["policy failed"] == 1
     assert ground.reach.tolist() == [[1.0, 1.0]]
 
 
@@ -246,7 +246,7 @@ def test_a_map_that_hands_out_its_own_tables_keeps_them():
     table = np.zeros((1, 3)), np.ones((1, 3))
     office = Office(rules=Rules(containment=True))
     office.register(OTHER_GUARD, "Guard", 80)
-    office.desk.dispatcher.situations.travel = lambda starts, goals: tuple(
+    office.core.dispatcher.situations.travel = lambda starts, goals: tuple(
         t[:, : len(starts)] for t in table
     )
     office.fire(12)

@@ -1,7 +1,7 @@
 """The book of events: reports become events, each in one state, its times in order."""
 
 import pytest
-from helpers.dva.dispatch_desk import (
+from helpers.dva.dispatch_office import (
     DETECTOR,
     GUARD,
     HERE,
@@ -40,14 +40,14 @@ def test_reports_of_one_kind_within_8_metres_are_one_event(office):
     office.fire(19.9)
     office.fire(20.1)
     office.fire(12, kind="gas_leak")
-    assert {e.number: e.reports for e in office.desk.book.open.values()} == {1: 2, 2: 1, 3: 1}
+    assert {e.number: e.reports for e in office.core.book.open.values()} == {1: 2, 2: 1, 3: 1}
 
 
 def test_where_reports_are_not_merged_each_is_an_event():
     office = Office(rules=Rules(merge_distance=0.0))
     office.fire(12)
     office.fire(12)
-    assert office.desk.book.total == 2
+    assert office.core.book.total == 2
 
 
 def test_an_event_that_is_over_takes_no_more_reports(office):
@@ -95,7 +95,7 @@ def test_when_the_book_is_full_a_report_is_answered_busy_and_one_of_a_known_even
     assert office.say(DETECTOR, new)[0].code == m.BUSY
     known = m.EventReport(None, "fire", east(12), 0.5, 0.9, "detected")
     assert office.say(DETECTOR, known)[0].code == m.OK
-    assert office.desk.book.total == 1
+    assert office.core.book.total == 1
 
 
 # --- withdrawal ----------------------------------------------------------------------------
@@ -107,7 +107,7 @@ def test_what_its_only_source_withdraws_before_anybody_was_sent_has_expired():
     office.withdraw(12, now=5.0)
     assert office.event().state is State.EXPIRED
     assert office.event().times == {"detected": 1.0, "closed": 5.0}
-    assert office.desk.book.waiting == {}
+    assert office.core.book.waiting == {}
 
 
 def test_an_event_expires_only_when_the_last_of_its_sources_has_withdrawn_it():
@@ -141,7 +141,7 @@ def test_a_withdrawal_elsewhere_or_of_another_kind_ends_nothing():
     office.fire(12, kind="flood")
     office.fire(90)
     office.withdraw(12)
-    assert office.desk.book.counts[State.PENDING] == 2
+    assert office.core.book.counts[State.PENDING] == 2
 
 
 # --- states and times ----------------------------------------------------------------------
@@ -169,7 +169,7 @@ def test_an_event_runs_its_course_with_its_times_in_order(office):
 
 def test_every_step_is_a_change_that_the_memory_hears_of(office):
     office.fire(12)
-    book = office.desk.book
+    book = office.core.book
     for state in ("departed", "arrived"):
         book.changes()
         office.progress(OPERATOR, state, 3.0)
@@ -190,7 +190,7 @@ def test_an_event_that_waits_again_has_not_been_departed_for(office):
     office.busy(OPERATOR, ROBOT)
     office.idle(OPERATOR, ROBOT)
     for name in (OPERATOR, ROBOT):
-        office.desk.orders.engaged.begin(name, office.event())
+        office.core.orders.engaged.begin(name, office.event())
     office.progress(OPERATOR, "failed", 10.0)
     assert set(office.event().times) == {"detected", "assigned"}  # to the same again
 
@@ -268,7 +268,7 @@ def test_a_late_finding_closes_an_event_that_waits(office):
     office.busy(GUARD)
     office.ok(office.fire(12))
     office.beat(GUARD, now=11.0)
-    office.desk.tick(11.0)
+    office.core.tick(11.0)
     assert office.event().state is State.PENDING
     office.finds(OPERATOR, "confirmed", 12.0)
     assert office.event().state is State.CONFIRMED
@@ -280,4 +280,4 @@ def test_a_finding_about_an_event_that_is_over_changes_nothing(office):
     office.status(ROBOT, 80, now=6.0)
     assert office.finds(OPERATOR, "confirmed", 7.0)[0].code == m.OK
     assert office.event().state is State.REFUTED
-    assert office.desk.registry.entries[ROBOT].position == east(80)
+    assert office.core.registry.entries[ROBOT].position == east(80)

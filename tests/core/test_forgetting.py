@@ -7,7 +7,7 @@ from dataclasses import fields
 from typing import Any
 
 import pytest
-from helpers.dva.dispatch_desk import (
+from helpers.dva.dispatch_office import (
     ADDRESS,
     DETECTOR,
     GUARD,
@@ -35,7 +35,7 @@ def office() -> Office:
 
 
 def known(office: Office) -> set[str]:
-    return set(office.desk.registry.entries)
+    return set(office.core.registry.entries)
 
 
 def only(office: Office, *heard: str, until: float, since: float = 0.0) -> list[Send]:
@@ -78,7 +78,7 @@ def test_who_registers_again_after_that_comes_last(office):
     only(office, OPERATOR, until=FORGOTTEN)
     office.register(GUARD, "Guard", now=61.0)
     office.register(ROBOT, "Robot", now=61.0)
-    entries = office.desk.registry.entries
+    entries = office.core.registry.entries
     assert sorted(entries, key=lambda device: entries[device].place) == [OPERATOR, GUARD, ROBOT]
 
 
@@ -118,7 +118,7 @@ def test_who_works_on_an_event_is_replaced_first_and_then_forgotten(office):
     assert known(office) == {GUARD}
     assert office.event().responder == GUARD
     assert office.event().sources  # its detector is forgotten, what it reported is not
-    assert office.desk.book.counts[State.ASSIGNED] == office.desk.book.total == 1
+    assert office.core.book.counts[State.ASSIGNED] == office.core.book.total == 1
 
 
 def test_what_was_sent_to_who_is_forgotten_may_come_back_undelivered(office):
@@ -134,19 +134,19 @@ def test_what_was_sent_to_who_is_forgotten_may_come_back_undelivered(office):
 
 
 def test_in_a_full_registry_the_longest_silent_makes_room(office):
-    office.desk.registry.most = 4
+    office.core.registry.most = 4
     office.beat(OPERATOR, now=5.0)
     office.beat(ROBOT, now=6.0)
     office.tick(20.0, alive=False)
     assert office.say(STRANGER, m.Registration("x", "TeleOp", ADDRESS), 20.0)[0].code == m.OK
     assert known(office) == {GUARD, OPERATOR, ROBOT, STRANGER}  # the detector said least
-    assert counted(office.desk.counters, "forgotten", "room") == 1
+    assert counted(office.core.counters, "forgotten", "room") == 1
 
 
 def test_of_whom_something_is_open_makes_room_last_and_its_holder_hears_that(office):
     session = held(office)
     only(office, OPERATOR, until=20.0)
-    office.desk.registry.most = 4
+    office.core.registry.most = 4
     everybody = [f"02:00:00:09:00:{number:02X}" for number in range(3)]
     reported: list[Send] = []
     for device in everybody:
@@ -158,7 +158,7 @@ def test_of_whom_something_is_open_makes_room_last_and_its_holder_hears_that(off
     assert office.say(STRANGER, m.Registration("x", "TeleOp", ADDRESS), 20.0)[0].code == m.BUSY
     # The robot was never told: as soon as it is back, it is.
     office.no([Send(ROBOT, over)], 21.0)
-    office.desk.registry.most = 5
+    office.core.registry.most = 5
     office.register(ROBOT, "Robot", now=22.0)
     assert Send(ROBOT, over) in office.tick(22.0)
 
@@ -181,10 +181,10 @@ def sizes(thing: Any, depth: int = 4) -> dict[str, int]:
     return found
 
 
-def test_after_ten_waves_the_desk_holds_what_it_held_after_the_first(office, tmp_path):
+def test_after_ten_waves_the_core_holds_what_it_held_after_the_first(office, tmp_path):
     """Each is heard once; half of the operators hold a robot of their wave and ask others."""
     memory = Store(tmp_path / "state.sqlite")
-    desk, now, after = office.desk, 0.0, []
+    core, now, after = office.core, 0.0, []
     kinds = ["Robot", "TeleOp", "Guard", "Sensor"]
     for wave in range(10):
         for index in range(200):
@@ -199,10 +199,10 @@ def test_after_ten_waves_the_desk_holds_what_it_held_after_the_first(office, tmp
             sends = office.tick(now, alive=False)
             office.ok([send for send in sends if send.to in TEAM_THERE], now)
             office.ok([s for s in sends if isinstance(s.body, m.PermissionRevocation)], now)
-            office.desk.registry.moves()
-            assert memory.keep(desk, desk.book.changes(), now) is None
+            office.core.registry.moves()
+            assert memory.keep(core, core.book.changes(), now) is None
         office.sent.clear()
-        after.append(sizes(desk))
+        after.append(sizes(core))
     memory.close()
     assert after[-1] == after[0]
     assert known(office) == set(TEAM_THERE)
@@ -225,18 +225,18 @@ def test_the_next_life_does_not_know_who_was_forgotten_and_knows_every_event(off
     memory = Store(file)
     office.fire(12)
     office.fire(90, kind="flood")
-    memory.keep(office.desk, office.desk.book.changes(), 0.0)
+    memory.keep(office.core, office.core.book.changes(), 0.0)
     held(office, OTHER_OPERATOR, OTHER_ROBOT)
     only(office, OTHER_OPERATOR, GUARD, until=FORGOTTEN)
-    memory.keep(office.desk, office.desk.book.changes(), FORGOTTEN)
+    memory.keep(office.core, office.core.book.changes(), FORGOTTEN)
     memory.close()
-    desk = office.new_desk()
+    core = office.new_core()
     memory = Store(file)
-    memory.recall(desk, 0.0)
+    memory.recall(core, 0.0)
     memory.close()
-    assert set(desk.registry.entries) == {OTHER_OPERATOR, GUARD, OTHER_ROBOT}
-    assert desk.registry.entries.keys() == known(office)
-    assert desk.book.total == 2
-    assert {e.number: e.state for e in (*desk.book.open.values(), *desk.book.closed.values())} == {
+    assert set(core.registry.entries) == {OTHER_OPERATOR, GUARD, OTHER_ROBOT}
+    assert core.registry.entries.keys() == known(office)
+    assert core.book.total == 2
+    assert {e.number: e.state for e in (*core.book.open.values(), *core.book.closed.values())} == {
         n: office.event(n).state for n in (1, 2)
     }

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from helpers.dva.dispatch_desk import GUARD, OPERATOR, OTHER_GUARD, OTHER_ROBOT, ROBOT, Office
+from helpers.dva.dispatch_office import GUARD, OPERATOR, OTHER_GUARD, OTHER_ROBOT, ROBOT, Office
 from helpers.wording import counted
 
 from dva_sim.core.assignments import Rules
@@ -40,7 +40,7 @@ def test_who_says_ok_and_does_nothing_but_live_loses_the_order_after_the_stated_
         (GUARD, "OrderProgress"),
         (OTHER_GUARD, "Order"),
     ]
-    assert office.desk.counters["did not set out"] == 1
+    assert office.core.counters["did not set out"] == 1
     assert office.event().state is State.ASSIGNED
 
 
@@ -52,7 +52,7 @@ def test_who_set_out_and_stands_still_loses_it_too(office):
         office.stands(GUARD, metres, now)
         assert sent_to(office.tick(now)) == []
     assert sent_to(office.tick(70.0)) == [OTHER_GUARD]
-    assert office.desk.counters["did not move"] == 1
+    assert office.core.counters["did not move"] == 1
 
 
 def test_who_keeps_on_moving_keeps_the_order_and_nothing_more_is_owed_on_scene(office):
@@ -75,7 +75,7 @@ def test_a_robot_gets_on_if_it_moves_whatever_its_operator_does(office):
         assert office.tick(float(now)) == []
     stopped = [t for t in range(100, 129) if OPERATOR in [s.to for s in office.tick(float(t))]]
     assert stopped[0] == pytest.approx(121, abs=2)
-    assert office.desk.counters["did not move"] == 1
+    assert office.core.counters["did not move"] == 1
 
 
 def test_of_several_orders_only_the_first_is_owed_and_the_next_from_when_it_is_first():
@@ -93,12 +93,12 @@ def test_of_several_orders_only_the_first_is_owed_and_the_next_from_when_it_is_f
     office.tick(401.0)
     assert office.tick(500.0) == []
     office.tick(501.0)
-    assert office.desk.counters["did not set out"] == 1
+    assert office.core.counters["did not set out"] == 1
 
 
 def test_who_stands_by_may_stand_but_has_to_go_once_it_is_confirmed(office):
     office.ok(office.fire(12))
-    office.ok([office.desk.orders.act(office.event(), GUARD, 0.0)])
+    office.ok([office.core.orders.act(office.event(), GUARD, 0.0)])
     office.tick(1.0)
     for who, state in ((OPERATOR, "departed"), (OPERATOR, "arrived"), (GUARD, "departed")):
         office.progress(who, state, 1.0)
@@ -109,7 +109,7 @@ def test_who_stands_by_may_stand_but_has_to_go_once_it_is_confirmed(office):
     for now in (201.0, 230.0, 231.0):
         office.tick(now)
     assert office.event().actor == OTHER_GUARD
-    assert office.desk.counters["did not move"] == 1
+    assert office.core.counters["did not move"] == 1
 
 
 def test_nothing_is_owed_of_an_order_that_was_not_answered_yet(office):
@@ -144,7 +144,7 @@ def test_who_says_from_afar_that_it_has_arrived_loses_the_order_as_if_it_stood_s
         office.stands(GUARD, 0.0, float(now))
         given = office.tick(float(now))
     assert sent_to(given) == [OTHER_GUARD]
-    assert counted(office.desk.counters, "from afar") == 1
+    assert counted(office.core.counters, "from afar") == 1
 
 
 def test_who_is_nearly_there_when_it_says_so_has_arrived_with_its_next_position():
@@ -163,7 +163,7 @@ def test_who_deals_with_it_has_to_be_there_too():
     office = Office(rules=replace(RULES, arrived_within=10.0))
     office.register(OTHER_GUARD, "Guard", at=90)
     office.ok(office.fire(12))
-    office.ok([office.desk.orders.act(office.event(), GUARD, 0.0)])
+    office.ok([office.core.orders.act(office.event(), GUARD, 0.0)])
     office.progress(OPERATOR, "arrived", 1.0)  # its robot stands at 10 m
     office.ok(office.finds(OPERATOR, "confirmed", 2.0)[1])
     office.progress(GUARD, "arrived", 2.0)

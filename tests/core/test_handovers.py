@@ -1,7 +1,7 @@
 """Handover of a robot: requested, granted, declined or forced."""
 
 import pytest
-from helpers.dva.dispatch_desk import (
+from helpers.dva.dispatch_office import (
     ADDRESS,
     DVA,
     GUARD,
@@ -26,7 +26,7 @@ HANDOVER = Send(OPERATOR, m.HandoverRequest(ROBOT, OTHER_OPERATOR, "remote contr
 def office() -> Office:
     """Somebody with a remote control is there, too, and supervises."""
     office = Office(supervisors=frozenset({OTHER_OPERATOR}))
-    office.desk.sessions.permissions.own = DVA
+    office.core.sessions.permissions.own = DVA
     office.register(OTHER_OPERATOR, "Remote Control")
     return office
 
@@ -90,7 +90,7 @@ def test_a_robot_is_handed_over_through_standstill_and_a_confirmed_end(office):
     assert isinstance(reply.content, m.Permission)
     assert reply.content.session > over.session
     assert [type(send.body) for send in sends] == [m.PermissionGrant]
-    assert office.desk.counters["robot handed over"] == 1
+    assert office.core.counters["robot handed over"] == 1
     assert ask(office, OPERATOR, "no", 8.5)[0].content == m.Holder(
         OTHER_OPERATOR, "remote control", 2.0
     )
@@ -144,10 +144,10 @@ def test_a_handover_that_leads_nowhere_ends(office, told, waited):
     sends = ask(office)[1]
     if told:
         office.ok(sends)
-    assert office.desk.next_deadline() <= waited
+    assert office.core.next_deadline() <= waited
     office.tick(waited)
-    assert office.desk.handovers.under_way == {}
-    assert office.desk.sessions.reserved == set()
+    assert office.core.handovers.under_way == {}
+    assert office.core.sessions.reserved == set()
 
 
 def test_who_does_not_come_for_it_in_time_gets_nothing(office):
@@ -166,7 +166,7 @@ def test_a_late_yes_takes_nothing_from_the_next_holder(office):
     office.say(OPERATOR, over)
     assert ask(office, third, None, 1.0)[0].code == m.OK
     assert office.ok(asked, 2.0) == []
-    assert office.desk.sessions.permissions.grants[ROBOT].holder == third
+    assert office.core.sessions.permissions.grants[ROBOT].holder == third
 
 
 def test_a_late_yes_takes_nothing_from_who_was_sent_with_it_meanwhile(office):
@@ -203,7 +203,7 @@ def test_who_is_no_supervisor_forces_nothing(office):
     reply, sends = ask(office, OPERATOR, "force")
     assert (reply.code, sends) == (m.NOT_PERMITTED, [])
     assert unnamed(reply.text, "teleop", "supervisor") == []
-    assert office.desk.sessions.permissions.grants[ROBOT].holder == OTHER_OPERATOR
+    assert office.core.sessions.permissions.grants[ROBOT].holder == OTHER_OPERATOR
 
 
 def test_a_supervisor_does_not_wait_for_who_is_being_asked(office):

@@ -1,7 +1,7 @@
 """Robots that the DVA sends round while nothing happens."""
 
 import numpy as np
-from helpers.dva.dispatch_desk import DVA, GUARD, OPERATOR, ROBOT, Office, crow, east
+from helpers.dva.dispatch_office import DVA, GUARD, OPERATOR, ROBOT, Office, crow, east
 
 from dva_sim.core.dispatcher import REST, Patrols
 from dva_sim.core.dva import Dva
@@ -14,7 +14,7 @@ BEAT = (east(20), east(40))
 class PatrolOffice(Office):
     """Its robot has a beat, and there is no guard in the way."""
 
-    def new_desk(self) -> Dva:
+    def new_core(self) -> Dva:
         sessions = Sessions(Permissions(lambda: 7, own=DVA))
         beats = Patrols({"robot": BEAT})
         rng = np.random.default_rng(1)
@@ -105,4 +105,4 @@ def test_a_robot_that_comes_back_from_an_order_takes_up_its_round():
 def test_a_dva_that_closes_stops_its_patrols():
     office = PatrolOffice()
     session = sent_out(office)
-    assert office.desk.close() == [Send(ROBOT, m.PermissionRevocation(ROBOT, DVA, session))]
+    assert office.core.close() == [Send(ROBOT, m.PermissionRevocation(ROBOT, DVA, session))]

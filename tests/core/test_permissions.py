@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from helpers.dva.dispatch_desk import (
+from helpers.dva.dispatch_office import (
     ADDRESS,
     DETECTOR,
     GUARD,
@@ -73,14 +73,14 @@ def test_sessions_only_grow(office):
     sessions = []
     for _ in range(3):
         sessions.append(granted(office).session)
-        office.desk.sessions.permissions.release(OPERATOR)
+        office.core.sessions.permissions.release(OPERATOR)
     assert sessions == sorted(set(sessions))
 
 
 def test_a_session_grows_above_and_is_random_below(office):
     first = granted(office).session
-    office.desk.sessions.permissions.release(OPERATOR)
-    office.desk.sessions.permissions.draw = lambda: 2**32 - 1
+    office.core.sessions.permissions.release(OPERATOR)
+    office.core.sessions.permissions.draw = lambda: 2**32 - 1
     second = granted(office).session
     assert first & (2**32 - 1) == 7
     assert second & (2**32 - 1) == 2**32 - 1
@@ -128,19 +128,19 @@ def test_a_holder_gives_its_permission_back_and_the_robot_is_told(office):
 def test_a_silent_holder_loses_its_session_and_both_ends_are_told(office):
     session = granted(office).session
     office.status(ROBOT, 10, now=11.0)
-    sends = office.desk.tick(11.0)
+    sends = office.core.tick(11.0)
     over = m.PermissionRevocation(ROBOT, OPERATOR, session)
     assert sends == [Send(ROBOT, over), Send(OPERATOR, over)]
-    assert office.desk.sessions.permissions.grants == {}
+    assert office.core.sessions.permissions.grants == {}
 
 
 def test_a_grant_that_fails_ends_its_own_session_alone(office):
     driver = granted(office).session
-    office.desk.sessions.permissions.draw = lambda: 8
+    office.core.sessions.permissions.draw = lambda: 8
     _, sends = office.say(OPERATOR, m.PermissionRequest(ROBOT, "sensors", ("heat_flux",)))
     office.no(sends, 1.0)
-    assert office.desk.sessions.permissions.grants[ROBOT].session == driver
-    assert office.desk.sessions.permissions.observers == {}
+    assert office.core.sessions.permissions.grants[ROBOT].session == driver
+    assert office.core.sessions.permissions.observers == {}
 
 
 def test_a_robot_that_could_not_be_told_is_told_again(office):
@@ -148,20 +148,20 @@ def test_a_robot_that_could_not_be_told_is_told_again(office):
     over = m.PermissionRevocation(ROBOT, OPERATOR, session)
     sent = office.say(OPERATOR, over)[1][0]
     assert office.no([sent], 1.0) == []
-    assert office.desk.tick(2.0) == [sent]
-    assert office.desk.tick(3.0) == []
+    assert office.core.tick(2.0) == [sent]
+    assert office.core.tick(3.0) == []
 
 
-def test_all_sessions_end_with_the_desk(office):
+def test_all_sessions_end_with_the_core(office):
     over = m.PermissionRevocation(ROBOT, OPERATOR, granted(office).session)
-    assert office.desk.close() == [Send(ROBOT, over), Send(OPERATOR, over)]
+    assert office.core.close() == [Send(ROBOT, over), Send(OPERATOR, over)]
 
 
 def test_a_declined_order_leaves_the_operator_what_it_held_by_itself(office):
     session = granted(office).session
     order = office.fire(12)[0]
     assert office.no([order], 1.0) == []
-    assert office.desk.sessions.permissions.grants[ROBOT].session == session
+    assert office.core.sessions.permissions.grants[ROBOT].session == session
 
 
 def test_the_right_to_drive_ends_with_the_order(office):
@@ -169,7 +169,7 @@ def test_the_right_to_drive_ends_with_the_order(office):
     session = granted(office).session
     sends = office.progress(OPERATOR, "failed", 5.0)[1]
     assert Send(ROBOT, m.PermissionRevocation(ROBOT, OPERATOR, session)) in sends
-    assert office.desk.sessions.permissions.grants == {}
+    assert office.core.sessions.permissions.grants == {}
 
 
 def test_a_robot_that_somebody_holds_is_sent_nowhere_by_another(office):
@@ -183,11 +183,11 @@ def test_a_robot_that_somebody_holds_is_sent_nowhere_by_another(office):
 
 def test_who_reads_sensors_holds_nothing_else_and_needs_no_order(office):
     driver = granted(office).session
-    office.desk.sessions.permissions.draw = lambda: 8
+    office.core.sessions.permissions.draw = lambda: 8
     reader = granted(office, DETECTOR, "sensors").session
     assert reader != driver
     assert reader >> 32 == driver >> 32  # only the right to drive uses up what makes them grow
-    assert office.desk.sessions.permissions.grants[ROBOT].holder == OPERATOR
+    assert office.core.sessions.permissions.grants[ROBOT].holder == OPERATOR
 
 
 def test_sensors_are_granted_one_by_one():
@@ -264,11 +264,11 @@ def test_a_rule_holds_from_its_beginning_and_before_its_end():
 def test_a_permission_is_revoked_while_in_use_when_the_time_of_its_rule_ends():
     office = guarded(AccessRule(until=200.0))
     session = granted(office, now=190.0).session
-    assert office.desk.next_deadline() <= 200.0
+    assert office.core.next_deadline() <= 200.0
     assert office.tick(199.9) == []
     over = m.PermissionRevocation(ROBOT, OPERATOR, session)
     assert office.tick(200.0) == [Send(ROBOT, over), Send(OPERATOR, over)]
-    assert office.desk.counters["permission revoked"] == 1
+    assert office.core.counters["permission revoked"] == 1
 
 
 def test_a_permission_that_another_rule_allows_too_is_not_revoked():
@@ -297,6 +297,6 @@ def test_an_order_outlives_a_revoked_permission_and_its_operator_says_how_it_end
 
 def test_the_end_of_rules_is_no_deadline_once_it_is_past():
     office = guarded(AccessRule(until=200.0))
-    assert math.isfinite(office.desk.next_deadline())
-    office.desk.tick(200.0)
-    assert office.desk.next_deadline() == math.inf
+    assert math.isfinite(office.core.next_deadline())
+    office.core.tick(200.0)
+    assert office.core.next_deadline() == math.inf

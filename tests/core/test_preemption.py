@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from helpers.dva.dispatch_desk import (
+from helpers.dva.dispatch_office import (
     GUARD,
     OPERATOR,
     OTHER_OPERATOR,
@@ -44,7 +44,7 @@ def test_the_guard_is_redirected_and_the_first_event_waits_again(office):
     sends = office.fire(20, severity=0.9, now=5.0)
     assert sends == [Send(GUARD, m.Order(2, "fire", east(20), None))]
     assert (office.event(1).state, office.event(2).state) == (State.PENDING, State.ASSIGNED)
-    assert office.desk.counters["preempted"] == 1
+    assert office.core.counters["preempted"] == 1
 
 
 def test_to_be_preempted_is_no_attempt_and_no_new_wait(office):
@@ -64,7 +64,7 @@ def test_nobody_is_called_away_from_a_scene(office):
 def test_nobody_is_called_away_from_an_event_that_has_waited_for_60_s(office):
     assert office.fire(20, severity=0.9, now=60.0) == []
     assert office.event(1).state is State.ASSIGNED
-    assert office.desk.counters["overruled"] == 1
+    assert office.core.counters["overruled"] == 1
 
 
 def test_who_has_not_taken_its_order_up_yet_is_not_redirected():
@@ -84,7 +84,7 @@ def test_the_operator_stays_with_its_robot():
     sends = office.fire(20, severity=0.9, now=5.0)
     assert sends == [Send(OPERATOR, m.Order(2, "fire", east(20), ROBOT))]
     assert office.event(2).operator == OPERATOR
-    assert office.desk.sessions.permissions.grants[ROBOT].holder == OPERATOR
+    assert office.core.sessions.permissions.grants[ROBOT].holder == OPERATOR
     assert {n: e for n, e in office.working.items() if e != 99} == {OPERATOR: 2, ROBOT: 2}
 
 
@@ -105,9 +105,9 @@ def test_a_policy_that_grabs_everybody_cannot_keep_an_event_beyond_its_deadline(
     office.busy(ROBOT, OPERATOR)
     for now in range(90):
         office.ok(office.fire(80, now=now), now)
-    late = [e for e in office.desk.book.open.values() if e.waiting_since <= 29]
+    late = [e for e in office.core.book.open.values() if e.waiting_since <= 29]
     assert all(e.state is State.ASSIGNED for e in late)
-    assert office.desk.counters["preempted"] >= 59
+    assert office.core.counters["preempted"] >= 59
     assert len(office.working) == 3
 
 
@@ -124,4 +124,4 @@ def test_a_policy_that_does_not_preempt_never_sees_who_is_busy():
     office.ok(office.fire(80))
     office.ok(office.fire(40))
     office.fire(60)
-    assert office.desk.counters["policy failed"] == 0
+    assert office.core.counters["policy failed"] == 0

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from helpers.dva.dispatch_desk import ADDRESS, DETECTOR, DVA, GUARD, OPERATOR, ROBOT, Office
+from helpers.dva.dispatch_office import ADDRESS, DETECTOR, DVA, GUARD, OPERATOR, ROBOT, Office
 from helpers.wording import counted
 
 from dva_sim.core.registry import Registry
@@ -38,8 +38,8 @@ def test_who_is_not_registered_is_refused_and_counted(office):
     reply, sends = office.say(STRANGER, m.GetDeviceList())
     assert (reply.code, sends) == (m.NOT_REGISTERED, [])
     office.beat(STRANGER, now=1.0)
-    assert office.desk.refused == 2
-    assert STRANGER not in office.desk.registry.entries
+    assert office.core.refused == 2
+    assert STRANGER not in office.core.registry.entries
 
 
 def test_the_device_list_shows_robots_then_operators_then_guards_and_no_detectors(office):
@@ -48,7 +48,7 @@ def test_the_device_list_shows_robots_then_operators_then_guards_and_no_detector
 
 def test_who_is_silent_is_not_on_the_device_list_until_it_is_heard_again(office):
     office.beat(OPERATOR, GUARD, now=8.0)
-    office.desk.tick(11.0)
+    office.core.tick(11.0)
     assert listed(office) == [OPERATOR, GUARD]
     office.status(ROBOT, 10, now=12.0)
     assert listed(office) == [ROBOT, OPERATOR, GUARD]
@@ -67,10 +67,10 @@ def test_a_list_of_any_devices_fits_into_a_message(office):
 
 def test_a_device_is_silent_only_after_its_timeout_has_passed(office):
     office.fire(12)
-    office.desk.tick(10.0)
+    office.core.tick(10.0)
     assert office.event().operator == OPERATOR
     office.say(GUARD, m.GetDeviceList(), 10.0)
-    office.desk.tick(10.1)
+    office.core.tick(10.1)
     assert office.event().responder == GUARD
 
 
@@ -86,14 +86,14 @@ def test_silence_comes_at_the_moment_it_was_announced_for_and_not_before(heard):
 
 
 def test_a_device_falls_silent_once(office):
-    assert len(office.desk.registry.fallen_silent(20.0)) == 4
-    assert office.desk.registry.fallen_silent(30.0) == []
+    assert len(office.core.registry.fallen_silent(20.0)) == 4
+    assert office.core.registry.fallen_silent(30.0) == []
 
 
 def test_a_device_stays_what_it_is(office):
     changed = m.Registration("detector", "TeleOp", ADDRESS)
     assert office.say(DETECTOR, changed)[0].code == m.NOT_PERMITTED
-    assert office.desk.registry.entries[DETECTOR].device.device_type == "Sensor"
+    assert office.core.registry.entries[DETECTOR].device.device_type == "Sensor"
 
 
 def test_who_claims_anothers_identity_as_another_type_ends_nothing_of_it(office):
@@ -101,19 +101,19 @@ def test_who_claims_anothers_identity_as_another_type_ends_nothing_of_it(office)
     office.number = 0
     stolen = m.Registration("evil", "Guard", "10.0.0.66")
     assert office.say(OPERATOR, stolen)[1] == []
-    assert office.desk.sessions.permissions.grants[ROBOT].session == session
-    assert office.desk.registry.entries[OPERATOR].device.address == ADDRESS
+    assert office.core.sessions.permissions.grants[ROBOT].session == session
+    assert office.core.registry.entries[OPERATOR].device.address == ADDRESS
 
 
 def test_a_changed_address_is_known_from_then_on(office):
     office.say(OPERATOR, m.Registration("operator", "TeleOp", "10.0.0.7:6000"), 10.1)
-    assert office.desk.registry.entries[OPERATOR].device.address == "10.0.0.7:6000"
-    assert len(office.desk.registry.entries) == 4
+    assert office.core.registry.entries[OPERATOR].device.address == "10.0.0.7:6000"
+    assert len(office.core.registry.entries) == 4
 
 
 @pytest.mark.invariant("S10")
 def test_a_full_registry_refuses_strangers_and_renews_who_is_known(office):
-    office.desk.registry.most = 4
+    office.core.registry.most = 4
     assert office.say(STRANGER, AGAIN)[0].code == m.BUSY
     assert office.say(OPERATOR, AGAIN)[0].code == m.OK
 
@@ -121,7 +121,7 @@ def test_a_full_registry_refuses_strangers_and_renews_who_is_known(office):
 def test_a_renewed_registration_changes_nothing_and_a_new_life_ends_what_was_held(office):
     session = granted(office)
     assert office.say(OPERATOR, AGAIN)[1] == []
-    assert office.desk.sessions.permissions.grants[ROBOT].session == session
+    assert office.core.sessions.permissions.grants[ROBOT].session == session
     office.number = 0  # restarted, it counts its messages from 1 again
     over = m.PermissionRevocation(ROBOT, OPERATOR, session)
     assert office.say(OPERATOR, AGAIN)[1] == [Send(ROBOT, over), Send(OPERATOR, over)]
@@ -134,7 +134,7 @@ def test_a_robot_that_restarts_has_no_holder_any_longer(office):
     sends = office.register(ROBOT, "Robot")
     over = m.PermissionRevocation(ROBOT, OPERATOR, held.session)
     assert {send.to for send in sends if send.body == over} == {ROBOT, OPERATOR}
-    assert ROBOT not in office.desk.sessions.permissions.grants
+    assert ROBOT not in office.core.sessions.permissions.grants
 
 
 def test_a_new_life_knows_nothing_of_its_order(office):
@@ -151,8 +151,8 @@ def test_a_copy_of_an_old_registration_ends_nothing(office):
     first = m.Message(DVA, office.number + 1, OPERATOR, "12:00:01", 0, AGAIN)
     later = m.Message(DVA, office.number + 9, OPERATOR, "12:00:11", 0, AGAIN)
     for message in (first, later, first, later):
-        assert office.desk.handle(message, 1.0)[1] == []
-    assert office.desk.sessions.permissions.grants[ROBOT].holder == OPERATOR
+        assert office.core.handle(message, 1.0)[1] == []
+    assert office.core.sessions.permissions.grants[ROBOT].holder == OPERATOR
 
 
 def test_what_is_not_for_the_dva_is_refused(office):
@@ -175,10 +175,10 @@ def test_who_is_heard_at_its_address_keeps_its_id_whoever_claims_it(office):
         reply, sends = office.say(ROBOT, ELSEWHERE, second + 1.0)
         assert (reply.code, sends) == (m.BUSY, [])
         assert reply.text.startswith(f"robot is heard at {ADDRESS} under this id;")
-        office.desk.tick(second + 1.5)
-    assert office.desk.registry.entries[ROBOT].device.address == ADDRESS
-    assert office.desk.sessions.permissions.grants[ROBOT].session == session
-    assert counted(office.desk.counters, "id in use") == 30
+        office.core.tick(second + 1.5)
+    assert office.core.registry.entries[ROBOT].device.address == ADDRESS
+    assert office.core.sessions.permissions.grants[ROBOT].session == session
+    assert counted(office.core.counters, "id in use") == 30
 
 
 def test_who_is_back_at_another_address_is_there_after_the_silence_at_the_old_one(office):

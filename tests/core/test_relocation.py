@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from helpers.dva.dispatch_desk import GUARD, OPERATOR, ROBOT, Office, east
+from helpers.dva.dispatch_office import GUARD, OPERATOR, ROBOT, Office, east
 
 from dva_sim.core.dispatch import Advice, Coverage, MinEta, Policy, Relocation, Situation
 from dva_sim.core.sessions import Send
@@ -37,21 +37,21 @@ def office_of(policy: Policy) -> Office:
 def test_an_idle_guard_is_sent_where_events_are_expected():
     office = office_of(Coverage())
     assert office.tick(1.0) == [Send(GUARD, THERE)]
-    assert office.desk.counters["relocated"] == 1
+    assert office.core.counters["relocated"] == 1
 
 
 def test_a_guard_on_its_way_is_not_sent_there_again():
     office = office_of(Eastward())
     assert office.tick(1.0) == [Send(GUARD, THERE)]
-    overruled = office.desk.counters["overruled"]
+    overruled = office.core.counters["overruled"]
     assert office.tick(2.0) == []
-    assert office.desk.counters["overruled"] == overruled + 2  # the robot, and the guard again
+    assert office.core.counters["overruled"] == overruled + 2  # the robot, and the guard again
 
 
 def test_a_robot_is_never_sent_to_wait():
     office = office_of(Eastward())
     assert ROBOT not in {send.to for send in office.tick(1.0)}
-    assert office.desk.counters["overruled"] == 1
+    assert office.core.counters["overruled"] == 1
 
 
 def test_who_has_an_order_is_not_sent_to_wait():
@@ -72,10 +72,10 @@ def test_a_guard_under_way_to_an_event_is_not_sent_to_wait():
     office.busy(ROBOT, OPERATOR)
     office.ok(office.fire(12))
     office.progress(GUARD, "accepted")
-    overruled = office.desk.counters["overruled"]
+    overruled = office.core.counters["overruled"]
     assert office.tick(1.0) == []
-    assert office.desk.counters["overruled"] > overruled  # it was advised
-    assert office.desk.counters["relocated"] == 0
+    assert office.core.counters["overruled"] > overruled  # it was advised
+    assert office.core.counters["relocated"] == 0
     assert office.working[GUARD] == 1
 
 
@@ -125,7 +125,7 @@ def test_a_guard_that_never_arrives_counts_as_bound_for_twice_its_time_and_3_min
 def test_without_stations_nobody_is_moved():
     office = Office(Coverage())
     assert office.tick(1.0) == []
-    assert office.desk.counters["policy failed"] == 0
+    assert office.core.counters["policy failed"] == 0
 
 
 @pytest.mark.parametrize("policy", [MinEta, Coverage])

@@ -1,7 +1,7 @@
 """Limit on the robots of one operator, which holds for any policy."""
 
 import pytest
-from helpers.dva.dispatch_desk import GUARD, OPERATOR, OTHER_OPERATOR, OTHER_ROBOT, ROBOT, Office
+from helpers.dva.dispatch_office import GUARD, OPERATOR, OTHER_OPERATOR, OTHER_ROBOT, ROBOT, Office
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import State
@@ -30,7 +30,7 @@ def three_fires(office: Office) -> list[str | None]:
 def test_one_operator_is_given_as_many_robots_as_the_span(span, sent):
     office = office_of(span)
     assert three_fires(office) == [OPERATOR] * sent + [None] * (3 - sent)
-    assert office.desk.orders.engaged.count(OPERATOR) == sent
+    assert office.core.orders.engaged.count(OPERATOR) == sent
 
 
 def test_of_two_operators_the_one_with_less_in_hand_is_given_the_next_robot():
@@ -56,7 +56,7 @@ def test_a_hand_that_is_free_again_is_given_what_waits():
     _, sends = office.progress(OPERATOR, "done", 9.0, event=1)
     assert [(send.to, getattr(send.body, "event_id", None)) for send in sends] == [(OPERATOR, 3)]
     assert office.working[OPERATOR] == 3
-    assert office.desk.orders.engaged.count(OPERATOR) == 2
+    assert office.core.orders.engaged.count(OPERATOR) == 2
 
 
 def test_an_operator_gets_the_robots_of_all_its_orders_and_no_other():
@@ -82,9 +82,9 @@ def test_all_that_a_lost_operator_had_in_hand_is_open_to_others():
 
 def test_each_order_of_an_operator_has_its_own_time_limit():
     office = office_of(span=2)
-    office.desk.orders.rules = Rules(escalate_after=1000.0, order_limit=100.0, operator_span=2)
+    office.core.orders.rules = Rules(escalate_after=1000.0, order_limit=100.0, operator_span=2)
     office.fire(10, now=0.0)
     office.fire(30, now=50.0)
     office.beat(now=101.0)
-    office.desk.orders.take_back(101.0)
+    office.core.orders.take_back(101.0)
     assert [office.event(n).state for n in (1, 2)] == [State.PENDING, State.ASSIGNED]

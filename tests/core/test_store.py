@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from helpers.dva.dispatch_desk import (
+from helpers.dva.dispatch_office import (
     ADDRESS,
     GUARD,
     OPERATOR,
@@ -38,16 +38,16 @@ def file(tmp_path: Path) -> Path:
 
 
 def keep(office: Office, memory: Store, now: float = 0.0) -> str | None:
-    return memory.keep(office.desk, office.desk.book.changes(), now)
+    return memory.keep(office.core, office.core.book.changes(), now)
 
 
 def next_life(office: Office, file: Path, now: float) -> Dva:
-    """Restart the office with a new desk that recalls the file."""
+    """Restart the office with a new core that recalls the file."""
     memory = Store(file)
-    office.desk = office.new_desk()
-    memory.recall(office.desk, now)
+    office.core = office.new_core()
+    memory.recall(office.core, now)
     memory.close()
-    return office.desk
+    return office.core
 
 
 # --- what is remembered --------------------------------------------------------------------
@@ -55,7 +55,7 @@ def next_life(office: Office, file: Path, now: float) -> Dva:
 
 def test_an_empty_file_knows_nothing(file):
     memory = Store(file)
-    assert not memory.recall(Office().new_desk(), 0.0)
+    assert not memory.recall(Office().new_core(), 0.0)
     memory.close()
 
 
@@ -67,7 +67,7 @@ def test_the_next_life_knows_events_devices_permissions_and_who_works_on_what(fi
     office.progress(OPERATOR, "departed", 4.0)
     keep(office, memory, 5.0)
     memory.close()
-    before = snapshot(office.desk)
+    before = snapshot(office.core)
     assert set(before["engaged"]) == {(OPERATOR, 1), (ROBOT, 1), (GUARD, 2)}
     assert snapshot(next_life(office, file, 5.0)) == before
 
@@ -87,7 +87,7 @@ def test_the_order_of_registration_lasts_when_a_device_moves(file):
     office.say(GUARD, m.Registration("guard", "Guard", "10.0.0.7"))
     keep(office, memory)
     memory.close()
-    ids = list(office.desk.registry.entries)
+    ids = list(office.core.registry.entries)
     assert list(next_life(office, file, 0.0).registry.entries) == ids
 
 
@@ -118,8 +118,8 @@ def test_how_late_it_is_is_kept_though_nothing_changes(file):
         keep(office, memory, 1.5 * second)
     memory.close()
     for life in (1, 2):
-        memory, office.desk = Store(file), office.new_desk()
-        memory.recall(office.desk, 0.0)
+        memory, office.core = Store(file), office.new_core()
+        memory.recall(office.core, 0.0)
         assert office.event().waiting_since == pytest.approx(-22.5 - 15.0 * (life - 1), abs=1.1)
         keep(office, memory, 15.0)
         memory.close()
@@ -148,10 +148,10 @@ def test_devices_have_their_time_out_to_show_that_they_are_there(file):
     office.ok(office.fire(12))
     keep(office, memory)
     memory.close()
-    desk = next_life(office, file, 100.0)
-    desk.tick(110.0)
+    core = next_life(office, file, 100.0)
+    core.tick(110.0)
     assert office.working == {OPERATOR: 1, ROBOT: 1}
-    desk.tick(110.1)
+    core.tick(110.1)
     assert office.working == {}
 
 
@@ -206,7 +206,7 @@ def test_a_robot_that_did_not_answer_is_told_by_every_life_until_it_does(file):
         memory.close()
         assert next_life(office, file, life).go_on() == [untold]
         memory = Store(file)
-        memory.recall(office.new_desk(), life)
+        memory.recall(office.new_core(), life)
     office.ok([untold], 3.0)
     keep(office, memory)
     memory.close()
@@ -236,23 +236,23 @@ def test_a_copy_of_the_file_taken_at_any_moment_knows_what_was_kept_until_then(t
         copy = tmp_path / f"copy-{step}.sqlite"
         for end in ("", "-wal"):
             shutil.copy(f"{day.file}{end}", f"{copy}{end}")
-        memory, desk = Store(copy), day._desk()
-        memory.recall(desk, day.now)
+        memory, core = Store(copy), day._core()
+        memory.recall(core, day.now)
         memory.close()
-        assert snapshot(desk) == snapshot(day.desk)
+        assert snapshot(core) == snapshot(day.core)
     day.memory.close()
 
 
 SAYS_WHAT_IT_KEPT = """
 import sys
 sys.path.insert(0, sys.argv[2])
-from helpers.dva.dispatch_desk import Office
+from helpers.dva.dispatch_office import Office
 from dva_sim.core.store import Memory
 office, memory = Office(), Memory(sys.argv[1])
 while True:
-    office.fire(20.0 * (office.desk.book.total + 1), source=sys.argv[3])
-    memory.keep(office.desk, office.desk.book.changes(), 0.0)
-    print(office.desk.book.total, flush=True)
+    office.fire(20.0 * (office.core.book.total + 1), source=sys.argv[3])
+    memory.keep(office.core, office.core.book.changes(), 0.0)
+    print(office.core.book.total, flush=True)
 """
 
 
@@ -269,11 +269,11 @@ def test_a_process_that_is_killed_forgets_nothing_that_it_has_said(file):
                 reported = int(line)
                 if reported == enough:
                     process.send_signal(signal.SIGKILL)
-        memory, desk = Store(file), Office().new_desk()
-        memory.recall(desk, 0.0)
+        memory, core = Store(file), Office().new_core()
+        memory.recall(core, 0.0)
         memory.close()
-        assert desk.book.total in (reported, reported + 1)
-        assert sum(desk.book.counts.values()) == desk.book.total
+        assert core.book.total in (reported, reported + 1)
+        assert sum(core.book.counts.values()) == core.book.total
         for path in file.parent.iterdir():
             path.unlink()
 
@@ -296,7 +296,7 @@ def test_a_full_disk_is_one_line_and_work_goes_on_and_is_caught_up_with(file):
     office.register(OTHER_GUARD, "Guard", 5)
     assert keep(office, memory) is None
     memory.close()
-    before = snapshot(office.desk)
+    before = snapshot(office.core)
     assert before["total"] == 40
     assert snapshot(next_life(office, file, 0.0)) == before
 
@@ -387,7 +387,7 @@ def test_a_memory_whose_content_makes_no_sense_is_refused_in_one_line(file, dama
     keep(office, memory)
     memory._file.execute(damage)
     with pytest.raises(ConfigError, match="DVA's memory") as refused:
-        memory.recall(office.new_desk(), 0.0)
+        memory.recall(office.new_core(), 0.0)
     assert "\n" not in str(refused.value)
     memory.close()
 

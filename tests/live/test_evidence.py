@@ -46,8 +46,8 @@ def trace_of(path: Path, name: str, memory: Store | None = None, **changes: obje
     """A virtual run whose DVA is written down."""
     run = Run(scenario_of(name, **changes), 1)
     with path.open("w") as file:
-        run.dva._memory, desk = memory, run.dva.desk
-        run.dva.desk = traced(desk, lambda line: file.write(line + "\n"), run.stage, memory)
+        run.dva._memory, core = memory, run.dva.core
+        run.dva.core = traced(core, lambda line: file.write(line + "\n"), run.stage, memory)
         if memory:
             run.dva.start()
         run.run()
@@ -97,14 +97,14 @@ def test_a_dva_that_remembers_an_earlier_life_decides_the_same_again(tmp_path):
     path = tmp_path / "dva.trace.jsonl"
     run = trace_of(path, "drive-to-event", store, horizon_s=60)
     assert '"do": "recall"' in path.read_text()
-    assert run.dva.desk.book.total == 1
+    assert run.dva.core.book.total == 1
     assert differences(path) == 0
 
 
 def test_every_way_to_ask_the_dva_is_written_down():
     """A change of the DVA that no trace records would be missed by every replay."""
     public = {name for name, _ in inspect.getmembers(Dva, inspect.isfunction) if name[0] != "_"}
-    asked = set(re.findall(r"\bdesk\.(\w+)\(", inspect.getsource(dva_server)))
+    asked = set(re.findall(r"\bcore\.(\w+)\(", inspect.getsource(dva_server)))
     kept = {name for name in vars(TracedDva) if name[0] != "_"}
     assert public - kept == {"next_deadline"}  # which changes nothing
     assert asked <= kept

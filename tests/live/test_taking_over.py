@@ -203,7 +203,7 @@ def test_nobody_plays_the_supervisor_where_the_sender_is_told(network):
     scene.until(lambda: second)
     reported = isinstance(network, MqttNetwork) or bool(getattr(network, "_ring", None))
     assert second[0].code == (m.NOT_PERMITTED if reported else m.BUSY)
-    assert (ROBOT in scene.dva.desk.sessions.reserved) is not reported
+    assert (ROBOT in scene.dva.core.sessions.reserved) is not reported
 
 
 def test_the_dva_lists_sensors_and_smoke_at_a_robot_is_an_event(network):
@@ -219,7 +219,7 @@ def test_the_dva_lists_sensors_and_smoke_at_a_robot_is_an_event(network):
             yield Pause(0.2)
 
     asker = scene.enters(1, asks)
-    book = scene.dva.desk.book
+    book = scene.dva.core.book
     scene.until(lambda: asker.done and book.total)
     content = heard[-1].content
     assert isinstance(content, m.SensorList)
@@ -240,7 +240,7 @@ def test_what_a_detector_reports_beside_the_robot_is_confirmed_by_it(network):
     detector = scene.stage.device("detector", 1)
     report = m.EventReport(None, "fire", place, 0.5, 0.9, "detected")
     detector.register(lambda: detector.ask(DVA, report))
-    book = scene.dva.desk.book
+    book = scene.dva.core.book
     scene.until(lambda: book.total and book.get(1).state is State.CONFIRMED)  # type: ignore[union-attr]
     assert book.total == 1
     assert set(book.closed[1].sources) >= {detector.id_tag}

@@ -52,7 +52,7 @@ def traced(path: Path, **changes: object) -> Iterator[Run]:
 
 def say(run: Run, body: m.Body, session: int) -> None:
     """Let the DVA say something to the robot, which its book says, too."""
-    enter(run.dva.desk, ROBOT, body)
+    enter(run.dva.core, ROBOT, body)
     run.dva.device.ask(ROBOT, body, session=session)
 
 

@@ -119,7 +119,7 @@ def test_a_client_of_another_make_drives_with_keys_and_not_without(tmp_path, is_
         assert field.robots[ROBOT].applied == 20
     else:
         assert "zmq.error.Again" in err
-        assert me not in dva.desk.registry.entries
+        assert me not in dva.core.registry.entries
 
 
 def test_the_control_room_of_the_specification_acknowledges_and_sends_as_proposed(
@@ -135,11 +135,11 @@ def test_the_control_room_of_the_specification_acknowledges_and_sends_as_propose
     dva, field = a_dva(network, scenario_of("fire-drill", changes))
     field.schedule_incidents()
     guards = [id_of("guard", 1), id_of("guard", 2)]
-    live_until(network.clock, lambda: all(dva.desk.registry.entries.get(g) for g in guards))
-    live_until(network.clock, lambda: dva.desk.registry.located("Guard"))
+    live_until(network.clock, lambda: all(dva.core.registry.entries.get(g) for g in guards))
+    live_until(network.clock, lambda: dva.core.registry.located("Guard"))
     out, err = run(control_room, dva, tmp_path)
     assert (out.startswith("code 0"), err) == (True, "")
-    event = dva.desk.book.get(1)
+    event = dva.core.book.get(1)
     assert event.handling.acknowledged.author == me
     assert [f.overrides for f in dva.facts if f.action == "assign"] == [False]
 

@@ -113,7 +113,7 @@ def lines(storm: Storm) -> list[str]:
 
 @pytest.mark.invariant("S6")
 def test_what_is_not_kept_is_not_confirmed_and_a_report_is_acted_on(storm, disk):
-    asks, robot, book = Answers(storm), storm.robots[0].id, storm.run.dva.desk.book
+    asks, robot, book = Answers(storm), storm.robots[0].id, storm.run.dva.core.book
     with disk.full(storm):
         assert asks.ask(DVA, FIRE).code == m.BUSY
         assert asks.ask(DVA, m.PermissionRequest(robot, "teleoperation")).code == m.BUSY
@@ -124,7 +124,7 @@ def test_what_is_not_kept_is_not_confirmed_and_a_report_is_acted_on(storm, disk)
         (line,) = lines(storm)
         assert unnamed(line, "memory") == []
     assert asks.ask(DVA, FIRE).code == m.OK
-    assert robot in storm.run.dva.desk.sessions.permissions.grants
+    assert robot in storm.run.dva.core.sessions.permissions.grants
     assert len(lines(storm)) == 2
     assert storm.recorder.broken == {}
 
@@ -132,7 +132,7 @@ def test_what_is_not_kept_is_not_confirmed_and_a_report_is_acted_on(storm, disk)
 @pytest.mark.invariant("S2", "S6")
 def test_what_was_confirmed_survives_a_dva_that_is_killed_on_a_full_disk(storm, disk):
     asks, robot = Answers(storm), storm.robots[0].id
-    storm.run.dva.desk.sessions.take_back_everything()
+    storm.run.dva.core.sessions.take_back_everything()
     asks.ask(DVA, m.GetDeviceList())
     held = asks.ask(DVA, m.PermissionRequest(robot, "teleoperation")).content
     with disk.full(storm):
@@ -143,9 +143,9 @@ def test_what_was_confirmed_survives_a_dva_that_is_killed_on_a_full_disk(storm, 
         storm.dva.kill(5.0)
         storm.dva.survive(storm.now + 2.0)
     storm.dva.survive(storm.now + 10.0)
-    desk = storm.run.dva.desk
-    assert {event.kind for event in desk.book.open.values()} <= {"flood", "fire"}
-    assert desk.sessions.permissions.grants[robot].session == held.session
+    core = storm.run.dva.core
+    assert {event.kind for event in core.book.open.values()} <= {"flood", "fire"}
+    assert core.sessions.permissions.grants[robot].session == held.session
     assert asks.ask(DVA, given_back).code == m.OK
     assert asks.ask(DVA, FIRE).code == m.OK
     assert storm.recorder.broken == {}
@@ -153,7 +153,7 @@ def test_what_was_confirmed_survives_a_dva_that_is_killed_on_a_full_disk(storm, 
 
 def test_a_permission_that_replaces_one_and_cannot_be_kept_leaves_that_in_force(storm, disk):
     asks, robot = Answers(storm), storm.robots[0].id
-    sessions = storm.run.dva.desk.sessions
+    sessions = storm.run.dva.core.sessions
     sessions.take_back_everything()
     asks.ask(DVA, m.GetDeviceList())
     held = asks.ask(DVA, m.PermissionRequest(robot, "teleoperation")).content
@@ -172,7 +172,7 @@ def test_a_dva_that_was_killed_restarts_on_a_full_disk(storm, disk, monkeypatch)
         storm.dva.kill(1.0)
         storm.dva.survive(storm.now + 5.0)
         assert storm.dva.memory is not killed
-        assert "fire" in {event.kind for event in storm.run.dva.desk.book.open.values()}
+        assert "fire" in {event.kind for event in storm.run.dva.core.book.open.values()}
         assert asks.ask(DVA, FIRE).code == m.BUSY
     assert asks.ask(DVA, FIRE).code == m.OK
     assert storm.recorder.broken == {}
@@ -185,7 +185,7 @@ def test_a_finding_that_cannot_be_kept_is_reported_until_it_can(storm, disk):
     with disk.full(storm):
         device.report_finding(FIRE, replies.append)
         storm.dva.survive(storm.now + 12.0)
-        book = storm.run.dva.desk.book
+        book = storm.run.dva.core.book
         (fire,) = (event for event in book.open.values() if event.kind == "fire")
         assert [reply.code for reply in replies] == [m.BUSY]
         assert fire.reports == 3

@@ -54,7 +54,7 @@ def say(
     session: int = 5,
 ) -> None:
     """Let the DVA send a robot something, which its book says, too."""
-    enter(run.dva.desk, robot, body)
+    enter(run.dva.core, robot, body)
     run.dva.device.ask(robot, body, then, session=session)
 
 

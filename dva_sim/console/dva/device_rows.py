@@ -43,7 +43,7 @@ class DeviceRows:
         Args:
             fakes: Ids of those that were added by hand.
         """
-        entries = self._run.dva.desk.registry.entries
+        entries = self._run.dva.core.registry.entries
         first = islice(sorted(entries, key=lambda i: entries[i].silent), MOST_ROWS)
         self._beats = {i: self._beats.get(i) or Rate() for i in first}
         return [self._row(i, entries[i], i in fakes) for i in self._beats]
@@ -51,7 +51,7 @@ class DeviceRows:
     def _row(self, id_tag: str, entry: DeviceEntry, is_fake: bool) -> DeviceRow:
         run, now, device = self._run, self._run.clock.now, entry.device
         heard, robot = now - entry.last_heard, run.field.robots.get(id_tag)
-        grant = run.dva.desk.sessions.permissions.grants.get(id_tag)
+        grant = run.dva.core.sessions.permissions.grants.get(id_tag)
         rate = self._rate_of(robot, now)
         speaks = not is_fake and device.device_type != DETECTOR
         return {
@@ -96,16 +96,16 @@ class DeviceRows:
         return round(statistics.median(trips), 4) if trips else None
 
     def _label_of(self, holder: str) -> str:
-        entry = self._run.dva.desk.registry.entries.get(holder)
+        entry = self._run.dva.core.registry.entries.get(holder)
         return self._run.stage.labels.get(holder, "") if entry is None else entry.device.label
 
     def _end_of(self, grant: Grant, now: float) -> float:
         """Return when a permission ends [s]; infinity: never."""
-        desk = self._run.dva.desk
-        holder, robot = (desk.registry.entries.get(one) for one in (grant.holder, grant.robot))
+        core = self._run.dva.core
+        holder, robot = (core.registry.entries.get(one) for one in (grant.holder, grant.robot))
         if holder is None or robot is None:
             return math.inf
-        return desk.access.ends(holder.device, robot.device, grant.level, now)
+        return core.access.ends(holder.device, robot.device, grant.level, now)
 
 
 def _finite(seconds: float | None, digits: int) -> float | None:

@@ -42,7 +42,7 @@ class DvaPages:
         self.port = DvaPort(run, run.recorder, address, sockets)
         self.looked = False
         self._rows = DeviceRows(run)
-        entries = run.dva.desk.registry.entries
+        entries = run.dva.core.registry.entries
         self._fakes = FakeDevices(
             self._make, lambda i: i == DVA or i in entries, self._identity, self._dismiss
         )
@@ -68,7 +68,7 @@ class DvaPages:
     @does("revoke")
     def _revoke(self, _: str, line: OfDevice, on_result: OnResult) -> None:
         robot = line["device"]
-        grant = self._run.dva.desk.sessions.permissions.grants.get(robot)
+        grant = self._run.dva.core.sessions.permissions.grants.get(robot)
         if grant is None:
             raise Refused(f"nobody has a permission for {robot}")
         self._run.dva.revoke(grant.robot, None, holder_told=True)

@@ -56,12 +56,12 @@ class RunFacts:
 
     def is_somebody_free(self) -> bool:
         """Return True if some reachable device has no order."""
-        desk = self._run.dva.desk
+        core = self._run.dva.core
         return any(
             entry.device.device_type in (ROBOT, GUARD)
             and not entry.silent
-            and entry.device.id_tag not in desk.orders.engaged
-            for entry in desk.registry.entries.values()
+            and entry.device.id_tag not in core.orders.engaged
+            for entry in core.registry.entries.values()
         )
 
 

@@ -106,7 +106,7 @@ class RoomActions:
         body, done = report_of(line, place)
 
         def then(_: m.Reply) -> Answered:
-            event = self._world.run.dva.desk.book.near(body.kind, body.position)
+            event = self._world.run.dva.core.book.near(body.kind, body.position)
             return {} if event is None else {"event": event.number}
 
         self._ask(client, line, on_result, body, done, then)
@@ -117,7 +117,7 @@ class RoomActions:
         Raises:
             Refused: there is none.
         """
-        entries = self._world.run.dva.desk.registry.entries
+        entries = self._world.run.dva.core.registry.entries
         found = (i for i, entry in entries.items() if entry.device.label == label)
         id_tag = next(found, None)
         if id_tag is None:

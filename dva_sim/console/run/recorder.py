@@ -138,7 +138,7 @@ def keep_run(run: Run, recorder: ConsoleRecorder) -> None:
         kept.put_new("team", dict(run.stage.labels), radii, key="team")
         for number, when in field.contained.items():
             kept.put_new("contains", number, when, key=f"contained {number}")
-        book = run.dva.desk.book
+        book = run.dva.core.book
         for e in (*book.closed.values(), *book.open.values()):
             kept.put_new("event", *event_facts(e), key=f"event {e.number}")
 

@@ -54,7 +54,7 @@ class ForeignDevices:
 
     def come(self) -> bool:
         """Return True if a device is new since the last call; each has a number from then on."""
-        registry = self._run.dva.desk.registry
+        registry = self._run.dva.core.registry
         if registry.version == self._version:
             return False
         self._version = registry.version
@@ -92,6 +92,6 @@ class ForeignDevices:
         ]
 
     def _here(self) -> list[tuple[str, DeviceEntry]]:
-        entries = self._run.dva.desk.registry.entries
+        entries = self._run.dva.core.registry.entries
         known = ((i, entries.get(i)) for i in self._known)
         return [(i, entry) for i, entry in known if entry is not None and not entry.silent]

@@ -96,7 +96,7 @@ class ConsoleWorld(PublishingWorld):
             if self.sockets is not None:
                 self.sockets.close()
             raise
-        self.feed, self.lag = Feed(self.run, self.run.dva.desk.book), LagRule()
+        self.feed, self.lag = Feed(self.run, self.run.dva.core.book), LagRule()
         self.tell: Tell = lambda *_: None
         self.show: Show = lambda *_: None
         self.windows = self._windows()
@@ -121,7 +121,7 @@ class ConsoleWorld(PublishingWorld):
         )
         self.guards = PlayedGuards(self.run, self.feed)
         self.foreign = ForeignDevices(self.run, self.feed)
-        self.rooms = ConsoleRooms(self.run, self.run.dva.desk.roles)
+        self.rooms = ConsoleRooms(self.run, self.run.dva.core.roles)
         self.alarms = ConsoleAlarms(RunFacts(self.run))
         self.audited: Audited | None = None
         self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)

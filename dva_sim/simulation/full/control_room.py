@@ -65,10 +65,10 @@ def add_dva(
     """
     draw = stage.streams["dva/sessions"]
     permissions = permissions or Permissions(lambda: int(draw.integers(2**LOW_BITS)))
-    return DvaAgent(stage.device("dva", 1), make_desk(stage, permissions), memory, keep_events)
+    return DvaAgent(stage.device("dva", 1), make_core(stage, permissions), memory, keep_events)
 
 
-def make_desk(stage: Stage, permissions: Permissions) -> Dva:
+def make_core(stage: Stage, permissions: Permissions) -> Dva:
     """Build the DVA that a scenario wants.
 
     Raises:

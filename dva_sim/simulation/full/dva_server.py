@@ -1,4 +1,4 @@
-"""The DVA on the network: binds the desk, which knows no clock, to messages and time."""
+"""The DVA on the network: binds the core, which knows no clock, to messages and time."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from dva_sim.protocol import messages as m
 MOST_TOLD = 20_000  # events whose last word is remembered, so that none is said twice
 FIRST_BEAT = 1.27  # after the start, when hardly anything else happens at the same moment [s]
 MOST_TURNED_AWAY = 1000  # devices that were not registered, of which that was told
-TICK = 1.0  # how often the desk looks at deadlines [s]
+TICK = 1.0  # how often the core looks at deadlines [s]
 NOTHING_TO_KEEP: Final = (
     *(m.Registration, m.TaskBid, m.GetGrant, m.GetDeviceList, m.GetSensorInfo),
     *(m.GetEventList, m.GetDispatch, m.GetProposal),
@@ -42,7 +42,7 @@ class DvaAgent:
 
     Args:
         device: Its identity and ways to talk.
-        desk: Core that makes the decisions.
+        core: Core that makes the decisions.
 
     Attributes:
         beats: Heartbeats heard, by device.
@@ -54,13 +54,13 @@ class DvaAgent:
     """
 
     def __init__(
-        self, device: AgentDevice, desk: Dva, memory: Store | None = None, keep_events: bool = True
+        self, device: AgentDevice, core: Dva, memory: Store | None = None, keep_events: bool = True
     ) -> None:
-        self.device, self.desk = device, desk
+        self.device, self.core = device, core
         self.events: dict[int, Event] = {}
         self.facts: deque[Fact] = deque(maxlen=None if keep_events else MOST_KEPT)
         self.on_fact: Callable[[Fact], object] = self.facts.append
-        self._asks = desk.dispatcher.questions.asks
+        self._asks = core.dispatcher.questions.asks
         self._memory, self._keep_events = memory, keep_events
         self._told: dict[int, State] = {}
         self._policy_failures = 0
@@ -75,11 +75,11 @@ class DvaAgent:
     def start(self) -> None:
         """Begin to look at deadlines; a memory tells what was going on before."""
         clock = self.device.clock
-        if self._memory is not None and self._memory.recall(self.desk, clock.now):
-            count = len(self.desk.book.open)
+        if self._memory is not None and self._memory.recall(self.core, clock.now):
+            count = len(self.core.book.open)
             self.device.tell(f"remembers {count} open event{'s' * (count != 1)}")
             self._attend()
-            self._carry_out(self.desk.go_on())
+            self._carry_out(self.core.go_on())
         clock.every(TICK, self._tick, start=clock.now + TICK)
         clock.every(HEARTBEAT_PERIOD, self._beat, start=clock.now + FIRST_BEAT)
 
@@ -99,7 +99,7 @@ class DvaAgent:
 
     def close(self) -> None:
         """End all sessions: permissions of a DVA that has ended are void."""
-        self._carry_out(self.desk.close())
+        self._carry_out(self.core.close())
 
     def silence(self, silent: bool) -> None:
         """Say and decide nothing for a while, though the devices are still heard; or go on."""
@@ -107,7 +107,7 @@ class DvaAgent:
 
     def dismiss(self, device: str) -> None:
         """Forget a device at once, as if it had been silent for long."""
-        self._carry_out(self.desk.dismiss(device, self.device.clock.now))
+        self._carry_out(self.core.dismiss(device, self.device.clock.now))
         self._attend()
 
     def revoke(self, robot: str, takes: str | None, holder_told: bool) -> None:
@@ -118,7 +118,7 @@ class DvaAgent:
             takes: Device that gets it next, if any.
             holder_told: True if the notice reaches the previous holder.
         """
-        sessions, entries = self.desk.sessions, self.desk.registry.entries
+        sessions, entries = self.core.sessions, self.core.registry.entries
         grant = sessions.permissions.grants.get(robot)
         if grant is None:
             return
@@ -131,7 +131,7 @@ class DvaAgent:
         self._carry_out(sends)
 
     def _on_request(self, message: m.Message) -> m.Reply:
-        reply, sends = self.desk.handle(message, self.device.clock.now)
+        reply, sends = self.core.handle(message, self.device.clock.now)
         if isinstance(message.body, m.Registration) and reply.code != m.OK:
             self._tell_refused(message.source, message.body, reply.text)
         self._attend()
@@ -168,7 +168,7 @@ class DvaAgent:
 
     def _attend(self) -> None:
         """Listen to who is there, not to who is silent, and know nothing of who is forgotten."""
-        registry = self.desk.registry
+        registry = self.core.registry
         if registry.version == self._attended:
             return
         self._attended = registry.version
@@ -184,7 +184,7 @@ class DvaAgent:
                 self.device.forget(id_tag)
 
     def _leave_the_silent(self, id_tag: str) -> None:
-        entry = self.desk.registry.entries.get(id_tag)
+        entry = self.core.registry.entries.get(id_tag)
         if entry is not None and entry.silent:
             self._leave(id_tag)
 
@@ -207,7 +207,7 @@ class DvaAgent:
             topics.append(STATUS)
         if device.device_type == ROBOT:
             me = self.device.id_tag
-            topics += [sensor_topic(name, me) for name in self.desk.sensing.alarms]
+            topics += [sensor_topic(name, me) for name in self.core.sensing.alarms]
         heard = partial(self._on_published, source)
         listening = [network.subscribe(self.device.id_tag, source, t, heard) for t in topics]
         self._heard[source] = device.address, listening
@@ -215,16 +215,16 @@ class DvaAgent:
     def _on_published(self, source: str, data: bytes) -> None:
         message = self.device.read(data, source)
         if message is not None and self.device.silent:
-            self.desk.registry.heard(source, self.device.clock.now)
+            self.core.registry.heard(source, self.device.clock.now)
         elif message is not None:
             self.beats[source] += isinstance(message.body, m.Heartbeat)
-            sends = self.desk.note(message, self.device.clock.now)
+            sends = self.core.note(message, self.device.clock.now)
             if sends or isinstance(message.body, m.SensorValue):
                 self._carry_out(sends)
 
     def _tick(self) -> bool:
         if not self.device.silent:
-            self._carry_out(self.desk.tick(self.device.clock.now))
+            self._carry_out(self.core.tick(self.device.clock.now))
             self._attend()
         return not self.is_gone
 
@@ -235,7 +235,7 @@ class DvaAgent:
         for send in sends:
             if isinstance(send.body, m.PermissionGrant) and not self._is_kept(send.session):
                 continue
-            if send.to not in self.desk.registry.entries:
+            if send.to not in self.core.registry.entries:
                 self.device.clock.call_after(0.0, self._undelivered, send)
                 continue
             self.device.ask(
@@ -250,22 +250,22 @@ class DvaAgent:
         # Whoever refuses to hear that something is over knows nothing of it: it is over there.
         if reply.code == m.OK or isinstance(send.body, m.PermissionRevocation | m.OrderProgress):
             now = self.device.clock.now
-            self._carry_out(self.desk.delivered(send, now, reply.content))
+            self._carry_out(self.core.delivered(send, now, reply.content))
         elif isinstance(send.body, m.PermissionGrant):
-            self._carry_out(self.desk.refused_grant(send, reply, self.device.clock.now))
+            self._carry_out(self.core.refused_grant(send, reply, self.device.clock.now))
         else:
             self._undelivered(send)
 
     def _undelivered(self, send: Send) -> None:
         if self.is_gone:
             return
-        self._carry_out(self.desk.undelivered(send, self.device.clock.now))
+        self._carry_out(self.core.undelivered(send, self.device.clock.now))
 
     def _keep_changes(self) -> None:
         """Put each change of an event on the timeline, and all that changed into the memory."""
-        changed = self.desk.book.changes()
+        changed = self.core.book.changes()
         if self._memory is not None:
-            self._complain(self._memory.keep(self.desk, changed, self.device.clock.now))
+            self._complain(self._memory.keep(self.core, changed, self.device.clock.now))
         for event in changed:
             if self._keep_events:
                 self.events[event.number] = event
@@ -274,27 +274,27 @@ class DvaAgent:
 
     def _tell_control_rooms(self, changed: Iterable[Event]) -> None:
         """Publish what is new, if anybody is there who listens for it; facts are kept anyway."""
-        desk, now, facts = self.desk, self.device.clock.now, self.desk.trail.take()
+        core, now, facts = self.core, self.device.clock.now, self.core.trail.take()
         for fact in facts:
             self.on_fact(fact)
-        if not any(desk.registry.of_type(CONTROL_ROOM)):
+        if not any(core.registry.of_type(CONTROL_ROOM)):
             return
         for event in changed:
-            self.device.publish(EVENT, desk.control_rooms.event_status(event, now))
+            self.device.publish(EVENT, core.control_rooms.event_status(event, now))
         for fact in facts:
             self.device.publish(AUDIT, fact.record())
-        if self._asks != desk.dispatcher.questions.asks:
-            self._asks = desk.dispatcher.questions.asks
-            self.device.publish(EVENT, desk.control_rooms.status(now))
+        if self._asks != core.dispatcher.questions.asks:
+            self._asks = core.dispatcher.questions.asks
+            self.device.publish(EVENT, core.control_rooms.status(now))
 
     def _count_failures(self) -> None:
         """Count what a policy got wrong, and tell of the first time."""
-        failures, known = self.desk.counters["policy failed"], self._policy_failures
+        failures, known = self.core.counters["policy failed"], self._policy_failures
         if failures > known:
             self.device.recorder.counters["failed: an answer of a policy"] += failures - known
             self._policy_failures = failures
             if not known:
-                why = self.desk.dispatcher.last_failure
+                why = self.core.dispatcher.last_failure
                 self.device.tell(f"its policy failed, so min_eta decides: {why}", "order")
 
     def _complain(self, problem: str | None) -> None:

@@ -25,7 +25,7 @@ from dva_sim.kernel.recorder import Recorder
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.simulation.full.control_room import make_desk
+from dva_sim.simulation.full.control_room import make_core
 from dva_sim.simulation.full.stage import DVA, Stage
 from dva_sim.simulation.scenario import Scenario, robot_profiles
 
@@ -40,19 +40,19 @@ class TracedDva:
     """Recording wrapper of the DVA core with the same interface.
 
     Args:
-        desk: Core that makes the decisions.
+        core: Core that makes the decisions.
         sink: Callback for lines.
         stage: Stage of the run.
         memory: Store that it will recall, if any.
     """
 
-    def __init__(self, desk: Dva, sink: Sink, stage: Stage, memory: Store | None = None) -> None:
-        self._desk, self._sink = desk, sink
+    def __init__(self, core: Dva, sink: Sink, stage: Stage, memory: Store | None = None) -> None:
+        self._core, self._sink = core, sink
         self._bits: list[int] = []
         self._numbers: OrderedDict[Send, int] = OrderedDict()
         self._given = 0
-        self._roles = dict(desk.roles.known)
-        permissions = desk.sessions.permissions
+        self._roles = dict(core.roles.known)
+        permissions = core.sessions.permissions
         draw = permissions.draw
         permissions.draw = lambda: self._kept(draw())
         kept = None if memory is None else base64.b64encode(memory.copy()).decode()
@@ -61,13 +61,13 @@ class TracedDva:
             "scenario": stage.scenario.model_dump(mode="json"),
             "seed": stage.seed,
             "sessions": permissions.count,
-            "most_devices": desk.registry.most,
+            "most_devices": core.registry.most,
             "memory": kept,
         }
         sink(json.dumps(start))
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._desk, name)
+        return getattr(self._core, name)
 
     def _kept(self, bits: int) -> int:
         self._bits.append(bits)
@@ -78,49 +78,49 @@ class TracedDva:
     def handle(self, message: m.Message, now: float) -> Reaction:
         """See `Dva`, as for all that follow."""
         values = {"do": "handle", "message": encode(message).decode(), "now": now}
-        return self._decided(values, lambda: self._desk.handle(message, now))
+        return self._decided(values, lambda: self._core.handle(message, now))
 
     def note(self, message: m.Message, now: float) -> list[Send]:
         """Handle a published message."""
         values = {"do": "note", "message": encode(message).decode(), "now": now}
-        return self._decided(values, lambda: self._desk.note(message, now))
+        return self._decided(values, lambda: self._core.note(message, now))
 
     def delivered(self, send: Send, now: float, content: Any = None) -> list[Send]:
         """Answered with OK, and with this content."""
         entry = self._about(send, now, m.Reply(1, m.OK, "", content))
-        return self._decided(entry, lambda: self._desk.delivered(send, now, content))
+        return self._decided(entry, lambda: self._core.delivered(send, now, content))
 
     def refused_grant(self, send: Send, reply: m.Reply, now: float) -> list[Send]:
         """Answered, but not with OK."""
         entry = self._about(send, now, reply)
-        return self._decided(entry, lambda: self._desk.refused_grant(send, reply, now))
+        return self._decided(entry, lambda: self._core.refused_grant(send, reply, now))
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
         """Not answered."""
         return self._decided(
-            self._about(send, now, None), lambda: self._desk.undelivered(send, now)
+            self._about(send, now, None), lambda: self._core.undelivered(send, now)
         )
 
     def tick(self, now: float) -> list[Send]:
         """Handle the passing of time."""
-        return self._decided({"do": "tick", "now": now}, lambda: self._desk.tick(now))
+        return self._decided({"do": "tick", "now": now}, lambda: self._core.tick(now))
 
     def go_on(self) -> list[Send]:
         """After a recall."""
-        return self._decided({"do": "go on"}, self._desk.go_on)
+        return self._decided({"do": "go on"}, self._core.go_on)
 
     def dismiss(self, device: str, now: float) -> list[Send]:
         """Somebody is to be there no more."""
         values = {"do": "dismiss", "device": device, "now": now}
-        return self._decided(values, lambda: self._desk.dismiss(device, now))
+        return self._decided(values, lambda: self._core.dismiss(device, now))
 
     def close(self) -> list[Send]:
         """The end."""
-        return self._decided({"do": "close"}, self._desk.close)
+        return self._decided({"do": "close"}, self._core.close)
 
     def check_access(self, now: float) -> None:
         """Only a memory that was recalled asks for this from outside."""
-        self._desk.check_access(now)
+        self._core.check_access(now)
         self._sink(json.dumps({"do": "recall", "now": now}))
 
     def _about(self, send: Send, now: float, reply: m.Reply | None) -> dict[str, Any]:
@@ -147,7 +147,7 @@ class TracedDva:
 
     def _new_roles(self) -> dict[str, Any]:
         """Return the roles of control rooms, if somebody was appointed since the last line."""
-        known = self._desk.roles.known
+        known = self._core.roles.known
         if known == self._roles:
             return {}
         self._roles = dict(known)
@@ -158,9 +158,9 @@ def _nowhere(_: str) -> None:
     """Takes what is kept no longer."""
 
 
-def traced(desk: Dva, sink: Sink, stage: Stage, memory: Store | None) -> Dva:
-    """A desk that is written down; see `TracedDva`."""
-    return cast(Dva, TracedDva(desk, sink, stage, memory))
+def traced(core: Dva, sink: Sink, stage: Stage, memory: Store | None) -> Dva:
+    """A core that is written down; see `TracedDva`."""
+    return cast(Dva, TracedDva(core, sink, stage, memory))
 
 
 def _as_message(reply: m.Reply) -> m.Message:
@@ -224,13 +224,13 @@ class _Again:
     def __init__(self, start: dict[str, Any]) -> None:
         scenario = Scenario.model_validate(start["scenario"])
         _refuse_own_code(scenario)
-        # A desk talks to nobody, and no command is sent.
+        # A core talks to nobody, and no command is sent.
         plain = scenario.model_copy(update={"pattern": "req-rep", "pattern_options": {}})
         stage = Stage(plain, start["seed"], cast(Any, None), Recorder())
         self._bits: deque[int] = deque()
         permissions = Permissions(self._draw, count=start["sessions"])
-        self._desk, self._sends = make_desk(stage, permissions), list[Send]()
-        self._desk.registry.most = start["most_devices"]
+        self._core, self._sends = make_core(stage, permissions), list[Send]()
+        self._core.registry.most = start["most_devices"]
         self._memory = start["memory"]
 
     def _draw(self) -> int:
@@ -241,7 +241,7 @@ class _Again:
         self._bits = deque(entry.get("bits", ()))
         if "roles" in entry:
             roles = {room: ControlRoomRole(role) for room, role in entry["roles"].items()}
-            self._desk.roles.known = roles
+            self._core.roles.known = roles
         if entry["do"] == "recall":
             self._recall(entry["now"])
             return []
@@ -250,39 +250,39 @@ class _Again:
         return _in_words(decision)
 
     def _decide(self, entry: dict[str, Any]) -> Any:
-        desk = self._desk
+        core = self._core
         match entry["do"]:
             case "handle":
-                return desk.handle(decode(entry["message"].encode()), entry["now"])
+                return core.handle(decode(entry["message"].encode()), entry["now"])
             case "note":
-                return desk.note(decode(entry["message"].encode()), entry["now"])
+                return core.note(decode(entry["message"].encode()), entry["now"])
             case "answer":
                 return self._answered(self._sends[entry["to"]], entry["reply"], entry["now"])
             case "tick":
-                return desk.tick(entry["now"])
+                return core.tick(entry["now"])
             case "go on":
-                return desk.go_on()
+                return core.go_on()
             case "dismiss":
-                return desk.dismiss(entry["device"], entry["now"])
+                return core.dismiss(entry["device"], entry["now"])
             case "close":
-                return desk.close()
+                return core.close()
         raise ValueError(f"{entry['do']!r} does not happen to a DVA")
 
     def _answered(self, send: Send, said: str | None, now: float) -> list[Send]:
         if said is None:
-            return self._desk.undelivered(send, now)
+            return self._core.undelivered(send, now)
         reply = decode(said.encode()).body
         assert isinstance(reply, m.Reply)
         if reply.code == m.OK:
-            return self._desk.delivered(send, now, reply.content)
-        return self._desk.refused_grant(send, reply, now)
+            return self._core.delivered(send, now, reply.content)
+        return self._core.refused_grant(send, reply, now)
 
     def _recall(self, now: float) -> None:
         with TemporaryDirectory() as folder:
             file = Path(folder) / "memory.sqlite"
             file.write_bytes(base64.b64decode(self._memory))
             store = Store(file)
-            store.recall(self._desk, now)
+            store.recall(self._core, now)
             store.close()
 
 

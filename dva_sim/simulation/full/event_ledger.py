@@ -21,7 +21,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.observations import Page, Right
 
 STEP_SLACK = 0.5  # of the time of a step of an event [s]
-PENDING_SLACK = 2.0  # the desk looks at deadlines once a second, the audit twice [s]
+PENDING_SLACK = 2.0  # the core looks at deadlines once a second, the audit twice [s]
 SILENT_AFTER = 10.0  # a device of which nothing was heard for so long holds nothing any longer [s]
 LOST_BY_RESTART = 1.0  # a DVA that was killed goes on from the time that it wrote last [s]
 TOLD_WITHIN = (

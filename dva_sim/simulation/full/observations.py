@@ -166,9 +166,9 @@ class Page(NamedTuple):
 
 def page_of(dva: DvaAgent) -> Page:
     """Return the present page of a DVA's book."""
-    grants = dva.desk.sessions.permissions.grants.values()
+    grants = dva.core.sessions.permissions.grants.values()
     rights = [Right(grant.robot, grant.holder, grant.session) for grant in grants]
-    return Page(dva.desk.book, rights, not dva.device.silent)
+    return Page(dva.core.book, rights, not dva.device.silent)
 
 
 class Listener(Protocol):

@@ -80,7 +80,7 @@ class SteppedDrive:
         Raises:
             ConfigError: nobody answers, or one of them refuses.
         """
-        robots = self.run.dva.desk.registry.entries
+        robots = self.run.dva.core.registry.entries
         known = lambda: self._is_known and self._robot in robots  # noqa: E731
         self._pass_until(known, "the DVA does not come to know the robot and its driver")
         self._person.sit_down()

@@ -1,6 +1,6 @@
 """The timed world: thousands of events through the DVA's own core, responders as times only.
 
-Nobody drives and nothing is sent over a network; the messages, the desk, the policies and the
+Nobody drives and nothing is sent over a network; the messages, the core, the policies and the
 clock are the real ones. It serves the study of policies over whole shifts, and the validation
 of the dispatch against what theory says exactly.
 """

@@ -211,8 +211,8 @@ def _speed(streams: Streams, group: Group, name: str) -> float:
     return float(np.clip(speed, SLOWEST * group.speed_mps, FASTEST * group.speed_mps))
 
 
-def open_desk(shift: Team, policy: Policy) -> Dva:
-    """The DVA's desk, with the scenario's rules; nobody falls silent, as nobody can be lost."""
+def make_core(shift: Team, policy: Policy) -> Dva:
+    """The DVA's core, with the scenario's rules; nobody falls silent, as nobody can be lost."""
     config = shift.scenario.dispatch
     rules = Rules(
         escalate_after=limit_of(config.escalate_after_s),
@@ -225,7 +225,7 @@ def open_desk(shift: Team, policy: Policy) -> Dva:
     )
     sessions = Sessions(Permissions(lambda: 0))
     ground = ground_of(shift) if policy.relocates or config.preferences else SiteKnowledge()
-    desk = Dva(
+    core = Dva(
         policy,
         partial(travel, shift),
         rules,
@@ -234,8 +234,8 @@ def open_desk(shift: Team, policy: Policy) -> Dva:
         ground=ground,
         audit=False,
     )
-    desk.registry.silent_after = math.inf
-    return desk
+    core.registry.silent_after = math.inf
+    return core
 
 
 def register(shift: Team) -> None:

@@ -1,4 +1,4 @@
-"""Messages between the desk of the DVA and everybody in a shift: at once, and in order."""
+"""Messages between the core of the DVA and everybody in a shift: at once, and in order."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dva_sim.core.sessions import Send
 from dva_sim.kernel.clock import Clock
 from dva_sim.protocol import messages as m
 
-TICK = 1.0  # how often the desk looks by itself on a network [s]
+TICK = 1.0  # how often the core looks by itself on a network [s]
 DVA = "02:00:00:00:00:01"
 NOON = "12:00:00"  # for people, who are not here to read it
 LEAST = 1e-6  # the clock's own step: a deadline is never looked at twice at one time [s]
@@ -26,16 +26,16 @@ class Taker(Protocol):
 
 
 class Mail:
-    """Carries messages to the desk and from it, one after the other, at once.
+    """Carries messages to the core and from it, one after the other, at once.
 
-    Messages to a busy desk wait. The desk looks at deadlines
+    Messages to a busy core wait. The core looks at deadlines
     exactly when they are due. Where one decision can make the next possible, it also looks again
     a second after it has sent something, as it would on its network, until nothing is left to say.
 
     Args:
-        desk: The DVA's.
+        core: The DVA's.
         clock: Clock of the run.
-        changed: Called when the desk has done something, with whom the message was about.
+        changed: Called when the core has done something, with whom the message was about.
         moved: Callback before each decision of the core, to update positions.
         attentive: True if one decision can make the next possible.
 
@@ -47,13 +47,13 @@ class Mail:
 
     def __init__(
         self,
-        desk: Dva,
+        core: Dva,
         clock: Clock,
         changed: Callable[[object], None],
         moved: Callable[[], None],
         attentive: bool,
     ) -> None:
-        self.desk, self._clock = desk, clock
+        self.core, self._clock = core, clock
         self._changed, self._moved = changed, moved
         self.takers: dict[str, Taker] = {}
         self.sent = 0
@@ -64,20 +64,20 @@ class Mail:
         self._attentive = attentive
 
     def say(self, source: str, body: m.Body, about: object = None) -> None:
-        """Put a message to the desk into the box; `carry` brings it."""
+        """Put a message to the core into the box; `carry` brings it."""
         self._waiting.append((source, body, about))
 
     def publish(self, source: str, body: m.Body) -> None:
-        """Tell the desk something that nobody answers."""
-        self.desk.note(self._message(source, body), self._clock.now)
+        """Tell the core something that nobody answers."""
+        self.core.note(self._message(source, body), self._clock.now)
 
     def carry(self) -> None:
         """Bring everything that was said, and what was said in answer, until all is quiet."""
-        waiting, desk, now = self._waiting, self.desk, self._clock.now
+        waiting, core, now = self._waiting, self.core, self._clock.now
         while waiting:
             source, body, about = waiting.popleft()
             self._moved()
-            reply, sends = desk.handle(self._message(source, body), now)
+            reply, sends = core.handle(self._message(source, body), now)
             self.sent += 1
             if reply.code != m.OK:
                 self.refused[f"{type(body).__name__}: {m.CODE_NAMES[reply.code]}"] += 1
@@ -87,9 +87,9 @@ class Mail:
         self._look_again()
 
     def tick(self) -> None:
-        """Let the desk look at what time has brought."""
+        """Let the core look at what time has brought."""
         self._moved()
-        sends = self.desk.tick(self._clock.now)
+        sends = self.core.tick(self._clock.now)
         self._changed(None)
         self._deliver(sends)
         self.carry()
@@ -99,7 +99,7 @@ class Mail:
         return m.Message(DVA, number, source, NOON, 0, body)
 
     def _deliver(self, sends: list[Send]) -> None:
-        """Hand over what the desk wants delivered, and tell it how that went."""
+        """Hand over what the core wants delivered, and tell it how that went."""
         queue = deque(sends)
         now = self._clock.now
         if self._attentive and sends:
@@ -108,13 +108,13 @@ class Mail:
             send = queue.popleft()
             taker = self.takers.get(send.to)
             taken = taker is not None and taker.take(send.body)
-            answer = self.desk.delivered if taken else self.desk.undelivered
+            answer = self.core.delivered if taken else self.core.undelivered
             queue.extend(answer(send, now))
         self._changed(None)
 
     def _look_again(self) -> None:
         """Be there at the next deadline."""
-        due = min(self.desk.next_deadline(), self._again)
+        due = min(self.core.next_deadline(), self._again)
         if due < self._due:
             self._due = max(due, self._clock.now + LEAST)
             self._clock.call_at(self._due, self._on_due, self._due)
@@ -124,7 +124,7 @@ class Mail:
             return  # an earlier one was found meanwhile, and looks for the next
         self._due = math.inf
         now = self._clock.now + LEAST
-        if self.desk.next_deadline() <= now or self._again <= now:
+        if self.core.next_deadline() <= now or self._again <= now:
             self._again = math.inf
             self.tick()
         else:

@@ -14,8 +14,8 @@ there counts T. Response is for all events, confirmation and containment for the
 Percentiles are over all events of the cohort, never being infinitely late; nan where the
 percentile is not reached by T.
 
-Use of the team, its exposure and what the desk counted are of the whole measured time, from the
-end of the warm-up to the horizon, or (the desk's counts) of the whole run.
+Use of the team, its exposure and what the core counted are of the whole measured time, from the
+end of the warm-up to the horizon, or (the core's counts) of the whole run.
 """
 
 from __future__ import annotations
@@ -298,7 +298,7 @@ def run_row(recording: TimedRecording, events: Columns, follow: float) -> Row:
     if recording.scenario.dispatch.containment:
         row |= _containment(only(events, events["is_true"]), follow)
     row |= {"zone_ratio": zone_ratio(events, follow)} | _bound(events, follow)
-    row |= _team(recording) | _exposure(recording) | _desk(recording)
+    row |= _team(recording) | _exposure(recording) | _dispatching(recording)
     return row | {"violations": sum(recording.violations.values()), "simulated_s": recording.ended}
 
 
@@ -382,7 +382,7 @@ def _exposure(recording: TimedRecording) -> Row:
     }
 
 
-def _desk(recording: TimedRecording) -> Row:
+def _dispatching(recording: TimedRecording) -> Row:
     counted = recording.counters
     row: Row = {what: counted[what] for what in ("preempted", "relocated", "auctions", "overruled")}
     return row | {"policy_failed": counted["policy failed"], "messages": recording.messages}

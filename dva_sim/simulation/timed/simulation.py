@@ -54,7 +54,7 @@ def _conservation(shift: Shift) -> Iterator[str]:
     held = sum(len(incidents) for incidents in shift.events.values())
     if shift.total != len(shift.unnoticed) + held + sum(shift.settled.values()):
         yield "an event of the world is lost"
-    book = shift.desk.book
+    book = shift.core.book
     if sum(book.counts.values()) != book.total:
         yield "the book's counts do not add up"
     if book.open.keys() != shift.events.keys():
@@ -65,7 +65,7 @@ def _conservation(shift: Shift) -> Iterator[str]:
 
 def _limits(shift: Shift) -> Iterator[str]:
     """Nothing waits beyond its deadline, and no more than may wait."""
-    rules, now, book = shift.desk.orders.rules, shift.clock.now, shift.desk.book
+    rules, now, book = shift.core.orders.rules, shift.clock.now, shift.core.book
     for event in book.waiting.values():
         if now - event.waiting_since > rules.escalate_after + SLACK:
             yield "an event waits beyond its deadline"
@@ -75,12 +75,12 @@ def _limits(shift: Shift) -> Iterator[str]:
 
 def _team(shift: Shift) -> Iterator[str]:
     """One event per responder and one responder per event, as the DVA believes it to be."""
-    engaged = shift.desk.orders.engaged
+    engaged = shift.core.orders.engaged
     for unit in shift.units:
         job, at = unit.job, [event.number for event in engaged.all(unit.device)]
         if ([] if job is None else [job.order.event_id]) != at:
             yield "a responder is at something else than the DVA believes"
-    for event in shift.desk.book.in_state(State.ASSIGNED, State.ON_SCENE):
+    for event in shift.core.book.in_state(State.ASSIGNED, State.ON_SCENE):
         if event.responder is None:
             yield "an event that somebody should be at has nobody"
         elif event.responder == event.actor:
@@ -114,7 +114,7 @@ class Shift:
         self.units = control_room.hire(self, self.streams, self.stations)
         self.by_device = {unit.device: unit for unit in self.units}
         self.numbers = {unit.device: unit.number for unit in self.units}
-        self.desk = control_room.open_desk(self, policy)
+        self.core = control_room.make_core(self, policy)
         self.mail = self._open_mail(policy)
         self.records = [UnitRecord(unit.name, unit.kind) for unit in self.units]
         self.events: dict[int, list[Incident]] = {}
@@ -141,7 +141,7 @@ class Shift:
         """One decision leads to the next where orders build on each other, or guards move."""
         containment = self.scenario.dispatch.containment
         attentive = containment or policy.preempts or policy.relocates
-        return Mail(self.desk, self.clock, self._changed, self._tell_who_moves, attentive)
+        return Mail(self.core, self.clock, self._changed, self._tell_who_moves, attentive)
 
     def _begin_shift(self, units: list[Unit]) -> None:
         for unit in units:
@@ -183,7 +183,7 @@ class Shift:
                 self.ledger.write(incident, CODES[incident.event.state.value], self.numbers)
         for incident in self.unnoticed.values():
             self.ledger.write(incident, CODES["unnoticed"], self.numbers)
-        counters = Counter(self.desk.counters)
+        counters = Counter(self.core.counters)
         counters.update({f"refused {text}": n for text, n in self.mail.refused.items()})
         for unit, record in zip(self.units, self.records, strict=True):
             record.distance, record.jobs = unit.distance, unit.jobs
@@ -250,7 +250,7 @@ class Shift:
 
     def _changed(self, about: object) -> None:
         """Follow the events of the DVA."""
-        changes = self.desk.book.changes()
+        changes = self.core.book.changes()
         if changes:
             now = self.clock.now
             for event in changes:
@@ -283,7 +283,7 @@ class Shift:
 
     def _follow(self, event: Event, now: float) -> None:
         """Count an event where it stands now: waiting, served or over."""
-        number, book, stream = event.number, self.desk.book, self.events[event.number][0].stream
+        number, book, stream = event.number, self.core.book, self.events[event.number][0].stream
         waited = number not in self._served
         if number not in book.open:
             (self.waiting if waited else self.served)[stream].change(-1, now)
@@ -426,7 +426,7 @@ class Shift:
 
     def moving(self, unit: Unit, moves: bool) -> None:
         """Note that a unit starts or stops moving; inform the DVA of units it might call."""
-        if moves and (unit.job is None or self.desk.dispatcher.policy.preempts):
+        if moves and (unit.job is None or self.core.dispatcher.policy.preempts):
             self._moving[unit] = None
         else:
             self._moving.pop(unit, None)

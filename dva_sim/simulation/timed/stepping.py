@@ -71,7 +71,7 @@ class SteppedShift:
 
     def new_events(self) -> list[Event]:
         """Events that were reported since this was asked last, as the DVA knows them."""
-        book = self._shift.desk.book
+        book = self._shift.core.book
         first, self._known = self._known + 1, book.total
         return [e for number in range(first, book.total + 1) if (e := book.get(number))]
 

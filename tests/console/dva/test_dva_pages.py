@@ -84,7 +84,7 @@ def test_devices_outlast_a_server_that_was_stopped_for_long(page):
     page.let(60.0)
     page.do("server_start", port=5555)
     page.let(2.0)
-    assert not any(e.silent for e in page.world.run.dva.desk.registry.entries.values())
+    assert not any(e.silent for e in page.world.run.dva.core.registry.entries.values())
 
 
 def test_a_person_is_told_for_how_long_the_server_has_been_silent(page):
@@ -114,7 +114,7 @@ def test_a_stopped_server_decides_and_says_nothing(page):
     page.world.recorder.message_sent = note
     page.let(90.0)  # in which fire and gas would have been reported, and guards sent
     assert sent == []
-    assert not page.world.run.dva.desk.book.total
+    assert not page.world.run.dva.core.book.total
 
 
 @pytest.mark.parametrize("what", ["server_stop", "server_start"])

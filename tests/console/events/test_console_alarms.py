@@ -96,7 +96,7 @@ def test_a_robot_that_waits_for_its_first_command_is_not(alarms):
 def test_nobody_left_to_send_is_an_alarm_only_while_something_waits(page, alarms):
     waits = event(state="pending")
     assert texts(alarms, waits) == ["Gas leak, Lab"]  # somebody is free
-    for entry in page.world.run.dva.desk.registry.entries.values():
+    for entry in page.world.run.dva.core.registry.entries.values():
         entry.silent = True
 
     assert any(unnamed(text, "nobody", "1 wait") == [] for text in texts(alarms, waits))

@@ -43,8 +43,8 @@ def ordered(page):
 
 def event(page):
     return (
-        next(iter(page.world.run.dva.desk.book.open.values()), None)
-        or list(page.world.run.dva.desk.book.closed.values())[-1]
+        next(iter(page.world.run.dva.core.book.open.values()), None)
+        or list(page.world.run.dva.core.book.closed.values())[-1]
     )
 
 
@@ -150,7 +150,7 @@ def test_a_body_stands_where_the_person_says_and_others_see_it(page):
     at = {row[0]: row[1:3] for row in page.told("pos")[-1]["p"]}
     number = line(page)["guard"]
     assert at[number] == [pytest.approx(100 * x, abs=3), pytest.approx(100 * y, abs=3)]
-    known = page.world.run.dva.desk.registry.entries[guard(page).device.id_tag].position
+    known = page.world.run.dva.core.registry.entries[guard(page).device.id_tag].position
     frame = page.world.run.stage.site.frame
     assert frame.to_xy(known.latitude, known.longitude) == pytest.approx((x, y), abs=0.05)
     near = page.world.run.field.world.neighbours(x, y, 0.5)
@@ -179,12 +179,12 @@ def test_nobody_stands_in_a_wall_or_in_somebody_else(page):
 def test_a_person_reports_an_event(page):
     assert page.do("guard_join", guard="guard-2")[0]
     x, y = guard(page).walking.place
-    before = len(page.world.run.dva.desk.book.open)
+    before = len(page.world.run.dva.core.book.open)
     done, _ = page.do("guard_report", kind="gas_leak", x_m=x, y_m=y, severity="high")
     assert done
     page.let(0.5)
     found = [e for e in page.told("events")[-1]["events"] if e["kind"] == "gas_leak"]
-    assert len(page.world.run.dva.desk.book.open) == before + 1
+    assert len(page.world.run.dva.core.book.open) == before + 1
     assert found[0]["severity"] == "high"
     for wrong in ({"kind": "war"}, {"severity": 7}, {"x_m": math.inf}):
         about = {"kind": "fire", "x_m": x, "y_m": y, "severity": "low"} | wrong
@@ -226,7 +226,7 @@ def test_without_an_order_there_is_nothing_to_say(page):
 def test_operators_are_people_by_number(monkeypatch):
     page = PhonePage(monkeypatch, operator__count=3, operator__kind={1: "person", 3: "person"})
     page.let(1.0)
-    labels = {e.device.label for e in page.world.run.dva.desk.registry.entries.values()}
+    labels = {e.device.label for e in page.world.run.dva.core.registry.entries.values()}
     assert {"console-1", "console-2", "operator-2"} <= labels
     assert not {"operator-1", "operator-3"} & labels
 

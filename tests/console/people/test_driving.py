@@ -270,7 +270,7 @@ def test_the_age_of_an_event_is_that_of_its_state(page):
     page.let(20.0)
     event = page.told("events")[-1]["events"][0]
     assert (event["state"], event["over"]) == ("assigned", False)
-    book = page.world.run.dva.desk.book
+    book = page.world.run.dva.core.book
     assert event["since_ms"] == round(1000 * book.open[event["number"]].times["assigned"])
 
 

@@ -109,7 +109,7 @@ def test_another_device_joins_over_the_network(page):
     network.introduce(DVA, world.sockets.dva)
     newcomer = stage.device("operator", 9)
     newcomer.register()
-    becomes(page, lambda: newcomer.id_tag in world.run.dva.desk.registry.entries)
+    becomes(page, lambda: newcomer.id_tag in world.run.dva.core.registry.entries)
     network.close()
 
 

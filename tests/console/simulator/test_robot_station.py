@@ -35,7 +35,7 @@ class Bench:
         self.world = RobotWorld(options.read(), clock=PacedClock())
         self.lines = []
         self.world.tell = lambda line, key="": self.lines.append(checked(line))
-        self.desk = LoneRobotActions(self.world)
+        self.core = LoneRobotActions(self.world)
         self.world.begin()
         self.world.clock.go()
         self.count, self.code, self.heard = 0, m.OK, []
@@ -75,7 +75,7 @@ class Bench:
         self.count += 1
         number = f"a{self.count}"
         robot = {"robot": 0} if "robot" in hints_of(ACTIONS[what].arguments) else {}
-        self.desk.take({"id": number, "client": "c1", "do": what, **robot, **about})
+        self.core.take({"id": number, "client": "c1", "do": what, **robot, **about})
 
         def answers():
             return [one for one in self.lines if one["k"] == "done" and one["id"] == number]

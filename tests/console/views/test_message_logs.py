@@ -29,7 +29,7 @@ GROUPS = {"Access", "Dispatch", "Event", "Mission", "Sensor", "TeleOp"}  # of se
 # --- in the world ----------------------------------------------------------------------------
 
 
-class Desk:
+class LoggedDva:
     """A DVA on a virtual network that answers each request at once."""
 
     def __init__(self) -> None:
@@ -44,34 +44,34 @@ class Desk:
 
 
 @pytest.fixture
-def desk() -> Desk:
+def logged() -> LoggedDva:
     """One whose log is kept."""
-    made = Desk()
+    made = LoggedDva()
     made.logs.keep("dva")
     return made
 
 
-def test_nothing_taps_a_device_that_nobody_looks_at(desk):
-    assert list(desk.network.taps) == [DVA]
-    desk.logs.look({"robot-1": True, "nobody": False})
-    assert list(desk.network.taps) == [DVA, ROBOT]
-    desk.logs.look({})
-    assert list(desk.network.taps) == [DVA]
+def test_nothing_taps_a_device_that_nobody_looks_at(logged):
+    assert list(logged.network.taps) == [DVA]
+    logged.logs.look({"robot-1": True, "nobody": False})
+    assert list(logged.network.taps) == [DVA, ROBOT]
+    logged.logs.look({})
+    assert list(logged.network.taps) == [DVA]
 
 
-def test_a_batch_holds_what_came_since_the_last_one(desk):
-    desk.ask(b"one")
-    desk.ask(b"two")
-    (reported,) = desk.logs.batches()
+def test_a_batch_holds_what_came_since_the_last_one(logged):
+    logged.ask(b"one")
+    logged.ask(b"two")
+    (reported,) = logged.logs.batches()
     found = [(one[0], one[2], one[3]) for one in reported["lines"]]
     assert found == [(1, "one", "re"), (2, "two", "re")]
-    assert desk.logs.batches() == []
+    assert logged.logs.batches() == []
 
 
-def test_of_a_flood_the_newest_are_told_and_numbers_say_how_many_are_not(desk):
+def test_of_a_flood_the_newest_are_told_and_numbers_say_how_many_are_not(logged):
     for n in range(1, 1405):
-        desk.ask(b"%d" % n)
-    (reported,) = desk.logs.batches()
+        logged.ask(b"%d" % n)
+    (reported,) = logged.logs.batches()
     assert [one[0] for one in reported["lines"]] == list(range(1405 - LOG_BATCH, 1405))
     logs = KeptLogs()
     looks = looking(logs)
@@ -82,19 +82,19 @@ def test_of_a_flood_the_newest_are_told_and_numbers_say_how_many_are_not(desk):
     assert len(line_["lines"]) == AT_ONCE
 
 
-def test_large_messages_make_a_batch_short_and_are_cut(desk):
+def test_large_messages_make_a_batch_short_and_are_cut(logged):
     for _ in range(60):
-        desk.ask(b"x" * 60_000)
-    (reported,) = desk.logs.batches()
+        logged.ask(b"x" * 60_000)
+    (reported,) = logged.logs.batches()
     sizes = [len(one[2]) for one in reported["lines"]]
     assert set(sizes) == {CUT}
     assert sum(sizes) < LOG_BYTES + CUT
 
 
 def test_who_listens_in_this_process_has_each_exchange():
-    desk, heard = Desk(), []
-    desk.logs.listen("robot-1", heard.append)
-    desk.ask(b"go", ROBOT)
+    logged, heard = LoggedDva(), []
+    logged.logs.listen("robot-1", heard.append)
+    logged.ask(b"go", ROBOT)
     assert [(one.data, one.reply) for one in heard] == [(b"go", b"re")]
 
 

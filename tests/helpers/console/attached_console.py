@@ -36,7 +36,7 @@ class AttachedPage:
 
     def __init__(self, world: PhonePage, audit: Path, role: str = "supervise") -> None:
         self.world, run = world, world.world.run
-        run.dva.desk.roles.appoint(OWN, role)
+        run.dva.core.roles.appoint(OWN, role)
         links = AttachedLinks(
             clock=world.world.clock,
             recorder=Recorder(),

@@ -9,7 +9,7 @@ import itertools
 from collections.abc import Iterator
 from pathlib import Path
 
-from helpers.dva.dispatch_desk import GUARD, HERE, Office
+from helpers.dva.dispatch_office import GUARD, HERE, Office
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dva import Dva
@@ -45,8 +45,8 @@ class Case:
 
     def __init__(self) -> None:
         rules = Rules(escalate_after=WAITS, containment=True, max_attempts=MOST, order_limit=LIMIT)
-        self.desk: Dva = Office(rules=rules).desk
-        self.event: Event = self.desk.book.add("fire", HERE, 0.5, BEGAN, contain=True)
+        self.core: Dva = Office(rules=rules).core
+        self.event: Event = self.core.book.add("fire", HERE, 0.5, BEGAN, contain=True)
 
     def into(self, state: str) -> None:
         """Bring the event into a state, at its beginning."""
@@ -55,7 +55,7 @@ class Case:
 
     def happens(self, what: str, now: float) -> None:
         """Let something happen, if it can."""
-        orders, event, state = self.desk.orders, self.event, self.state
+        orders, event, state = self.core.orders, self.event, self.state
         is_order = state in ("ORDERED", "ACTOR_ORDERED")
         match what:
             case "SEND" if state == "PENDING":
@@ -79,7 +79,7 @@ class Case:
             case "CALL_AWAY" if orders.may_preempt(event, now):
                 orders.redirect(event, now)
             case "REPORT" if event.open:
-                self.desk.book.merge(event, 0.9)
+                self.core.book.merge(event, 0.9)
             case "DEADLINE":
                 orders.give_up(now)
             case "ORDER_LIMIT" if event.open:
@@ -88,7 +88,7 @@ class Case:
                 orders.escalate(event, now)
 
     def _order(self) -> m.Order:
-        orders, event = self.desk.orders, self.event
+        orders, event = self.core.orders, self.event
         return next(send for send in orders.again() if send.body.event_id == event.number)
 
     @property

@@ -30,9 +30,9 @@ def give(controller: RobotController, grant: m.PermissionGrant, now: float = 0.0
     return reported if question is None else hear(controller, confirmation(grant), now)
 
 
-def enter(desk: Dva, robot: str, body: m.Body) -> None:
+def enter(core: Dva, robot: str, body: m.Body) -> None:
     """Let a DVA's book say what it is made to tell a robot."""
-    known = desk.sessions.permissions
+    known = core.sessions.permissions
     if isinstance(body, m.PermissionGrant):
         address, sensors = body.address, body.sensors
         known.restore(

@@ -1,4 +1,4 @@
-"""Days that go wrong: a desk at random among devices that fail, lie, vanish and come back."""
+"""Days that go wrong: a core at random among devices that fail, lie, vanish and come back."""
 
 import math
 import random
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from helpers.dva.dispatch_desk import DVA, crow, east
+from helpers.dva.dispatch_office import DVA, crow, east
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import (
@@ -71,7 +71,7 @@ class Chaos(Policy):
 
 
 class Walk:
-    """One day at the desk.
+    """One day at the core.
 
     Args:
         seed: Random seed.
@@ -97,7 +97,7 @@ class Walk:
         self.now, self.numbers = 0.0, dict.fromkeys(DEVICES, 0)
         self.alive = dict.fromkeys(DEVICES, True)
         self.in_flight: list[Send] = []
-        self.desk, self.memory = self._desk(), self._store()
+        self.core, self.memory = self._core(), self._store()
         for device in DEVICES:
             self._register(device)
             self._status(device)
@@ -109,11 +109,11 @@ class Walk:
         store.keeps_time = 0.0
         return store
 
-    def _desk(self) -> Dva:
+    def _core(self) -> Dva:
         sessions = Sessions(Permissions(lambda: self.dice.randrange(2**32)))
         rng = np.random.default_rng(self.dice.randrange(2**31))
         holds = AccessRule(until=self.access_until)
-        desk = Dva(
+        core = Dva(
             self._policy(),
             crow,
             self.rules,
@@ -124,8 +124,8 @@ class Walk:
             roles=Roles(dict(ROLES)),
             ask_first=self.ask_first,
         )
-        _watch(desk)
-        return desk
+        _watch(core)
+        return core
 
     def _policy(self) -> Policy:
         return Chaos() if self.policy == "chaos" else POLICIES[self.policy]()
@@ -139,7 +139,7 @@ class Walk:
         self.check(name)
 
     def _take(self, sends: list[Send]) -> None:
-        assert self.memory.keep(self.desk, self.desk.book.changes(), self.now) is None
+        assert self.memory.keep(self.core, self.core.book.changes(), self.now) is None
         self.in_flight += sends
 
     def say(self, source: str, body: m.Body, number: int | None = None) -> list[Send]:
@@ -147,7 +147,7 @@ class Walk:
             number = self.numbers[source] = self.numbers[source] + 1
         stamp = f"12:00:{self.dice.randrange(60):02d}.{self.dice.randrange(10**6)}"
         message = m.Message(DVA, number, source, stamp, 0, body)
-        reply, sends = self.desk.handle(message, self.now)
+        reply, sends = self.core.handle(message, self.now)
         assert reply.answers == number
         return sends
 
@@ -155,8 +155,8 @@ class Walk:
         return self.dice.choice([d for d, kind in DEVICES.items() if not kinds or kind in kinds])
 
     def _some_event(self) -> int:
-        newest = self.desk.book.total
-        known = list(self.desk.book.open) or [newest]
+        newest = self.core.book.total
+        known = list(self.core.book.open) or [newest]
         return self.dice.choice([*known, *known, max(1, newest), newest + 1])
 
     def _place(self) -> m.Position:
@@ -169,7 +169,7 @@ class Walk:
 
     def _impostor(self) -> list[Send]:
         body, device = m.Registration("x", self.dice.choice(list(KINDS)), "10.0.0.66"), self._any()
-        if device not in self.desk.registry.entries:
+        if device not in self.core.registry.entries:
             return []  # who is forgotten may be anybody
         return self.say(device, body)
 
@@ -189,7 +189,7 @@ class Walk:
         body: m.Body = m.PersonStatus("waiting", self._place())
         if DEVICES[device] == "Robot":
             body = m.RobotStatus("Idle", self._place(), 0.0, 0.0, 0.0, 5)
-        self.desk.note(m.Message(DVA, 1, device, "12:00:00", 0, body), self.now)
+        self.core.note(m.Message(DVA, 1, device, "12:00:00", 0, body), self.now)
 
     def _report(self) -> list[Send]:
         finding = "refuted" if self.dice.random() < 0.25 else "detected"
@@ -199,10 +199,10 @@ class Walk:
         return self.say(self._any("Sensor", "Guard"), body)
 
     def _delivered(self) -> list[Send]:
-        return self._answer(self.desk.delivered, keep=0.1)
+        return self._answer(self.core.delivered, keep=0.1)
 
     def _undelivered(self) -> list[Send]:
-        return self._answer(self.desk.undelivered, keep=0.05)
+        return self._answer(self.core.undelivered, keep=0.05)
 
     def _answer(self, what: Callable[[Send, float], list[Send]], keep: float) -> list[Send]:
         """Word of something sent comes back, in any order; of a few things twice."""
@@ -216,7 +216,7 @@ class Walk:
 
     def _progress(self) -> list[Send]:
         """Mostly of who has the order, and mostly about its event."""
-        working = self.desk.orders.engaged
+        working = self.core.orders.engaged
         device = self._any()
         if working and self.dice.random() < 0.8:
             device = self.dice.choice(list(working))
@@ -228,7 +228,7 @@ class Walk:
 
     def _found(self) -> list[Send]:
         number = self._some_event()
-        event, device = self.desk.book.get(number), self._any()
+        event, device = self.core.book.get(number), self._any()
         if event is not None and event.sent and self.dice.random() < 0.8:
             device = self.dice.choice(sorted(event.sent))
         finding = self.dice.choice(["confirmed", "confirmed", "refuted", "contained", "detected"])
@@ -236,14 +236,14 @@ class Walk:
         return self.say(device, m.EventReport(number, kind, place, 0.5, 0.9, finding))
 
     def _bid(self) -> list[Send]:
-        running = self.desk.dispatcher.auctions.running
+        running = self.core.dispatcher.auctions.running
         number = self.dice.choice(list(running)) if running else self._some_event()
         return self.say(self._any("Guard", "Robot"), m.TaskBid(number, self.dice.random() * 100))
 
     def _decide(self) -> list[Send]:
         """Somebody at a control room decides: mostly what can be, and about what is there."""
         number, device = self._some_event(), self._any("Guard", "Robot")
-        event = self.desk.book.get(number)
+        event = self.core.book.get(number)
         seen = None if event is None or self.dice.random() < 0.4 else event.handling.decisions
         if event is not None and event.holder and self.dice.random() < 0.3:
             device = event.responder or device
@@ -271,7 +271,7 @@ class Walk:
         return self.say(self._any(), body)
 
     def _give_back(self) -> list[Send]:
-        held = self.desk.sessions.permissions.all()
+        held = self.core.sessions.permissions.all()
         if not held:
             return []
         grant = self.dice.choice(held)
@@ -283,42 +283,42 @@ class Walk:
         return self.pass_time(self.dice.choice([0.125, 1.0, 1.0, 2.0, 5.0, 9.0, 12.0, 40.0, 130.0]))
 
     def _deadline(self) -> list[Send]:
-        due = self.desk.next_deadline()
+        due = self.core.next_deadline()
         return self.pass_time(min(math.ceil((due - self.now) * 8) / 8, 60.0) if due < 1e9 else 1.0)
 
     def pass_time(self, seconds: float) -> list[Send]:
-        """Time passes: who is alive is heard, and the desk looks at its deadlines."""
+        """Time passes: who is alive is heard, and the core looks at its deadlines."""
         self.now += max(seconds, 0.125)
         for device, alive in self.alive.items():
             if alive:
                 beat = m.Message(DVA, 1, device, "12:00:00", None, m.Heartbeat())
-                self.desk.note(beat, self.now)
-        sends = self.desk.tick(self.now)
-        assert self.desk.next_deadline() > self.now
-        ends = (e.waiting_since for e in self.desk.book.waiting.values())
+                self.core.note(beat, self.now)
+        sends = self.core.tick(self.now)
+        assert self.core.next_deadline() > self.now
+        ends = (e.waiting_since for e in self.core.book.waiting.values())
         assert all(self.now < since + self.rules.escalate_after for since in ends)
-        pending = {n for n, e in self.desk.book.open.items() if e.state is State.PENDING}
-        assert self.desk.dispatcher.auctions.running.keys() <= pending
+        pending = {n for n, e in self.core.book.open.items() if e.state is State.PENDING}
+        assert self.core.dispatcher.auctions.running.keys() <= pending
         return sends
 
     def _kill(self) -> list[Send]:
-        """The desk is killed, and a new one goes on from the file."""
-        before = snapshot(self.desk)
+        """The core is killed, and a new one goes on from the file."""
+        before = snapshot(self.core)
         self.memory.close()
-        self.desk, self.memory = self._desk(), self._store()
-        self.memory.recall(self.desk, self.now)
-        after = snapshot(self.desk)
+        self.core, self.memory = self._core(), self._store()
+        self.memory.recall(self.core, self.now)
+        after = snapshot(self.core)
         assert after == before, {k: (before[k], after[k]) for k in after if after[k] != before[k]}
         for device in DEVICES:
             self._status(device)
         self.in_flight = [s for s in self.in_flight if self.dice.random() < 0.5]
-        return self.desk.orders.again()
+        return self.core.orders.again()
 
     # --- what must hold ----------------------------------------------------------------
 
     def check(self, after: str) -> None:
         """All invariants."""
-        desk, book = self.desk, self.desk.book
+        core, book = self.core, self.core.book
         assert sum(book.counts.values()) == book.total, after
         for state in State:
             if state in (State.PENDING, *LOOKS):
@@ -328,17 +328,17 @@ class Walk:
         assert not any(event.open for event in book.closed.values()), after
         waiting = {n for n, e in book.open.items() if e.waits_for is not None}
         assert book.waiting.keys() == waiting, after
-        for device, event in desk.orders.engaged.pairs():
+        for device, event in core.orders.engaged.pairs():
             assert device in (event.responder, event.operator, event.actor), after
             assert book.get(event.number) is event, after
         for event in (*book.open.values(), *book.closed.values()):
             self._check_event(event, after)
         looked = [e.responder for e in book.open.values() if e.state in LOOKS]
         assert len(looked) == len(set(looked)), after
-        assert not desk.dispatcher.situations._bound_for.keys() & set(desk.orders.engaged), after
+        assert not core.dispatcher.situations._bound_for.keys() & set(core.orders.engaged), after
 
     def _check_event(self, event: Event, after: str) -> None:
-        engaged = self.desk.orders.engaged
+        engaged = self.core.orders.engaged
         for steps in (STEPS, ACT_STEPS):
             times = [event.times[step] for step in steps if step in event.times]
             assert times == sorted(times), (after, event)
@@ -361,33 +361,33 @@ class Walk:
 
     def recover(self) -> float:
         """Let everybody obey; returns the time until no event is open [s]."""
-        began, left = self.now, len(self.desk.book.open)
+        began, left = self.now, len(self.core.book.open)
         self.in_flight.clear()
         for device in DEVICES:
             self.alive[device] = True
             self._take(self._register(device))
             self._status(device)
-        for grant in self.desk.sessions.permissions.all():
+        for grant in self.core.sessions.permissions.all():
             body = m.PermissionRevocation(grant.robot, grant.holder, grant.session)
             self._take(self.say(grant.holder, body))
         self._take(self.say(ROOMS[0], m.SetDispatch("automatic")))
-        for event in list(self.desk.book.open.values()):
+        for event in list(self.core.book.open.values()):
             if event.handling.taken_off:  # whom the policy may not send there, it does not
                 self._take(self.say(ROOMS[0], m.Escalate(event.number)))
         # What was begun ends by its limit; then each event takes a few seconds of somebody's.
         bound = 2 * LIMIT + 20.0 + 30.0 * left
-        while self.desk.book.open:
+        while self.core.book.open:
             self._take(self.pass_time(1.0))
             while self.in_flight:
                 self._obey(self.in_flight.pop(0))
             self.check("recovery")
-            assert self.now - began < bound, (self.rules, self.policy, self.desk.book.open)
+            assert self.now - began < bound, (self.rules, self.policy, self.core.book.open)
         return self.now - began
 
     def _obey(self, send: Send) -> None:
         """Somebody gets an order, and carries it out at once."""
         body = send.body
-        self._take(self.desk.delivered(send, self.now))
+        self._take(self.core.delivered(send, self.now))
         if isinstance(body, m.TaskAnnouncement):
             self._take(self.say(send.to, m.TaskBid(body.event_id, 10.0)))
         elif isinstance(body, m.Order) and body.task == "stand_by":
@@ -429,9 +429,9 @@ STEPS_OF_A_WALK = {
 }
 
 
-def _watch(desk: Dva) -> None:
+def _watch(core: Dva) -> None:
     """Nobody gets an order who has one."""
-    confirm, act, orders = desk.orders.confirm, desk.orders.act, desk.orders
+    confirm, act, orders = core.orders.confirm, core.orders.act, core.orders
 
     def watched_confirm(
         event: Event, responder: str, operator: str | None, *args: Any, **named: Any
@@ -448,27 +448,27 @@ def _watch(desk: Dva) -> None:
         assert event.actor is None
         return act(event, guard, now)
 
-    desk.orders.confirm, desk.orders.act = watched_confirm, watched_act  # type: ignore[method-assign]
+    core.orders.confirm, core.orders.act = watched_confirm, watched_act  # type: ignore[method-assign]
 
 
-def snapshot(desk: Dva) -> dict[str, Any]:
-    """All that a desk must know again after it was killed."""
-    book, permissions = desk.book, desk.sessions.permissions
-    lasts = desk.sessions.with_something_open()
+def snapshot(core: Dva) -> dict[str, Any]:
+    """All that a core must know again after it was killed."""
+    book, permissions = core.book, core.sessions.permissions
+    lasts = core.sessions.with_something_open()
     return {
         "open": {n: repr(_with_sets_in_order(e)) for n, e in book.open.items()},
         "closed": {n: repr(_with_sets_in_order(e)) for n, e in sorted(book.closed.items())},
         "waiting": set(book.waiting),
         "counts": book.counts,
         "total": book.total,
-        "engaged": sorted((device, event.number) for device, event in desk.orders.engaged.pairs()),
+        "engaged": sorted((device, event.number) for device, event in core.orders.engaged.pairs()),
         "devices": [
-            e.device for i, e in desk.registry.entries.items() if not e.silent or i in lasts
+            e.device for i, e in core.registry.entries.items() if not e.silent or i in lasts
         ],
         "grants": permissions.grants,
         "observers": permissions.observers,
         "sessions": permissions.count,
-        "untold": desk.sessions.untold,
+        "untold": core.sessions.untold,
     }
 
 

@@ -200,7 +200,7 @@ class Scene:
 
     def __init__(self, stage: Stage, trace: Path | None = None) -> None:
         self.stage, self.dva = stage, add_dva(stage)
-        self.dva.desk.registry.silent_after = SILENT_AFTER
+        self.dva.core.registry.silent_after = SILENT_AFTER
         self.field = Field(stage)
         self.field.populate()
         self.robot = self.field.robots[ROBOT]

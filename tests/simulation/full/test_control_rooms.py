@@ -28,7 +28,7 @@ class Staffed:
         data["dispatch"] = {"mode": "ask_first", "decide_within_s": 100.0} | dispatch
         self.run = Run(build(data, {}), seed=3)
         if trace is not None:
-            self.run.dva.desk = traced(self.run.dva.desk, trace, self.run.stage, None)
+            self.run.dva.core = traced(self.run.dva.core, trace, self.run.stage, None)
         self.rooms = [
             ControlRoomAgent(self.run.stage.device("control-room", number)) for number in (1, 2)
         ]
@@ -48,7 +48,7 @@ class Staffed:
 
     @property
     def event(self) -> Any:
-        return self.run.dva.desk.book.get(1)
+        return self.run.dva.core.book.get(1)
 
 
 @pytest.fixture
@@ -128,8 +128,8 @@ def test_a_false_alarm_called_from_the_control_room_breaks_no_rule(staffed):
 @pytest.mark.invariant("S6")
 def test_an_event_that_is_refuted_by_nobody_is_found_out(staffed):
     """The checker above can fail: the same end without anybody's word."""
-    desk = staffed.run.dva.desk
-    desk.orders.settle(staffed.event, State.REFUTED, staffed.run.clock.now)
+    core = staffed.run.dva.core
+    core.orders.settle(staffed.event, State.REFUTED, staffed.run.clock.now)
     staffed.until(12.0)
     assert staffed.run.recorder.violations["S6"] > 0
 
@@ -139,7 +139,7 @@ def test_a_dva_whose_control_rooms_decided_is_replayed_from_its_trace(tmp_path):
     staffed = Staffed(lines.append)
     staffed.until(8.0)
     staffed.ask(0, m.GetProposal(1), m.Assign(1, GUARD, decisions=0), m.SetDispatch("automatic"))
-    staffed.run.dva.desk.roles.appoint(id_of("control-room", 2), "supervise")
+    staffed.run.dva.core.roles.appoint(id_of("control-room", 2), "supervise")
     staffed.ask(1, m.TakeOff(1, GUARD), m.SetDispatch("ask_first"), m.Escalate(1))
     staffed.run.dva.dismiss(id_of("control-room", 1))
     again = list(replay_dva(lines, tmp_path / "dva.jsonl"))

@@ -92,5 +92,5 @@ def test_a_guard_that_says_ok_and_only_lives_on_holds_no_event():
     first = event.responder
     until(run, lambda: event.responder not in (None, first), 100.0)
     assert 60.0 < run.clock.now < 75.0
-    assert run.dva.desk.counters["did not set out"] == 1
+    assert run.dva.core.counters["did not set out"] == 1
     assert run.recorder.violations == {}

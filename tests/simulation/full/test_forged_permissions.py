@@ -174,7 +174,7 @@ def test_without_the_dva_the_driver_drives_on_and_a_new_grant_waits():
     run.clock.run(DRIVEN + 10.0)
     assert robot_of(run).controller.grant == held
     assert robot_of(run).applied > before + 50
-    enter(run.dva.desk, ROBOT, m.PermissionGrant(STRANGER, "both", SESSION))
+    enter(run.dva.core, ROBOT, m.PermissionGrant(STRANGER, "both", SESSION))
     run.dva.silence(False)
     run.dva.device.serve(run.dva._on_request)
     run.clock.run(DRIVEN + 30.0)
@@ -187,7 +187,7 @@ def test_without_the_dva_the_driver_drives_on_and_a_new_grant_waits():
 def test_a_start_that_overtakes_the_grant_waits_one_round_trip_to_the_dva(delay):
     run = run_of(**QUIET, **{"link.delay_s": delay})
     run.clock.run(10.0)
-    enter(run.dva.desk, ROBOT, m.PermissionGrant(STRANGER, "both", SESSION))
+    enter(run.dva.core, ROBOT, m.PermissionGrant(STRANGER, "both", SESSION))
     forger = Forger(run)
     forger.say(m.GetSensorInfo(), STRANGER)
     run.clock.run(20.0)

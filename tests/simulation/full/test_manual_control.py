@@ -53,7 +53,7 @@ class InHand:
     def is_held(self) -> None:
         """The DVA gives the robot to an operator."""
         grant = m.PermissionGrant(OPERATOR, "both", 1 << 33)
-        enter(self.run.dva.desk, ROBOT, grant)
+        enter(self.run.dva.core, ROBOT, grant)
         self.run.dva.device.ask(ROBOT, grant)
         self.let(1.0)
 

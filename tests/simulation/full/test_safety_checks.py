@@ -70,7 +70,7 @@ def ask(run: Run, time: float, body: m.Body, session: int = 5, source: str = DVA
 
     def said() -> None:
         if source == DVA:
-            enter(run.dva.desk, ROBOT, body)
+            enter(run.dva.core, ROBOT, body)
         device.ask(ROBOT, body, session=session)
 
     run.clock.call_at(time, said)
@@ -312,7 +312,7 @@ def test_a_dva_that_never_takes_back_the_permission_of_a_silent_device_breaks_s2
     def falls_silent() -> Run:
         run = made({"horizon_s": 60})
         run.clock.run(15.0)
-        (right,) = run.dva.desk.sessions.permissions.grants.values()
+        (right,) = run.dva.core.sessions.permissions.grants.values()
         assert right.holder == id_of("operator", 1)
         run.network.leave(right.holder)
         phone = next(d for d in run.stage.devices if d.id_tag == right.holder)
@@ -352,7 +352,7 @@ def test_what_a_dva_remembers_of_an_earlier_life_breaks_no_rule():
 def test_a_dva_that_was_silenced_is_late_with_nothing():
     """Somebody has stopped it at a console: what waits for it waits no longer by the rules."""
     run = made({"dispatch.escalate_after_s": 20})
-    run.dva.desk.dispatcher.decide = lambda _: []  # type: ignore[method-assign]
+    run.dva.core.dispatcher.decide = lambda _: []  # type: ignore[method-assign]
     run.clock.run(10.0)
     run.dva.silence(True)
     run.clock.run(60.0)
@@ -421,7 +421,7 @@ def test_a_book_that_loses_or_doubles_an_event_breaks_s6(lose):
     run = made(EARLY)
     run.clock.run(10.0)
     assert broken(run) == set()
-    book = run.dva.desk.book
+    book = run.dva.core.book
     lose(book, next(iter(book.open.values())))
     run.clock.run(11.0)
     assert "S6" in broken(run)
@@ -457,7 +457,7 @@ def test_an_order_that_is_kept_for_ever_breaks_s6(monkeypatch):
 @pytest.mark.invariant("S6")
 def test_an_event_that_is_over_and_counts_as_something_else_breaks_s6():
     run = played()
-    counts = run.dva.desk.book.counts
+    counts = run.dva.core.book.counts
     assert counts[State.CONFIRMED] == 1
     counts[State.CONFIRMED], counts[State.EXPIRED] = 0, 1
     run.show_page()
@@ -514,7 +514,7 @@ def test_a_planted_bug_breaks_its_rule_in_an_ordinary_run(mutant, rule):
 def test_times_out_of_order_break_s7():
     run = made(EARLY)
     run.clock.run(10.0)
-    event = next(iter(run.dva.desk.book.open.values()))
+    event = next(iter(run.dva.core.book.open.values()))
     event.times["assigned"] = event.times["detected"] - 1.0
     run.clock.run(11.0)
     assert broken(run) == {"S7"}
@@ -549,7 +549,7 @@ def test_a_forgery_makes_no_honest_robot_a_breaker_of_rules(forged):
 def test_a_count_below_zero_breaks_s6():
     run = staged()
     run.clock.run(10.0)
-    counts = run.dva.desk.book.counts
+    counts = run.dva.core.book.counts
     counts[State.ESCALATED] -= 1
     counts[State.CONFIRMED] += 1
     run._watch()
@@ -685,6 +685,6 @@ def test_a_guard_that_says_from_its_post_that_it_has_arrived_is_replaced_after_a
     story = {moment.what: moment.time for moment in run.recorder.timeline}
     (over,) = (time for what, time in story.items() if "order is over" in what)
     assert over == pytest.approx(141.0, abs=2.0)
-    assert counted(run.dva.desk.counters, "from afar") == 1
+    assert counted(run.dva.core.counters, "from afar") == 1
     assert run.dva.events[1].responder == id_of("guard", 2)
     assert broken(run) == set()

@@ -20,6 +20,6 @@ def test_the_second_robot_of_an_id_is_refused_and_that_is_told_once_at_each_side
     story = [moment for moment in run.recorder.timeline if "regist" in moment.what]
     assert [moment.who for moment in story] == ["dva", "robot-1"]
     assert all(f"{ELSEWHERE}" in s.what or "under this id" in s.what for s in story)
-    assert run.dva.desk.registry.entries[ROBOT].device.address != ELSEWHERE
+    assert run.dva.core.registry.entries[ROBOT].device.address != ELSEWHERE
     assert run.recorder.drives[0].outcome == "confirmed"
-    assert counted(run.dva.desk.counters, "id in use") > 10
+    assert counted(run.dva.core.counters, "id in use") > 10

@@ -1,4 +1,4 @@
-"""Queues whose course can be worked out by hand: the desk adds nothing and loses nothing."""
+"""Queues whose course can be worked out by hand: the core adds nothing and loses nothing."""
 
 from typing import Any
 

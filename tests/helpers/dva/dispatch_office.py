@@ -1,4 +1,4 @@
-"""A desk with a small team, for tests: what is said to it, what it wants said, and a plain map."""
+"""A core with a small team, for tests: what is said to it, what it wants said, and a plain map."""
 
 import math
 from collections.abc import Sequence
@@ -47,9 +47,9 @@ def crow(starts: Sequence[Start], goals: Sequence[m.Position]) -> tuple[Floats, 
 
 
 class Office:
-    """A desk with a guard at 0 m, a robot at 10 m, an operator and a detector.
+    """A core with a guard at 0 m, a robot at 10 m, an operator and a detector.
 
-    Everything that the desk wants sent is in `sent` too, in order.
+    Everything that the core wants sent is in `sent` too, in order.
     """
 
     def __init__(
@@ -69,14 +69,14 @@ class Office:
         self.rules = rules or Rules(escalate_after=ESCALATE_AFTER)
         self.number = 0
         self.sent: list[Send] = []
-        self.desk = self.new_desk()
+        self.core = self.new_core()
         for id_tag, kind in TEAM.items():
             self.register(id_tag, kind)
         self.stands(GUARD, 0)
         self.status(ROBOT, 10)
 
-    def new_desk(self) -> Dva:
-        """A desk of the same kind that knows nobody yet."""
+    def new_core(self) -> Dva:
+        """A core of the same kind that knows nobody yet."""
         sessions = Sessions(Permissions(lambda: 7))
         rng = np.random.default_rng(1)
         return Dva(
@@ -108,7 +108,7 @@ class Office:
         self.number += 1
         session = None if isinstance(body, m.Heartbeat) else 0
         message = m.Message(DVA, self.number, source, "12:00:00", session, body)
-        reply, sends = self.desk.handle(message, now)
+        reply, sends = self.core.handle(message, now)
         self.sent += sends
         return reply, sends
 
@@ -120,7 +120,7 @@ class Office:
         sends: list[Send] = []
         for value in values:
             body = m.SensorValue(sensor, (value,), "1", 5)
-            sends += self.desk.note(m.Message(DVA, 1, robot, "12:00:00", 0, body), now)
+            sends += self.core.note(m.Message(DVA, 1, robot, "12:00:00", 0, body), now)
         self.sent += sends
         return sends
 
@@ -132,16 +132,16 @@ class Office:
 
     def beat(self, *devices: str, now: float) -> None:
         """Heartbeats: of these, or of all."""
-        for device in devices or list(self.desk.registry.entries):
+        for device in devices or list(self.core.registry.entries):
             self._publish(device, m.Heartbeat(), now)
 
     def _publish(self, source: str, body: m.Body, now: float) -> None:
         session = None if isinstance(body, m.Heartbeat) else 0
-        self.desk.note(m.Message(DVA, 1, source, "12:00:00", session, body), now)
+        self.core.note(m.Message(DVA, 1, source, "12:00:00", session, body), now)
 
     def silence(self, device: str, now: float) -> None:
         """A device has been quiet for so long that it counts as gone."""
-        for other in list(self.desk.registry.entries):
+        for other in list(self.core.registry.entries):
             if other != device:
                 self.beat(other, now=now)
         self.tick(now, alive=False)
@@ -184,17 +184,17 @@ class Office:
 
     def ok(self, sends: Sequence[Send], now: float = 0.0) -> list[Send]:
         """All of it is answered with OK."""
-        return self._after([s for send in sends for s in self.desk.delivered(send, now)])
+        return self._after([s for send in sends for s in self.core.delivered(send, now)])
 
     def no(self, sends: Sequence[Send], now: float = 0.0) -> list[Send]:
         """All of it is declined, or does not arrive."""
-        return self._after([s for send in sends for s in self.desk.undelivered(send, now)])
+        return self._after([s for send in sends for s in self.core.undelivered(send, now)])
 
     def tick(self, now: float, alive: bool = True) -> list[Send]:
         """Time passes; everybody has been heard just before, unless said otherwise."""
         if alive:
             self.beat(now=now)
-        return self._after(self.desk.tick(now))
+        return self._after(self.core.tick(now))
 
     def _after(self, sends: list[Send]) -> list[Send]:
         self.sent += sends
@@ -203,7 +203,7 @@ class Office:
     # --- what is so --------------------------------------------------------------------
 
     def event(self, number: int = 1) -> Event:
-        event = self.desk.book.get(number)
+        event = self.core.book.get(number)
         assert event is not None
         return event
 
@@ -211,15 +211,15 @@ class Office:
         """Somebody is kept by the rest of an event that is not ours."""
         other = Event(99, "flood", HERE, 0.5, state=State.REFUTED, times={"closed": math.inf})
         for name in names:
-            self.desk.orders.engaged.begin(name, other)
+            self.core.orders.engaged.begin(name, other)
 
     def idle(self, *names: str) -> None:
         """And does not any longer."""
         for name in names:
-            for event in self.desk.orders.engaged.all(name):
-                self.desk.orders.engaged.end(name, event)
+            for event in self.core.orders.engaged.all(name):
+                self.core.orders.engaged.end(name, event)
 
     @property
     def working(self) -> dict[str, int]:
         """Current event of each busy device."""
-        return {name: event.number for name, event in self.desk.orders.engaged.pairs()}
+        return {name: event.number for name, event in self.core.orders.engaged.pairs()}
