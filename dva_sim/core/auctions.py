@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.core.events import Event, EventBook, State
+from dva_sim.core.events import Event, EventTable, State
 
 
 @dataclass
@@ -59,10 +59,10 @@ class Auctions:
         if auction is not None:
             auction.asked.discard(device)
 
-    def close(self, book: EventBook, now: float) -> None:
+    def close(self, events: EventTable, now: float) -> None:
         """Forget what needs nobody to look any more, take no more bids where the time is up."""
         for number, auction in list(self.running.items()):
-            event = book.open.get(number)
+            event = events.open.get(number)
             if event is None or event.state is not State.PENDING:
                 del self.running[number]
             elif now >= auction.until:

@@ -77,7 +77,7 @@ class ControlRooms:
     ) -> None:
         self._dispatcher, self._handovers = dispatcher, handovers
         self._roles, self._access = roles, access
-        self._orders, self._book = dispatcher.orders, dispatcher.orders.book
+        self._orders, self._events = dispatcher.orders, dispatcher.orders.events
         self._doers: dict[type, Callable[[Any, Event, m.Device, float], list[Send] | str]] = {
             m.Acknowledge: self._acknowledge,
             m.Assign: self._assign,
@@ -130,14 +130,14 @@ class ControlRooms:
         return status_of(event, self._dispatcher.questions.of(event.number), now)
 
     def _list(self, above: int, now: float) -> m.EventList:
-        every = (*list(self._book.closed.values())[-LISTED_CLOSED:], *self._book.open.values())
+        every = (*list(self._events.closed.values())[-LISTED_CLOSED:], *self._events.open.values())
         rest = sorted((e for e in every if e.number > above), key=lambda event: event.number)
         return event_list(rest, self._dispatcher.questions, now)
 
     # --- about one event ---------------------------------------------------------------
 
     def _about_event(self, body: Any, sender: m.Device, action: str, now: float) -> RoomAnswer:
-        event = self._book.get(body.event_id)
+        event = self._events.get(body.event_id)
         if event is None:
             text = f"no event {body.event_id}"
             return self._refuse(body, sender, action, m.UNKNOWN_EVENT, text, now)
@@ -414,7 +414,7 @@ class ControlRooms:
         if action in _ON_HANDS:
             self._orders.decided(event, fact)
         else:
-            self._book.touch(event)
+            self._events.touch(event)
             self._orders.trail.note(fact)
 
     def _refuse(

@@ -94,7 +94,7 @@ class Dispatcher:
     def decide(self, now: float) -> list[Send]:
         """Give the orders that are due now; what finds nobody in time is given up."""
         sends: list[Send] = []
-        self.auctions.close(self.orders.book, now)
+        self.auctions.close(self.orders.events, now)
         for _ in range(DECISIONS):
             before = self.orders.counters["preempted"]
             given = self._decide(now)
@@ -104,7 +104,7 @@ class Dispatcher:
             if self.orders.counters["preempted"] == before and not looks:
                 break
         sends += self.orders.give_up(now)
-        self.auctions.close(self.orders.book, now)
+        self.auctions.close(self.orders.events, now)
         return sends
 
     def next_deadline(self) -> float:
@@ -138,7 +138,7 @@ class Dispatcher:
         if view is not None:
             sends = self._carry_out(self._advice(view.situation, self._rng), view, now)
         for event in self.questions.settle():
-            self.orders.book.touch(event)
+            self.orders.events.touch(event)
         return sends
 
     def _advice(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:

@@ -13,7 +13,7 @@ from dva_sim.core.control_rooms import ControlRooms
 from dva_sim.core.device_list import DeviceLister
 from dva_sim.core.dispatch import Policy
 from dva_sim.core.dispatcher import Dispatcher, Patrols
-from dva_sim.core.events import Event, EventBook, State, apart
+from dva_sim.core.events import Event, EventTable, State, apart
 from dva_sim.core.handovers import Handovers
 from dva_sim.core.orders import Orders
 from dva_sim.core.permissions import Access
@@ -55,7 +55,7 @@ class Dva:
 
     Attributes:
         registry: Registered devices.
-        book: Events.
+        events: Events.
         orders: Current orders.
         dispatcher: Dispatcher that chooses responders.
         control_rooms: Answers those where people decide.
@@ -83,8 +83,8 @@ class Dva:
         audit: bool = True,
     ) -> None:
         self.sessions, self.access = sessions, access or Access()
-        self.registry, self.book = Registry(), EventBook(rules.merge_distance)
-        self.orders = Orders(rules, self.registry, self.book, sessions)
+        self.registry, self.events = Registry(), EventTable(rules.merge_distance)
+        self.orders = Orders(rules, self.registry, self.events, sessions)
         self.trail, self.roles = self.orders.trail, roles or Roles()
         self.trail.keeps = audit
         self.dispatcher = Dispatcher(
@@ -457,7 +457,7 @@ class Dva:
     ) -> Reaction:
         if body.event_id is None:
             return self._raised(message, entry, body, now)
-        event = self.book.get(body.event_id)
+        event = self.events.get(body.event_id)
         if event is None:
             return self._refuse(message, m.UNKNOWN_EVENT, f"no event {body.event_id}")
         if message.source not in event.sent:
@@ -481,7 +481,7 @@ class Dva:
         if (text := self.control_rooms.may(entry.device, need, "report an event")) is not None:
             return self._refuse(message, m.NOT_PERMITTED, text)
         reply, sends = self._sighting(message, body, now)
-        if (event := self.book.near(body.kind, body.position)) is not None:
+        if (event := self.events.near(body.kind, body.position)) is not None:
             self.control_rooms.raised(event, entry.device, now)
         return reply, sends
 
@@ -489,18 +489,18 @@ class Dva:
         """Somebody who was not sent sees something, or sees it no longer."""
         if body.finding == "refuted":
             return self._withdrawal(message, body, now)
-        event = self.book.near(body.kind, body.position)
+        event = self.events.near(body.kind, body.position)
         sends: list[Send] = []
         if event is None:
             event, sends = self._told_better(message.source, body, now)
-        if event is None and self.book.full:
+        if event is None and self.events.full:
             return self._refuse(message, m.BUSY, "so many events are open that no more fit")
         if event is None:
             contain = self._rules.containment
-            event = self.book.add(body.kind, body.position, body.severity, now, contain)
+            event = self.events.add(body.kind, body.position, body.severity, now, contain)
         else:
-            self.book.merge(event, body.severity)
-        self.book.note_source(event, message.source, body.confidence)
+            self.events.merge(event, body.severity)
+        self.events.note_source(event, message.source, body.confidence)
         return self._ok(message, sends + self.dispatcher.decide(now))
 
     def _felt(
@@ -510,16 +510,16 @@ class Dva:
         alarm, robot = self.sensing.crossed(message.source, body), message.source
         if alarm is None:
             return []
-        event = within_reach(self.book.open.values(), alarm.kind, place)
+        event = within_reach(self.events.open.values(), alarm.kind, place)
         if event is None:
-            if is_no_news(self.book, alarm.kind, place, now):
+            if is_no_news(self.events, alarm.kind, place, now):
                 return []
             self.counters["event raised by a sensor"] += 1
             report = m.EventReport(None, alarm.kind, place, SEVERITY, CONFIDENCE, "detected")
             return self._sighting(message._replace(body=report), report, now)[1]
         others = event.sources.keys() - {robot}
-        self.book.merge(event, 0.0)
-        self.book.note_source(event, robot, CONFIDENCE)
+        self.events.merge(event, 0.0)
+        self.events.note_source(event, robot, CONFIDENCE)
         there = apart(event.position, place) < self._rules.merge_distance
         if not (there and others) or event.state is State.CONFIRMED:
             return []
@@ -535,7 +535,7 @@ class Dva:
         """
         if not self.sensing.alarms:
             return None, []
-        felt = (e for e in self.book.open.values() if only_felt(e, self.registry))
+        felt = (e for e in self.events.open.values() if only_felt(e, self.registry))
         event = within_reach(felt, body.kind, body.position)
         if event is None or source in event.sources:
             return None, []
@@ -549,8 +549,8 @@ class Dva:
     def _withdrawal(self, message: m.Message, body: m.EventReport, now: float) -> Reaction:
         """Close an event that all its reporters have withdrawn before anybody was sent."""
         source, sends = message.source, list[Send]()
-        for event in self.book.reported_by(source, body.kind, body.position):
-            self.book.take_back(event, source)
+        for event in self.events.reported_by(source, body.kind, body.position):
+            self.events.take_back(event, source)
             if event.state is State.PENDING and not event.sources:
                 sends += self.orders.expire(event, now)
         return self._ok(message, sends)

@@ -1,4 +1,4 @@
-"""The book of events: each in exactly one state, its times in order, none ever lost."""
+"""The event table: each event in exactly one state, its times in order, none ever lost."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class Event:
 
 
 @dataclass
-class EventBook:
+class EventTable:
     """The open events, and the last that were closed.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""Orders: who has to do what. Given, taken up, given back, taken back; the book tells the rest."""
+"""Orders: who has to do what. Given, taken up, given back, taken back; the events keep the rest."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from dva_sim.core.assignments import MOVE, SET_OUT, Assignments, Promise, Promises, Rules
 from dva_sim.core.audit import AuditTrail, Fact
-from dva_sim.core.events import NEXT, Event, EventBook, State, apart
+from dva_sim.core.events import NEXT, Event, EventTable, State, apart
 from dva_sim.core.handling import Choice
 from dva_sim.core.registry import Registry
 from dva_sim.core.sessions import Send, Sessions
@@ -30,7 +30,7 @@ class Orders:
 
     rules: Rules
     registry: Registry
-    book: EventBook
+    events: EventTable
     sessions: Sessions
     engaged: Assignments = field(default_factory=Assignments)
     counters: Counter[str] = field(default_factory=Counter)
@@ -48,7 +48,7 @@ class Orders:
         self, event: Event, responder: str, operator: str | None, now: float, award: bool = False
     ) -> Send:
         """Send somebody to look; an award goes to who has bid, its operator hears later."""
-        self.book.move(event, State.ASSIGNED, now)
+        self.events.move(event, State.ASSIGNED, now)
         event.responder, event.operator = responder, operator
         for name in (responder, operator):
             if name is not None:
@@ -72,7 +72,7 @@ class Orders:
         event.times["act_assigned"] = now
         event.sent.add(guard)
         self.engaged.begin(guard, event)
-        self.book.touch(event)
+        self.events.touch(event)
         return self._order_to_act(event)
 
     def _order_to_act(self, event: Event) -> Send:
@@ -86,13 +86,13 @@ class Orders:
         event.preemptions += 1
         event.attempts -= event.taken_up
         self.counters["preempted"] += 1
-        self.book.move(event, State.PENDING, now)
+        self.events.move(event, State.PENDING, now)
         return self._stand_down(event)
 
     def again(self) -> list[Send]:
         """All current orders, repeated by a DVA that was restarted."""
         sends = []
-        for event in self.book.open.values():
+        for event in self.events.open.values():
             if event.state in (State.ASSIGNED, State.ON_SCENE) and event.responder is not None:
                 sends.append(self._order_to_confirm(event))
             if event.actor is not None:
@@ -112,7 +112,7 @@ class Orders:
             self._release(event)  # settled meanwhile, and its operator has not heard of it
         elif _is_to_act(send.body):
             event.act_taken_up |= send.to == event.actor
-            self.book.touch(event)
+            self.events.touch(event)
         elif send.to == event.holder and _somebody_looks(event):
             self._noted_as_taken_up(event)
         return []
@@ -126,7 +126,7 @@ class Orders:
         if not event.taken_up:
             event.taken_up = True
             event.attempts += 1
-            self.book.touch(event)
+            self.events.touch(event)
 
     def not_taken_up(self, send: Send, now: float) -> list[Send]:
         """Handle an order declined or undelivered; does not count as an attempt."""
@@ -156,7 +156,7 @@ class Orders:
         elif event.state is State.ASSIGNED:
             self._noted_as_taken_up(event)
             event.times.setdefault("departed", now)
-        self.book.touch(event)
+        self.events.touch(event)
 
     def arrived(self, event: Event, device: str, now: float) -> None:
         """Somebody says that it is there; that counts as soon as it has told where it is."""
@@ -184,10 +184,10 @@ class Orders:
             event.times.setdefault("act_arrived", now)
         elif event.state is State.ASSIGNED:
             event.times["arrived"] = now
-            self.book.move(event, State.ON_SCENE, now)
+            self.events.move(event, State.ON_SCENE, now)
         if device is not None:
             self._from_afar.discard((device, event.number))
-            self.book.touch(event)
+            self.events.touch(event)
             self.registry.locate(self.registry.entries[device], event.position)
 
     def found(self, event: Event, device: str, finding: str, now: float) -> list[Send]:
@@ -198,15 +198,15 @@ class Orders:
             self.departed(event, device, now)
             self._is_there(event, device if device == event.actor else event.responder, now)
         if finding == "contained" and event.state is State.CONFIRMED:
-            self.book.move(event, State.CONTAINED, now)
+            self.events.move(event, State.CONTAINED, now)
             return self._stand_down(event, but=device)
         if finding == "confirmed" and event.state is not State.CONFIRMED:
-            self.book.move(event, State.CONFIRMED, now)
+            self.events.move(event, State.CONFIRMED, now)
             if event.open and event.actor is not None:
                 return [self._order_to_act(event)]
             return self._stand_down(event)
         if finding == "refuted" and State.REFUTED in NEXT[event.state]:
-            self.book.move(event, State.REFUTED, now)
+            self.events.move(event, State.REFUTED, now)
             return self._stand_down(event, but=device)
         return []
 
@@ -250,7 +250,7 @@ class Orders:
 
     def give_up(self, now: float) -> list[Send]:
         """Escalate what has waited too long, and the newest of more than may wait."""
-        most, waiting = self.rules.most_waiting, self.book.waiting
+        most, waiting = self.rules.most_waiting, self.events.waiting
         late = {n: e for n, e in waiting.items() if self._wait_ends(e) <= now}
         if most is not None and len(waiting) - len(late) > most:
             left = sorted(waiting.keys() - late.keys())
@@ -312,7 +312,7 @@ class Orders:
 
     def next_deadline(self) -> float:
         """Return when the next order waits, or takes, too long [s]."""
-        rules, waiting = self.rules, self.book.waiting
+        rules, waiting = self.rules, self.events.waiting
         ends = [min(self._pauses, default=math.inf) if waiting else math.inf]
         if math.isfinite(rules.escalate_after):
             ends += (self._wait_ends(e) for e in waiting.values())
@@ -382,13 +382,13 @@ class Orders:
     def escalate(self, event: Event, now: float) -> list[Send]:
         """Nobody has come in time: others than the DVA's own have to."""
         self._ruled(event, "escalate", "it has waited too long", now)
-        self.book.move(event, State.ESCALATED, now)
+        self.events.move(event, State.ESCALATED, now)
         return self._stand_down(event)
 
     def expire(self, event: Event, now: float) -> list[Send]:
         """Nobody says any longer that there is something."""
         self._ruled(event, "expire", "nobody reports it any longer", now)
-        self.book.move(event, State.EXPIRED, now)
+        self.events.move(event, State.EXPIRED, now)
         return self._stand_down(event)
 
     # --- decided by people -------------------------------------------------------------
@@ -410,13 +410,13 @@ class Orders:
         sends = self._called_off(event)
         if taken_up:
             event.waiting_since = now
-        self.book.move(event, State.PENDING, now)
+        self.events.move(event, State.PENDING, now)
         return sends + self._stand_down(event)
 
     def settle(self, event: Event, state: State, now: float) -> list[Send]:
         """Close an event by a person's decision and free its responders."""
         sends = self._called_off(event) if _somebody_looks(event) else []
-        self.book.move(event, state, now)
+        self.events.move(event, state, now)
         return sends + self._stand_down(event)
 
     def decided(self, event: Event, fact: Fact) -> None:
@@ -430,7 +430,7 @@ class Orders:
             device=self.label_of(fact.device) if fact.device else "",
         )
         event.handling.decide(choice)
-        self.book.touch(event)
+        self.events.touch(event)
         self.trail.note(fact)
 
     def label_of(self, device: str) -> str:
@@ -474,14 +474,14 @@ class Orders:
         for name in names:
             if name is not None and self.engaged.end(name, event):
                 self._from_afar.discard((name, event.number))
-                self.book.touch(event)
+                self.events.touch(event)
 
     def _reopen(self, event: Event, now: float) -> list[Send]:
         """Somebody else has to look, if that is not given up."""
         state = State.PENDING if self._goes_on(event, event.taken_up, now) else State.ESCALATED
         if state is State.ESCALATED:
             self._ruled(event, "escalate", "orders came to nothing", now)
-        self.book.move(event, state, now)
+        self.events.move(event, state, now)
         return self._stand_down(event)
 
     def _goes_on(self, event: Event, taken_up: bool, now: float) -> bool:
@@ -504,14 +504,14 @@ class Orders:
             event.attempts += taken_up
             if not self._goes_on(event, taken_up, now):
                 self._ruled(event, "escalate", "orders came to nothing", now)
-                self.book.move(event, State.ESCALATED, now)
+                self.events.move(event, State.ESCALATED, now)
         return []
 
     def _free_actor(self, event: Event) -> None:
         event.act_taken_up = False
         self._free(event, event.actor)
         event.actor = None
-        self.book.touch(event)
+        self.events.touch(event)
 
     def _stand_down(self, event: Event, but: str | None = None) -> list[Send]:
         """Release devices that stood by at, or were to contain, an event that no longer needs them.

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from dva_sim.core.events import Event, EventBook, State, apart
+from dva_sim.core.events import Event, EventTable, State, apart
 from dva_sim.core.registry import ROBOT, Registry
 from dva_sim.core.sessions import Send, Sessions
 from dva_sim.core.wire_size import LIST_BYTES, xml_size
@@ -179,10 +179,10 @@ def within_reach(events: Iterable[Event], kind: str, place: m.Position) -> Event
     return found[2] if found else None
 
 
-def is_no_news(book: EventBook, kind: str, place: m.Position, now: float) -> bool:
+def is_no_news(events: EventTable, kind: str, place: m.Position, now: float) -> bool:
     """Return True if people recently found such an event nearby, or were called to one."""
     lately = (
-        e for e in book.closed.values() if e.state in _FOUND and now - e.times["closed"] < NO_NEWS
+        e for e in events.closed.values() if e.state in _FOUND and now - e.times["closed"] < NO_NEWS
     )
     return within_reach(lately, kind, place) is not None
 

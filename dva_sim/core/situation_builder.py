@@ -78,7 +78,7 @@ class SituationBuilder:
 
     def look(self, now: float) -> PolicyView | None:
         """Return the decision to make; None if there is none, or nobody to send."""
-        if not self.orders.book.open and not self.policy.relocates:
+        if not self.orders.events.open and not self.policy.relocates:
             return None
         events = self._tasks()
         if not events and not self.policy.relocates:
@@ -103,11 +103,11 @@ class SituationBuilder:
 
     def _tasks(self) -> list[Event]:
         """Events that somebody could do something about, detected longest ago first."""
-        book, rules = self.orders.book, self.orders.rules
+        events, rules = self.orders.events, self.orders.rules
         if not (rules.containment or self.policy.preempts):
-            found = list(book.waiting.values())
+            found = list(events.waiting.values())
         else:
-            found = [e for e in book.open.values() if self._is_task(e)]
+            found = [e for e in events.open.values() if self._is_task(e)]
         found.sort(key=operator.attrgetter("number"))
         return found[:CONSIDERED]
 
@@ -140,7 +140,7 @@ class SituationBuilder:
             entries += robots
         engaged: list[Event | None] = [None] * len(entries)
         if self.policy.preempts:
-            for event in filter(self._is_under_way, self.orders.book.open.values()):
+            for event in filter(self._is_under_way, self.orders.events.open.values()):
                 entries.append(self.orders.registry.entries[event.responder or ""])
                 engaged.append(event)
         return KnownTeam(entries, engaged, operators)

@@ -187,7 +187,7 @@ class Store:
         self._held = _held(dva)
 
     def _time_is_due(self, dva: Dva, now: float) -> bool:
-        due = self._time_kept_at + self.keeps_time * (1 if dva.book.open else IDLE)
+        due = self._time_kept_at + self.keeps_time * (1 if dva.events.open else IDLE)
         return now >= due - SOON
 
     def _write(
@@ -248,20 +248,20 @@ class Store:
                 dva.registry.add(_entry(json.loads(data), now))
         found = bool(dva.registry.entries)
         for state, count in self._counts().items():
-            dva.book.counts[state] += count
+            dva.events.counts[state] += count
         for (data,) in self._file.execute(_RECENT, (KEPT_CLOSED,)):
             found = True
             kept = json.loads(data)
             event = _event(kept, self.past)
-            dva.book.restore(event)
+            dva.events.restore(event)
             for name in kept["engaged"]:
                 dva.orders.engaged.begin(name, event)
-        dva.book.total = sum(dva.book.counts.values())
+        dva.events.total = sum(dva.events.counts.values())
         self._recall_sessions(dva)
         if self._is_about("ask_first"):
             self._asks = dva.dispatcher.questions.asks = bool(self._about("ask_first"))
         dva.registry.changes()
-        dva.book.changes()
+        dva.events.changes()
         self._devices = dict.fromkeys(silent)  # is gone from the file with the next write
         return found
 

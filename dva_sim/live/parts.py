@@ -119,9 +119,9 @@ class DvaPart:
         self._agent.start()
         self._dispatcher = add_dispatcher(stage)
         self._stage = stage
-        book = self._agent.core.book
+        events = self._agent.core.events
         self._scripted = options.operators == "scripted"  # who follows a script settles no event
-        self._settled_before = 0 if book.open else book.total
+        self._settled_before = 0 if events.open else events.total
         self._beats: dict[str, Rate] = {}
 
     def _observe(self, recorder: LiveRecorder, stage: Stage) -> None:
@@ -163,13 +163,13 @@ class DvaPart:
 
     def settled(self) -> bool:
         """Implement `LivePart`."""
-        book = self._agent.core.book
-        return self._scripted or (book.total > self._settled_before and not book.open)
+        events = self._agent.core.events
+        return self._scripted or (events.total > self._settled_before and not events.open)
 
     def _events(self) -> list[Event]:
         """The last that were closed, and all that are open."""
-        book = self._agent.core.book
-        return [*book.closed.values(), *book.open.values()]
+        events = self._agent.core.events
+        return [*events.closed.values(), *events.open.values()]
 
     def has_company(self) -> bool:
         """See `LivePart`: some device has registered."""

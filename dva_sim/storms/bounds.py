@@ -19,9 +19,9 @@ MOST: Final = 200
 team of fifteen devices needs 72 at most."""
 BOUNDS: Final[dict[str, int]] = {
     "Registry.entries": 20_000,
-    "EventBook.open": 10_000,
-    "EventBook.closed": 10_000,
-    "EventBook.waiting": 10_000,
+    "EventTable.open": 10_000,
+    "EventTable.closed": 10_000,
+    "EventTable.waiting": 10_000,
     "Confirmations._waiting": OTHERS,
     "Inquiry._readers": MOST_READERS,
     "RobotController.observers": MOST_OBSERVERS,

@@ -218,7 +218,7 @@ LATER_MUTANTS: Final[dict[str, Mutant]] = {
     "given-up-miscounted": Mutant(
         "S6",
         "an escalated event counts as expired",
-        "dva_sim.core.events:EventBook.move",
+        "dva_sim.core.events:EventTable.move",
         _miscounts_given_up,
     ),
     "confirmed-on-arrival": Mutant(

@@ -311,13 +311,13 @@ def _says_before_keeping(original: Original, bug: Bug) -> Original:
         )
         if now - vars(self).setdefault("kept_at", now) >= 5.0:
             for event in unkept.values():
-                self.core.book.touch(event)
+                self.core.events.touch(event)
             unkept.clear()
             self.kept_at = now
             return original(self)
-        changed = self.core.book.changes()
+        changed = self.core.events.changes()
         for event in changed:
-            self.core.book.touch(event)
+            self.core.events.touch(event)
             unkept[event.number] = event
         self._memory = None
         original(self)
@@ -364,10 +364,10 @@ def _loses_open(original: Original, bug: Bug) -> Original:
 
     def wrong(self: Any, dva: Any, now: float) -> Any:
         found = original(self, dva, now)
-        for number in list(dva.book.open)[::2]:
+        for number in list(dva.events.open)[::2]:
             bug.act(f"event {number} is forgotten by the next life of the DVA")
-            dva.book.waiting.pop(number, None)
-            del dva.book.open[number]
+            dva.events.waiting.pop(number, None)
+            del dva.events.open[number]
         return found
 
     return wrong
@@ -673,14 +673,17 @@ MUTANTS: Final[dict[str, Mutant]] = {
     "timer-reset-by-reports": Mutant(
         "S6",
         "each report lets an event wait from the beginning",
-        "dva_sim.core.events:EventBook.merge",
+        "dva_sim.core.events:EventTable.merge",
         _resets_timer,
     ),
     "event-forgotten": Mutant(
-        "S6", "every fourth event is forgotten", "dva_sim.core.events:EventBook.add", _without_last
+        "S6", "every fourth event is forgotten", "dva_sim.core.events:EventTable.add", _without_last
     ),
     "counts-wrong": Mutant(
-        "S6", "a confirmed event is counted twice", "dva_sim.core.events:EventBook.move", _miscounts
+        "S6",
+        "a confirmed event is counted twice",
+        "dva_sim.core.events:EventTable.move",
+        _miscounts,
     ),
     "order-never-ends": Mutant(
         "S6",
@@ -703,7 +706,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
     "anybody-confirms": Mutant(
         "S6",
         "one more report confirms an event",
-        "dva_sim.core.events:EventBook.merge",
+        "dva_sim.core.events:EventTable.merge",
         _anybody_confirms,
     ),
     "events-lost-in-a-restart": Mutant(
@@ -808,7 +811,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
     "reports-swallowed": Mutant(
         "S6",
         "a report is taken for one of another event",
-        "dva_sim.core.events:EventBook.near",
+        "dva_sim.core.events:EventTable.near",
         _swallows,
     ),
     "subscribes-once": Mutant(

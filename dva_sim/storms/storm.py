@@ -200,7 +200,7 @@ class Storm(StormScene):
         robots = [robot.agent for robot in self.robots]
         team = {*self.guards, *self.operators}
         others = [device for device in self.run.stage.devices if device.id_tag in team]
-        events = self.run.dva.core.book.total
+        events = self.run.dva.core.events.total
         for name, held, bound in oversized([self.run.dva, *robots, *others], events):
             what = f"{name} holds {held}, more than {bound}"
             self.recorder.violated("S10", self.now, "dva" if "Dva" in name else "robots", what)

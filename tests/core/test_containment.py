@@ -256,7 +256,7 @@ def test_an_event_that_needs_no_containment_needs_nobody_to_stand_by():
     office = Office(Eager())
     office.fire(12)
     office.fire(80)
-    assert all(event.actor is None for event in office.core.book.open.values())
+    assert all(event.actor is None for event in office.core.events.open.values())
 
 
 class Everything(Policy):

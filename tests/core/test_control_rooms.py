@@ -283,7 +283,7 @@ def test_from_each_stage_an_event_is_ended_once_and_who_was_sent_hears_it(body, 
     assert office.event().state == stage
     _, sends = decide(office, body, 6.0)
     assert office.event().state is state
-    assert sum(office.core.book.counts.values()) == office.core.book.total == 1
+    assert sum(office.core.events.counts.values()) == office.core.events.total == 1
     kinds = {send.to for send in sends if send.body == OVER}
     assert kinds == {"pending": set(), "confirmed": {GUARD}}.get(stage, {OPERATOR})
     reply, sends = decide(office, m.Assign(1, GUARD), 8.0, OTHER_ROOM)

@@ -125,9 +125,9 @@ def test_the_core_enforces_the_rules_whatever_a_policy_returns():
     office.fire(12)
     office.fire(12, kind="gas_leak")
     office.fire(12, kind="flood")
-    held = [e.responder for e in office.core.book.in_state(State.ASSIGNED)]
+    held = [e.responder for e in office.core.events.in_state(State.ASSIGNED)]
     assert len(held) == len(set(held)) == 2
-    counts = office.core.book.counts
+    counts = office.core.events.counts
     assert (counts[State.ASSIGNED], counts[State.PENDING]) == (2, 1)
 
 
@@ -149,8 +149,8 @@ def test_what_the_rules_do_not_allow_is_overruled_and_counted(advice, taken):
 def test_more_robots_than_operators_are_overruled():
     office = Office(Advising(lambda s: [Assignment(t, t + 1) for t in range(len(s.tasks))]))
     office.register(OTHER_ROBOT, "Robot", 10)
-    office.core.book.add("fire", east(12), 0.5, 0.0)
-    office.core.book.add("flood", east(50), 0.5, 0.0)
+    office.core.events.add("fire", east(12), 0.5, 0.0)
+    office.core.events.add("flood", east(50), 0.5, 0.0)
     assert [send.to for send in office.tick(1.0)] == [OPERATOR]
     assert office.core.counters["overruled"] == 1
 

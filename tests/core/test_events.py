@@ -1,4 +1,4 @@
-"""The book of events: reports become events, each in one state, its times in order."""
+"""The event table: reports become events, each in one state, its times in order."""
 
 import pytest
 from helpers.dva.dispatch_office import (
@@ -13,7 +13,7 @@ from helpers.dva.dispatch_office import (
 )
 
 from dva_sim.core.assignments import Rules
-from dva_sim.core.events import KEPT_CLOSED, MOST_SOURCES, EventBook, State
+from dva_sim.core.events import KEPT_CLOSED, MOST_SOURCES, EventTable, State
 from dva_sim.protocol import messages as m
 
 
@@ -40,14 +40,14 @@ def test_reports_of_one_kind_within_8_metres_are_one_event(office):
     office.fire(19.9)
     office.fire(20.1)
     office.fire(12, kind="gas_leak")
-    assert {e.number: e.reports for e in office.core.book.open.values()} == {1: 2, 2: 1, 3: 1}
+    assert {e.number: e.reports for e in office.core.events.open.values()} == {1: 2, 2: 1, 3: 1}
 
 
 def test_where_reports_are_not_merged_each_is_an_event():
     office = Office(rules=Rules(merge_distance=0.0))
     office.fire(12)
     office.fire(12)
-    assert office.core.book.total == 2
+    assert office.core.events.total == 2
 
 
 def test_an_event_that_is_over_takes_no_more_reports(office):
@@ -78,15 +78,15 @@ def test_an_event_is_as_severe_as_the_worst_report(office):
 
 
 def test_of_one_event_at_most_64_sources_are_told_apart():
-    book = EventBook()
-    event = book.add("fire", HERE, 0.5, 0.0)
+    events = EventTable()
+    event = events.add("fire", HERE, 0.5, 0.0)
     for number in range(MOST_SOURCES + 10):
-        book.note_source(event, str(number), 0.5)
+        events.note_source(event, str(number), 0.5)
     assert len(event.sources) == 64
 
 
 @pytest.mark.invariant("S10")
-def test_when_the_book_is_full_a_report_is_answered_busy_and_one_of_a_known_event_is_not(
+def test_when_the_event_table_is_full_a_report_is_answered_busy_and_one_of_a_known_event_is_not(
     office, monkeypatch
 ):
     monkeypatch.setattr("dva_sim.core.events.MOST_OPEN", 1)
@@ -95,7 +95,7 @@ def test_when_the_book_is_full_a_report_is_answered_busy_and_one_of_a_known_even
     assert office.say(DETECTOR, new)[0].code == m.BUSY
     known = m.EventReport(None, "fire", east(12), 0.5, 0.9, "detected")
     assert office.say(DETECTOR, known)[0].code == m.OK
-    assert office.core.book.total == 1
+    assert office.core.events.total == 1
 
 
 # --- withdrawal ----------------------------------------------------------------------------
@@ -107,7 +107,7 @@ def test_what_its_only_source_withdraws_before_anybody_was_sent_has_expired():
     office.withdraw(12, now=5.0)
     assert office.event().state is State.EXPIRED
     assert office.event().times == {"detected": 1.0, "closed": 5.0}
-    assert office.core.book.waiting == {}
+    assert office.core.events.waiting == {}
 
 
 def test_an_event_expires_only_when_the_last_of_its_sources_has_withdrawn_it():
@@ -141,7 +141,7 @@ def test_a_withdrawal_elsewhere_or_of_another_kind_ends_nothing():
     office.fire(12, kind="flood")
     office.fire(90)
     office.withdraw(12)
-    assert office.core.book.counts[State.PENDING] == 2
+    assert office.core.events.counts[State.PENDING] == 2
 
 
 # --- states and times ----------------------------------------------------------------------
@@ -169,11 +169,11 @@ def test_an_event_runs_its_course_with_its_times_in_order(office):
 
 def test_every_step_is_a_change_that_the_memory_hears_of(office):
     office.fire(12)
-    book = office.core.book
+    events = office.core.events
     for state in ("departed", "arrived"):
-        book.changes()
+        events.changes()
         office.progress(OPERATOR, state, 3.0)
-        assert [event.number for event in book.changes()] == [1]
+        assert [event.number for event in events.changes()] == [1]
 
 
 def test_who_finds_something_was_there_even_if_its_arrival_was_lost(office):
@@ -196,37 +196,37 @@ def test_an_event_that_waits_again_has_not_been_departed_for(office):
 
 
 def test_a_step_that_does_not_exist_is_refused():
-    book = EventBook()
-    event = book.add("fire", HERE, 0.5, 0.0)
-    book.move(event, State.ESCALATED, 1.0)
+    events = EventTable()
+    event = events.add("fire", HERE, 0.5, 0.0)
+    events.move(event, State.ESCALATED, 1.0)
     with pytest.raises(ValueError, match="escalated to confirmed"):
-        book.move(event, State.CONFIRMED, 2.0)
+        events.move(event, State.CONFIRMED, 2.0)
 
 
 @pytest.mark.invariant("S6")
 def test_each_event_is_in_one_state_and_the_counts_add_up_to_all():
-    book = EventBook()
+    events = EventTable()
     for number in range(6):
-        book.add("fire", east(100 * number), 0.5, 0.0)
-    book.move(book.open[2], State.ASSIGNED, 1.0)
-    book.move(book.open[3], State.EXPIRED, 1.0)
-    book.move(book.open[4], State.CONFIRMED, 1.0)
-    assert {s.value: n for s, n in book.counts.items() if n} == {
+        events.add("fire", east(100 * number), 0.5, 0.0)
+    events.move(events.open[2], State.ASSIGNED, 1.0)
+    events.move(events.open[3], State.EXPIRED, 1.0)
+    events.move(events.open[4], State.CONFIRMED, 1.0)
+    assert {s.value: n for s, n in events.counts.items() if n} == {
         "pending": 3,
         "assigned": 1,
         "expired": 1,
         "confirmed": 1,
     }
-    assert sum(book.counts.values()) == book.total == 6
+    assert sum(events.counts.values()) == events.total == 6
 
 
 def test_the_last_1000_closed_events_are_kept():
-    book = EventBook()
+    events = EventTable()
     for _ in range(KEPT_CLOSED + 1):
-        book.move(book.add("fire", HERE, 0.5, 0.0), State.ESCALATED, 1.0)
-    assert book.get(1) is None
-    assert book.get(2) is not None
-    assert len(book.closed) == 1000
+        events.move(events.add("fire", HERE, 0.5, 0.0), State.ESCALATED, 1.0)
+    assert events.get(1) is None
+    assert events.get(2) is not None
+    assert len(events.closed) == 1000
 
 
 # --- findings ------------------------------------------------------------------------------

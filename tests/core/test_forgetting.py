@@ -118,7 +118,7 @@ def test_who_works_on_an_event_is_replaced_first_and_then_forgotten(office):
     assert known(office) == {GUARD}
     assert office.event().responder == GUARD
     assert office.event().sources  # its detector is forgotten, what it reported is not
-    assert office.core.book.counts[State.ASSIGNED] == office.core.book.total == 1
+    assert office.core.events.counts[State.ASSIGNED] == office.core.events.total == 1
 
 
 def test_what_was_sent_to_who_is_forgotten_may_come_back_undelivered(office):
@@ -200,7 +200,7 @@ def test_after_ten_waves_the_core_holds_what_it_held_after_the_first(office, tmp
             office.ok([send for send in sends if send.to in TEAM_THERE], now)
             office.ok([s for s in sends if isinstance(s.body, m.PermissionRevocation)], now)
             office.core.registry.moves()
-            assert memory.keep(core, core.book.changes(), now) is None
+            assert memory.keep(core, core.events.changes(), now) is None
         office.sent.clear()
         after.append(sizes(core))
     memory.close()
@@ -225,10 +225,10 @@ def test_the_next_life_does_not_know_who_was_forgotten_and_knows_every_event(off
     memory = Store(file)
     office.fire(12)
     office.fire(90, kind="flood")
-    memory.keep(office.core, office.core.book.changes(), 0.0)
+    memory.keep(office.core, office.core.events.changes(), 0.0)
     held(office, OTHER_OPERATOR, OTHER_ROBOT)
     only(office, OTHER_OPERATOR, GUARD, until=FORGOTTEN)
-    memory.keep(office.core, office.core.book.changes(), FORGOTTEN)
+    memory.keep(office.core, office.core.events.changes(), FORGOTTEN)
     memory.close()
     core = office.new_core()
     memory = Store(file)
@@ -236,7 +236,7 @@ def test_the_next_life_does_not_know_who_was_forgotten_and_knows_every_event(off
     memory.close()
     assert set(core.registry.entries) == {OTHER_OPERATOR, GUARD, OTHER_ROBOT}
     assert core.registry.entries.keys() == known(office)
-    assert core.book.total == 2
-    assert {e.number: e.state for e in (*core.book.open.values(), *core.book.closed.values())} == {
-        n: office.event(n).state for n in (1, 2)
-    }
+    assert core.events.total == 2
+    assert {
+        e.number: e.state for e in (*core.events.open.values(), *core.events.closed.values())
+    } == {n: office.event(n).state for n in (1, 2)}

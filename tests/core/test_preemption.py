@@ -105,7 +105,7 @@ def test_a_policy_that_grabs_everybody_cannot_keep_an_event_beyond_its_deadline(
     office.busy(ROBOT, OPERATOR)
     for now in range(90):
         office.ok(office.fire(80, now=now), now)
-    late = [e for e in office.core.book.open.values() if e.waiting_since <= 29]
+    late = [e for e in office.core.events.open.values() if e.waiting_since <= 29]
     assert all(e.state is State.ASSIGNED for e in late)
     assert office.core.counters["preempted"] >= 59
     assert len(office.working) == 3

@@ -149,7 +149,7 @@ def test_a_dva_that_heeds_nothing_reads_nothing():
     office.say(OPERATOR, m.GetSensorInfo())
     assert learn(office) == []
     assert office.shows(ROBOT, "smoke", *SMOKY) == []
-    assert office.core.book.total == 0
+    assert office.core.events.total == 0
 
 
 # --- what it means -----------------------------------------------------------------------------
@@ -167,24 +167,24 @@ def test_much_smoke_at_a_robot_is_a_fire_there_and_somebody_is_sent(office):
 @pytest.mark.parametrize("values", [(0.5, 0.5), (0.5, 0.5, 0.1, 0.5, 0.5), (0.29,) * 50])
 def test_noise_is_no_fire(office, values):
     office.shows(ROBOT, "smoke", *values)
-    assert office.core.book.total == 0
+    assert office.core.events.total == 0
 
 
 def test_what_a_sensor_goes_on_showing_is_said_once(office):
     office.shows(ROBOT, "smoke", *SMOKY * 20)
-    assert (office.core.book.total, office.event().reports) == (1, 1)
+    assert (office.core.events.total, office.event().reports) == (1, 1)
 
 
 def test_gas_is_a_leak_and_another_event_than_smoke(office):
     office.shows(ROBOT, "smoke", *SMOKY)
     office.shows(ROBOT, "gas", *(0.01,) * IN_A_ROW)
-    assert [event.kind for event in office.core.book.open.values()] == ["fire", "gas_leak"]
+    assert [event.kind for event in office.core.events.open.values()] == ["fire", "gas_leak"]
 
 
 @pytest.mark.parametrize("sensor", ["water", "temperature"])
 def test_what_it_does_not_heed_means_nothing(office, sensor):
     office.shows(ROBOT, sensor, *(99.0,) * 9)
-    assert office.core.book.total == 0
+    assert office.core.events.total == 0
 
 
 def test_smoke_at_the_place_of_an_event_confirms_it_and_who_was_sent_need_not_look(office):
@@ -194,7 +194,7 @@ def test_smoke_at_the_place_of_an_event_confirms_it_and_who_was_sent_need_not_lo
     assert office.event().state is State.CONFIRMED
     assert Send(OPERATOR, m.OrderProgress(1, "done")) in sends
     assert office.working == {}
-    assert office.core.book.total == 1
+    assert office.core.events.total == 1
 
 
 def test_a_confirmed_event_that_is_to_be_contained_waits_for_a_guard_then():
@@ -215,13 +215,13 @@ def test_smoke_some_way_off_speaks_for_the_event_but_does_not_confirm_it(office)
     event = office.event()
     assert (event.state, event.reports) == (State.ASSIGNED, 2)
     assert event.confidence > before
-    assert office.core.book.total == 1
+    assert office.core.events.total == 1
 
 
 def test_beyond_its_reach_smoke_is_another_fire(office):
     office.fire(10 + REACH + 1)
     office.shows(ROBOT, "smoke", *SMOKY)
-    assert office.core.book.total == 2
+    assert office.core.events.total == 2
 
 
 def test_a_robot_alone_confirms_nothing_of_its_own_but_a_second_one_does(office):
@@ -230,23 +230,23 @@ def test_a_robot_alone_confirms_nothing_of_its_own_but_a_second_one_does(office)
     office.register(OTHER_ROBOT, "Robot", 12)
     office.shows(OTHER_ROBOT, "smoke", *SMOKY)
     assert office.event().state is State.CONFIRMED
-    assert office.core.book.total == 1
+    assert office.core.events.total == 1
 
 
 def test_what_people_have_found_is_no_news_for_a_while(office):
     office.fire(12)
     office.finds(OPERATOR, "confirmed", 5.0)
     office.shows(ROBOT, "smoke", *SMOKY, 0.0, now=10.0)
-    assert office.core.book.total == 1
+    assert office.core.events.total == 1
     office.shows(ROBOT, "smoke", *SMOKY, now=5.0 + NO_NEWS)
-    assert office.core.book.total == 2
+    assert office.core.events.total == 2
 
 
 def test_what_was_refuted_is_news_again(office):
     office.fire(12)
     office.finds(OPERATOR, "refuted", 5.0)
     office.shows(ROBOT, "smoke", *SMOKY, now=10.0)
-    assert office.core.book.total == 2
+    assert office.core.events.total == 2
 
 
 # --- one event, whoever tells of it ------------------------------------------------------------
@@ -257,7 +257,7 @@ def test_a_detector_says_better_where_it_is_and_nobody_has_set_out(office):
     office.shows(ROBOT, "smoke", *SMOKY)
     office.fire(25)
     event = office.event()
-    assert (event.position, event.state, office.core.book.total) == (east(25), State.PENDING, 1)
+    assert (event.position, event.state, office.core.events.total) == (east(25), State.PENDING, 1)
     assert set(event.sources) == {ROBOT, DETECTOR}
 
 
@@ -269,13 +269,13 @@ def test_who_is_on_the_way_to_where_it_was_felt_is_sent_to_where_it_is(office):
     assert (felt.state, seen.state) == (State.EXPIRED, State.ASSIGNED)
     assert Send(OPERATOR, m.OrderProgress(1, "done")) in sends
     assert [s.body.event_id for s in sends if isinstance(s.body, m.Order)] == [2]
-    assert sum(office.core.book.counts.values()) == office.core.book.total == 2
+    assert sum(office.core.events.counts.values()) == office.core.events.total == 2
 
 
 def test_smoke_at_a_robot_whose_place_is_not_known_means_nothing(office):
     office.register(OTHER_ROBOT, "Robot")
     assert office.shows(OTHER_ROBOT, "smoke", *SMOKY) == []
-    assert office.core.book.total == 0
+    assert office.core.events.total == 0
 
 
 def test_when_no_more_events_fit_that_is_counted(office, monkeypatch):

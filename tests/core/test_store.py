@@ -38,7 +38,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def keep(office: Office, memory: Store, now: float = 0.0) -> str | None:
-    return memory.keep(office.core, office.core.book.changes(), now)
+    return memory.keep(office.core, office.core.events.changes(), now)
 
 
 def next_life(office: Office, file: Path, now: float) -> Dva:
@@ -250,9 +250,9 @@ from helpers.dva.dispatch_office import Office
 from dva_sim.core.store import Memory
 office, memory = Office(), Memory(sys.argv[1])
 while True:
-    office.fire(20.0 * (office.core.book.total + 1), source=sys.argv[3])
-    memory.keep(office.core, office.core.book.changes(), 0.0)
-    print(office.core.book.total, flush=True)
+    office.fire(20.0 * (office.core.events.total + 1), source=sys.argv[3])
+    memory.keep(office.core, office.core.events.changes(), 0.0)
+    print(office.core.events.total, flush=True)
 """
 
 
@@ -272,8 +272,8 @@ def test_a_process_that_is_killed_forgets_nothing_that_it_has_said(file):
         memory, core = Store(file), Office().new_core()
         memory.recall(core, 0.0)
         memory.close()
-        assert core.book.total in (reported, reported + 1)
-        assert sum(core.book.counts.values()) == core.book.total
+        assert core.events.total in (reported, reported + 1)
+        assert sum(core.events.counts.values()) == core.events.total
         for path in file.parent.iterdir():
             path.unlink()
 
@@ -311,7 +311,7 @@ def test_a_file_that_another_holds_is_one_line_and_caught_up_with_later(file):
     other.close()
     assert keep(office, memory) is None
     memory.close()
-    assert next_life(office, file, 0.0).book.total == 1
+    assert next_life(office, file, 0.0).events.total == 1
 
 
 def refusal(file: Path) -> str:

@@ -97,7 +97,7 @@ def test_a_dva_that_remembers_an_earlier_life_decides_the_same_again(tmp_path):
     path = tmp_path / "dva.trace.jsonl"
     run = trace_of(path, "drive-to-event", store, horizon_s=60)
     assert '"do": "recall"' in path.read_text()
-    assert run.dva.core.book.total == 1
+    assert run.dva.core.events.total == 1
     assert differences(path) == 0
 
 

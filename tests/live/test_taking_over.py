@@ -219,13 +219,13 @@ def test_the_dva_lists_sensors_and_smoke_at_a_robot_is_an_event(network):
             yield Pause(0.2)
 
     asker = scene.enters(1, asks)
-    book = scene.dva.core.book
-    scene.until(lambda: asker.done and book.total)
+    events = scene.dva.core.events
+    scene.until(lambda: asker.done and events.total)
     content = heard[-1].content
     assert isinstance(content, m.SensorList)
     (line,) = content.devices
     assert (line.device, line.sensors) == (ROBOT, (m.Sensor("smoke", "1/m"),))
-    event = book.get(1)
+    event = events.get(1)
     assert event is not None
     assert (event.kind, set(event.sources)) == ("fire", {ROBOT})
     here = scene.robot.body.pose()
@@ -240,8 +240,8 @@ def test_what_a_detector_reports_beside_the_robot_is_confirmed_by_it(network):
     detector = scene.stage.device("detector", 1)
     report = m.EventReport(None, "fire", place, 0.5, 0.9, "detected")
     detector.register(lambda: detector.ask(DVA, report))
-    book = scene.dva.core.book
-    scene.until(lambda: book.total and book.get(1).state is State.CONFIRMED)  # type: ignore[union-attr]
-    assert book.total == 1
-    assert set(book.closed[1].sources) >= {detector.id_tag}
-    assert replace(book.closed[1]).position == place
+    events = scene.dva.core.events
+    scene.until(lambda: events.total and events.get(1).state is State.CONFIRMED)  # type: ignore[union-attr]
+    assert events.total == 1
+    assert set(events.closed[1].sources) >= {detector.id_tag}
+    assert replace(events.closed[1]).position == place

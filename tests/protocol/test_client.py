@@ -139,7 +139,7 @@ def test_the_control_room_of_the_specification_acknowledges_and_sends_as_propose
     live_until(network.clock, lambda: dva.core.registry.located("Guard"))
     out, err = run(control_room, dva, tmp_path)
     assert (out.startswith("code 0"), err) == (True, "")
-    event = dva.core.book.get(1)
+    event = dva.core.events.get(1)
     assert event.handling.acknowledged.author == me
     assert [f.overrides for f in dva.facts if f.action == "assign"] == [False]
 

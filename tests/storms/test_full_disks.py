@@ -113,13 +113,13 @@ def lines(storm: Storm) -> list[str]:
 
 @pytest.mark.invariant("S6")
 def test_what_is_not_kept_is_not_confirmed_and_a_report_is_acted_on(storm, disk):
-    asks, robot, book = Answers(storm), storm.robots[0].id, storm.run.dva.core.book
+    asks, robot, events = Answers(storm), storm.robots[0].id, storm.run.dva.core.events
     with disk.full(storm):
         assert asks.ask(DVA, FIRE).code == m.BUSY
         assert asks.ask(DVA, m.PermissionRequest(robot, "teleoperation")).code == m.BUSY
         assert asks.ask(robot, m.Emergency()).code == m.OK
         assert asks.ask(DVA, m.GetDeviceList()).code == m.OK
-        (fire,) = (event for event in book.open.values() if event.kind == "fire")
+        (fire,) = (event for event in events.open.values() if event.kind == "fire")
         assert fire.sent
         (line,) = lines(storm)
         assert unnamed(line, "memory") == []
@@ -144,7 +144,7 @@ def test_what_was_confirmed_survives_a_dva_that_is_killed_on_a_full_disk(storm, 
         storm.dva.survive(storm.now + 2.0)
     storm.dva.survive(storm.now + 10.0)
     core = storm.run.dva.core
-    assert {event.kind for event in core.book.open.values()} <= {"flood", "fire"}
+    assert {event.kind for event in core.events.open.values()} <= {"flood", "fire"}
     assert core.sessions.permissions.grants[robot].session == held.session
     assert asks.ask(DVA, given_back).code == m.OK
     assert asks.ask(DVA, FIRE).code == m.OK
@@ -172,7 +172,7 @@ def test_a_dva_that_was_killed_restarts_on_a_full_disk(storm, disk, monkeypatch)
         storm.dva.kill(1.0)
         storm.dva.survive(storm.now + 5.0)
         assert storm.dva.memory is not killed
-        assert "fire" in {event.kind for event in storm.run.dva.core.book.open.values()}
+        assert "fire" in {event.kind for event in storm.run.dva.core.events.open.values()}
         assert asks.ask(DVA, FIRE).code == m.BUSY
     assert asks.ask(DVA, FIRE).code == m.OK
     assert storm.recorder.broken == {}
@@ -185,8 +185,8 @@ def test_a_finding_that_cannot_be_kept_is_reported_until_it_can(storm, disk):
     with disk.full(storm):
         device.report_finding(FIRE, replies.append)
         storm.dva.survive(storm.now + 12.0)
-        book = storm.run.dva.core.book
-        (fire,) = (event for event in book.open.values() if event.kind == "fire")
+        events = storm.run.dva.core.events
+        (fire,) = (event for event in events.open.values() if event.kind == "fire")
         assert [reply.code for reply in replies] == [m.BUSY]
         assert fire.reports == 3
     storm.dva.survive(storm.now + 20.0)

@@ -106,7 +106,7 @@ class RoomActions:
         body, done = report_of(line, place)
 
         def then(_: m.Reply) -> Answered:
-            event = self._world.run.dva.core.book.near(body.kind, body.position)
+            event = self._world.run.dva.core.events.near(body.kind, body.position)
             return {} if event is None else {"event": event.number}
 
         self._ask(client, line, on_result, body, done, then)

@@ -138,8 +138,8 @@ def keep_run(run: Run, recorder: ConsoleRecorder) -> None:
         kept.put_new("team", dict(run.stage.labels), radii, key="team")
         for number, when in field.contained.items():
             kept.put_new("contains", number, when, key=f"contained {number}")
-        book = run.dva.core.book
-        for e in (*book.closed.values(), *book.open.values()):
+        events = run.dva.core.events
+        for e in (*events.closed.values(), *events.open.values()):
             kept.put_new("event", *event_facts(e), key=f"event {e.number}")
 
     log = FactLog(

@@ -18,7 +18,7 @@ from dva_sim.live.process import ending_when_asked
 from dva_sim.network.addresses import check_address
 from dva_sim.network.keys import KeyRing
 from dva_sim.simulation.full.verdicts import (
-    BOOK_UNKNOWN,
+    EVENTS_UNKNOWN,
     OF_THE_DVA,
     refuse_broken,
     verdicts,
@@ -98,7 +98,7 @@ class RobotSimulator:
         finally:
             self._processes.end()
             world.close()
-        found = verdicts(world.recorder, dict.fromkeys(OF_THE_DVA, BOOK_UNKNOWN))
+        found = verdicts(world.recorder, dict.fromkeys(OF_THE_DVA, EVENTS_UNKNOWN))
         for verdict in found:
             self._say(str(verdict))
         if self._processes.failed:

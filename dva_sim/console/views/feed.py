@@ -16,7 +16,7 @@ from dva_sim.console.wire.events import EventFacts, StoryLine
 from dva_sim.console.wire.rows import DoingShown, PlacesLine, RobotRow
 from dva_sim.console.wire.scenes import Happened, ThingBody
 from dva_sim.core.event_status import state_since
-from dva_sim.core.events import FINAL, Event, EventBook
+from dva_sim.core.events import FINAL, Event, EventTable
 from dva_sim.kernel.recorder import Moment, Recorder
 from dva_sim.live.parts import Rate
 from dva_sim.worlds.site import Site
@@ -29,15 +29,15 @@ class Feed:
     """Lines about a run.
 
     Args:
-        book: Events of its DVA, if there is one here.
+        events: Events of its DVA, if there is one here.
 
     Attributes:
         things: Everybody.
         numbers: By which lines call them, by id or name.
     """
 
-    def __init__(self, run: PlayedRun, book: EventBook | None = None) -> None:
-        self._run, self._book = run, book or EventBook()
+    def __init__(self, run: PlayedRun, events: EventTable | None = None) -> None:
+        self._run, self._events = run, events or EventTable()
         self.things = Things()
         self.numbers = self.things.numbers
         self._rates: dict[str, Rate] = {}
@@ -146,11 +146,11 @@ class Feed:
 
     def events(self) -> list[EventFacts]:
         """All that are open, and the last that are over."""
-        book = self._book
-        over = list(book.closed.values())[-KEPT_EVENTS:]
+        events = self._events
+        over = list(events.closed.values())[-KEPT_EVENTS:]
         return [
             event_facts(event, self._run.stage.site, self._run.stage.labels)
-            for event in (*over, *book.open.values())
+            for event in (*over, *events.open.values())
         ]
 
     def story(self) -> Iterator[StoryLine]:

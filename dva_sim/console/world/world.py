@@ -96,7 +96,7 @@ class ConsoleWorld(PublishingWorld):
             if self.sockets is not None:
                 self.sockets.close()
             raise
-        self.feed, self.lag = Feed(self.run, self.run.dva.core.book), LagRule()
+        self.feed, self.lag = Feed(self.run, self.run.dva.core.events), LagRule()
         self.tell: Tell = lambda *_: None
         self.show: Show = lambda *_: None
         self.windows = self._windows()

@@ -76,7 +76,7 @@ class DvaAgent:
         """Begin to look at deadlines; a memory tells what was going on before."""
         clock = self.device.clock
         if self._memory is not None and self._memory.recall(self.core, clock.now):
-            count = len(self.core.book.open)
+            count = len(self.core.events.open)
             self.device.tell(f"remembers {count} open event{'s' * (count != 1)}")
             self._attend()
             self._carry_out(self.core.go_on())
@@ -263,7 +263,7 @@ class DvaAgent:
 
     def _keep_changes(self) -> None:
         """Put each change of an event on the timeline, and all that changed into the memory."""
-        changed = self.core.book.changes()
+        changed = self.core.events.changes()
         if self._memory is not None:
             self._complain(self._memory.keep(self.core, changed, self.device.clock.now))
         for event in changed:

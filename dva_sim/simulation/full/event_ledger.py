@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 from dva_sim.core.assignments import Rules
-from dva_sim.core.events import ACT_STEPS, SAME_SPOT, STEPS, Event, EventBook, State, apart
+from dva_sim.core.events import ACT_STEPS, SAME_SPOT, STEPS, Event, EventTable, State, apart
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.observations import Page, Right
 
@@ -127,7 +127,7 @@ class EventLedger:
         at_event: float,
         name: Callable[[str], str],
     ) -> None:
-        self._book, self._rules, self._dva, self._name = EventBook(), rules, dva, name
+        self._events, self._rules, self._dva, self._name = EventTable(), rules, dva, name
         self._place_of, self._at_event = place_of, at_event
         self.knows_places, self._is_new = True, True
         self._heard: dict[str, float] = {}
@@ -245,7 +245,7 @@ class EventLedger:
 
     def _finds(self, word: Word, source: str, number: int, finding: str) -> None:
         """It counts if who was sent there says so; what is confirmed, was looked at there."""
-        goes, event = word.ordered.get(source), self._book.get(number)
+        goes, event = word.ordered.get(source), self._events.get(number)
         if goes is None or event is None:
             return
         self._takes_up(number, source)
@@ -270,7 +270,7 @@ class EventLedger:
     # --- what the book shows -------------------------------------------------------------
 
     def check(self, now: float, page: Page) -> Iterator[Broken]:
-        """Yield what is wrong with the event book now."""
+        """Yield what is wrong with the event table now."""
         if now < self._now:
             yield "S7", f"time runs back, from {self._now:g} to {now:g} s"
         passed, last, self._now = now - self._now, self._now, now
@@ -284,46 +284,46 @@ class EventLedger:
             self._let_no_time_pass(LOST_BY_RESTART + self._not_kept)
             self._not_kept, last = 0.0, -math.inf
             self._seen = {n: e._replace(debt=Debt(None, False, now)) for n, e in self._seen.items()}
-            self._forget_unpromised(page.book)
-        book = self._book = page.book
+            self._forget_unpromised(page.events)
+        events = self._events = page.events
         if self._is_new:
             self._is_new = False
             self._adopt(now)
             last = -math.inf
         for report in self._taken:
-            booked = [*self._fitting(report)]
-            self._promised |= dict.fromkeys(booked)
-            if not booked:
+            expected = [*self._fitting(report)]
+            self._promised |= dict.fromkeys(expected)
+            if not expected:
                 yield "S6", f"a {report.kind} was reported, but the DVA does not list it"
         self._taken.clear()
-        if sum(book.counts.values()) != book.total:
-            yield "S6", f"{book.total} events, but {sum(book.counts.values())} in some state"
-        if min(book.counts.values()) < 0:
+        if sum(events.counts.values()) != events.total:
+            yield "S6", f"{events.total} events, but {sum(events.counts.values())} in some state"
+        if min(events.counts.values()) < 0:
             yield "S6", "a count of events is below zero"
-        states = [event.state for event in book.open.values()]
+        states = [event.state for event in events.open.values()]
         for state in UNSETTLED:
             count = states.count(state)
-            if count != book.counts[state]:
-                yield "S6", f"{count} events are {state}, but {book.counts[state]} counted"
-        if len(book.open) + len(book.closed) == book.total:  # none is forgotten yet
-            closed = Counter(event.state for event in book.closed.values())
-            for state in book.counts.keys() - UNSETTLED:
+            if count != events.counts[state]:
+                yield "S6", f"{count} events are {state}, but {events.counts[state]} counted"
+        if len(events.open) + len(events.closed) == events.total:  # none is forgotten yet
+            closed = Counter(event.state for event in events.closed.values())
+            for state in events.counts.keys() - UNSETTLED:
                 count = closed[state] + states.count(state)
-                if count != book.counts[state]:
-                    yield "S6", f"{count} events are {state}, but {book.counts[state]} counted"
-        for number in book.open.keys() & book.closed.keys():
+                if count != events.counts[state]:
+                    yield "S6", f"{count} events are {state}, but {events.counts[state]} counted"
+        for number in events.open.keys() & events.closed.keys():
             yield "S6", f"event {number} is open and closed"
-        for number in self._open.keys() - book.open.keys() - book.closed.keys():
+        for number in self._open.keys() - events.open.keys() - events.closed.keys():
             yield "S6", f"event {number} was open, but the DVA does not list it"
-        self._promised = {n: None for n in self._promised if n in book.open}
-        for number in self._lost.keys() & book.open.keys():
-            self._find_again(book.open[number])
-        known, self._open = self._open, {n: (e.kind, e.position) for n, e in book.open.items()}
+        self._promised = {n: None for n in self._promised if n in events.open}
+        for number in self._lost.keys() & events.open.keys():
+            self._find_again(events.open[number])
+        known, self._open = self._open, {n: (e.kind, e.position) for n, e in events.open.items()}
         for number in known.keys() & self._open.keys():
             (kind, place), (was, before) = self._open[number], known[number]
             if kind != was or (place != before and apart(place, before) > MOVED):
                 yield "S6", f"event {number} was a {was} elsewhere before"
-        every = (*book.open.values(), *book.closed.values())
+        every = (*events.open.values(), *events.closed.values())
         seen, self._seen = self._seen, {}
         for event in every:
             old = seen.get(event.number)
@@ -332,13 +332,13 @@ class EventLedger:
             else:
                 yield from self._of_event(event, old, now, last)
 
-    def _forget_unpromised(self, book: EventBook) -> None:
+    def _forget_unpromised(self, events: EventTable) -> None:
         """Forget events of which nobody was told that they are known, if a restart has lost them.
 
         Another event may have the number of such a one.
         """
         for number in [n for n in self._open if n not in self._promised]:
-            event, (kind, place) = book.open.get(number), self._open[number]
+            event, (kind, place) = events.open.get(number), self._open[number]
             if event is None or event.kind != kind or apart(event.position, place) > MOVED:
                 del self._open[number]
                 self._lost[number] = kind, place, self._words.pop(number, Word())
@@ -355,7 +355,7 @@ class EventLedger:
     def _fitting(self, report: m.EventReport) -> Iterator[int]:
         """Yield the numbers of the events, open or closed, that fit a report."""
         near, kind = max(self._rules.merge_distance, SAME_SPOT), report.kind
-        known = (*self._book.open.values(), *self._book.closed.values())
+        known = (*self._events.open.values(), *self._events.closed.values())
         same = (e for e in known if e.kind == kind)
         return (e.number for e in same if apart(e.position, report.position) < near)
 
@@ -364,7 +364,7 @@ class EventLedger:
 
         Their responders count as ordered there, although no order was heard here.
         """
-        for event in (*self._book.open.values(), *self._book.closed.values()):
+        for event in (*self._events.open.values(), *self._events.closed.values()):
             word = self._word(event.number)
             sent = {event.operator: event.responder, event.responder: event.responder}
             sent[event.actor] = event.actor

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol
 from dva_sim.agents.robot.command_queue import mean_of
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.assignments import Rules
-from dva_sim.core.events import Event, EventBook, State
+from dva_sim.core.events import Event, EventTable, State
 from dva_sim.kernel.recorder import Accepted, ByHand, Sent
 from dva_sim.protocol.messages import Position
 from dva_sim.simulation.full.control_room import at_event_m
@@ -154,12 +154,12 @@ class Page(NamedTuple):
     """The DVA's book as it is now.
 
     Attributes:
-        book: The events.
+        events: The events.
         rights: Permissions to act on robots.
         works: False while the DVA is silenced: then it decides nothing.
     """
 
-    book: EventBook
+    events: EventTable
     rights: Sequence[Right]
     works: bool
 
@@ -168,7 +168,7 @@ def page_of(dva: DvaAgent) -> Page:
     """Return the present page of a DVA's book."""
     grants = dva.core.sessions.permissions.grants.values()
     rights = [Right(grant.robot, grant.holder, grant.session) for grant in grants]
-    return Page(dva.core.book, rights, not dva.device.silent)
+    return Page(dva.core.events, rights, not dva.device.silent)
 
 
 class Listener(Protocol):
@@ -347,7 +347,7 @@ class FactLog:
         self._motions: dict[str, RobotMotion] = {}
         self._places: dict[str, Position] = {}
         self._heard: dict[str, None] = {}
-        self._book = _BookDiff()
+        self._events = _EventTableDiff()
 
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:
         """Note a message: an answer with the robot's motion, an order with the book."""
@@ -355,7 +355,7 @@ class FactLog:
             if source in self._robots and b"<reply>" in payload:
                 self._note_motions(now, {source: self._look(source)})
             elif source == self._dva and self._page is not None and b"<Order>" in payload:
-                self._put(self._book.news(now, self._page()))
+                self._put(self._events.news(now, self._page()))
         if self._keeps_sent:
             self._put(Sent(now, source, to, 0, payload))
 
@@ -402,7 +402,7 @@ class FactLog:
         if self._heard:
             self._put(Heard(now, tuple(self._heard)))
             self._heard.clear()
-        self._put(self._book.news(now, page))
+        self._put(self._events.news(now, page))
 
     def deafened(self, now: float, robot: str, deaf: bool) -> None:
         """Implement `Observer`."""
@@ -436,7 +436,7 @@ def event_facts(event: Event, where: str) -> dict[str, Any]:
 _SENT = "responder", "operator", "actor"
 
 
-class _BookDiff:
+class _EventTableDiff:
     """Finds the changes of a book by comparing all of it."""
 
     def __init__(self) -> None:
@@ -446,24 +446,24 @@ class _BookDiff:
 
     def news(self, now: float, page: Page) -> BookNews:
         """Return the changes since the last page."""
-        book, events = page.book, list[dict[str, Any]]()
-        every = [(e, _BOTH if n in book.closed else _OPEN) for n, e in book.open.items()]
-        every += [(e, _CLOSED) for n, e in book.closed.items() if n not in book.open]
+        events, changed = page.events, list[dict[str, Any]]()
+        every = [(e, _BOTH if n in events.closed else _OPEN) for n, e in events.open.items()]
+        every += [(e, _CLOSED) for n, e in events.closed.items() if n not in events.open]
         known, self._events = self._events, {}
         for event, where in every:
             shown: tuple[Any, ...] = where, event.state, event.responder, event.operator
             shown = *shown, event.actor, event.needs_containment, *event.times.items()
             self._events[event.number] = shown
             if known.get(event.number) != shown:
-                events.append(event_facts(event, where))
+                changed.append(event_facts(event, where))
         gone = [number for number in known if number not in self._events]
-        counts = {state.value: count for state, count in book.counts.items()}
+        counts = {state.value: count for state, count in events.counts.items()}
         rights = list(page.rights)
         news = BookNews(
             time=now,
-            events=events,
+            events=changed,
             gone=gone,
-            total=book.total,
+            total=events.total,
             counts=counts if counts != self._counts else None,
             rights=rights if rights != self._rights else None,
             works=page.works,
@@ -472,7 +472,7 @@ class _BookDiff:
         return news
 
 
-class BookCopy:
+class EventTableCopy:
     """A copy of the DVA's book, rebuilt from its changes.
 
     Args:
@@ -480,22 +480,22 @@ class BookCopy:
     """
 
     def __init__(self, merge_distance: float) -> None:
-        self.book, self._rights = EventBook(merge_distance), list[Right]()
+        self.events, self._rights = EventTable(merge_distance), list[Right]()
 
     def page(self, news: BookNews) -> Page:
         """Apply changes, and return the present page."""
-        book = self.book
+        events = self.events
         for number in news.gone:
-            book.open.pop(number, None)
-            book.closed.pop(number, None)
+            events.open.pop(number, None)
+            events.closed.pop(number, None)
         for facts in news.events:
             self._put(facts)
-        book.total = news.total
+        events.total = news.total
         if news.counts is not None:
-            book.counts = {State(state): count for state, count in news.counts.items()}
+            events.counts = {State(state): count for state, count in news.counts.items()}
         if news.rights is not None:
             self._rights = news.rights
-        return Page(book, self._rights, news.works)
+        return Page(events, self._rights, news.works)
 
     def _put(self, facts: Mapping[str, Any]) -> None:
         number = facts["number"]
@@ -509,8 +509,8 @@ class BookCopy:
             times=dict(facts["times_s"]),
             **{who: facts[who] for who in _SENT},
         )
-        for where, events in ((_OPEN, self.book.open), (_CLOSED, self.book.closed)):
+        for where, kept in ((_OPEN, self.events.open), (_CLOSED, self.events.closed)):
             if facts["where"] in (where, _BOTH):
-                events[number] = event
+                kept[number] = event
             else:
-                events.pop(number, None)
+                kept.pop(number, None)

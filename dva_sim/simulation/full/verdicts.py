@@ -27,7 +27,7 @@ RULES: Final = {
 }
 OF_ROBOTS: Final = ("S1", "S2", "S3", "S4", "S5")
 OF_THE_DVA: Final = ("S6", "S7")
-BOOK_UNKNOWN = "what the DVA's book showed is not known here"
+EVENTS_UNKNOWN = "what the DVA's book showed is not known here"
 HELD, BROKEN, NOT_JUDGED = "held", "broken", "not judged"
 
 
@@ -117,7 +117,7 @@ class Judge:
 
     def __init__(self, terms: o.SafetyTerms) -> None:
         self.recorder = Recorder()
-        self._terms, self._book = terms, o.BookCopy(terms.rules.merge_distance)
+        self._terms, self._events = terms, o.EventTableCopy(terms.rules.merge_distance)
         self._motions: dict[str, o.RobotMotion] = {}
         self._places: dict[str, Position] = {}
         self._audit = SafetyAudit(self.recorder, terms, self._motion_of, self._places.get)
@@ -148,7 +148,7 @@ class Judge:
             case o.BookNews():
                 self._sees_dva = True
                 audit.knows_places(bool(self._places))
-                audit.shows(now, self._book.page(fact))
+                audit.shows(now, self._events.page(fact))
             case o.Heard():
                 for device in fact.devices:
                     audit.heard(now, device)
@@ -177,7 +177,7 @@ class Judge:
         elif not self._sees_robots:
             why_not |= dict.fromkeys(OF_ROBOTS, "how the robots moved is not known here")
         if not self._sees_dva:
-            why_not |= dict.fromkeys(OF_THE_DVA, BOOK_UNKNOWN)
+            why_not |= dict.fromkeys(OF_THE_DVA, EVENTS_UNKNOWN)
         return why_not
 
 

@@ -54,22 +54,22 @@ def _conservation(shift: Shift) -> Iterator[str]:
     held = sum(len(incidents) for incidents in shift.events.values())
     if shift.total != len(shift.unnoticed) + held + sum(shift.settled.values()):
         yield "an event of the world is lost"
-    book = shift.core.book
-    if sum(book.counts.values()) != book.total:
+    events = shift.core.events
+    if sum(events.counts.values()) != events.total:
         yield "the book's counts do not add up"
-    if book.open.keys() != shift.events.keys():
+    if events.open.keys() != shift.events.keys():
         yield "the book and the world know different open events"
-    if len(book.waiting) != sum(level.now for level in shift.waiting):
+    if len(events.waiting) != sum(level.now for level in shift.waiting):
         yield "the book and the world count different waiting events"
 
 
 def _limits(shift: Shift) -> Iterator[str]:
     """Nothing waits beyond its deadline, and no more than may wait."""
-    rules, now, book = shift.core.orders.rules, shift.clock.now, shift.core.book
-    for event in book.waiting.values():
+    rules, now, events = shift.core.orders.rules, shift.clock.now, shift.core.events
+    for event in events.waiting.values():
         if now - event.waiting_since > rules.escalate_after + SLACK:
             yield "an event waits beyond its deadline"
-    if rules.most_waiting is not None and len(book.waiting) > rules.most_waiting:
+    if rules.most_waiting is not None and len(events.waiting) > rules.most_waiting:
         yield "more events wait than may"
 
 
@@ -80,7 +80,7 @@ def _team(shift: Shift) -> Iterator[str]:
         job, at = unit.job, [event.number for event in engaged.all(unit.device)]
         if ([] if job is None else [job.order.event_id]) != at:
             yield "a responder is at something else than the DVA believes"
-    for event in shift.core.book.in_state(State.ASSIGNED, State.ON_SCENE):
+    for event in shift.core.events.in_state(State.ASSIGNED, State.ON_SCENE):
         if event.responder is None:
             yield "an event that somebody should be at has nobody"
         elif event.responder == event.actor:
@@ -250,7 +250,7 @@ class Shift:
 
     def _changed(self, about: object) -> None:
         """Follow the events of the DVA."""
-        changes = self.core.book.changes()
+        changes = self.core.events.changes()
         if changes:
             now = self.clock.now
             for event in changes:
@@ -283,17 +283,17 @@ class Shift:
 
     def _follow(self, event: Event, now: float) -> None:
         """Count an event where it stands now: waiting, served or over."""
-        number, book, stream = event.number, self.core.book, self.events[event.number][0].stream
+        number, events, stream = event.number, self.core.events, self.events[event.number][0].stream
         waited = number not in self._served
-        if number not in book.open:
+        if number not in events.open:
             (self.waiting if waited else self.served)[stream].change(-1, now)
             self._served.discard(number)
             self._end(event, now)
-        elif waited and number not in book.waiting:
+        elif waited and number not in events.waiting:
             self.waiting[stream].change(-1, now)
             self.served[stream].change(1, now)
             self._served.add(number)
-        elif not waited and number in book.waiting:
+        elif not waited and number in events.waiting:
             self.waiting[stream].change(1, now)
             self.served[stream].change(-1, now)
             self._served.discard(number)

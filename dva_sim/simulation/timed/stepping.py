@@ -71,9 +71,9 @@ class SteppedShift:
 
     def new_events(self) -> list[Event]:
         """Events that were reported since this was asked last, as the DVA knows them."""
-        book = self._shift.core.book
-        first, self._known = self._known + 1, book.total
-        return [e for number in range(first, book.total + 1) if (e := book.get(number))]
+        events = self._shift.core.events
+        first, self._known = self._known + 1, events.total
+        return [e for number in range(first, events.total + 1) if (e := events.get(number))]
 
     def advise(self, advice: Sequence[Advice]) -> Situation | None:
         """Answer, and let time pass until the DVA asks again; None: the shift is over.

@@ -114,7 +114,7 @@ def test_a_stopped_server_decides_and_says_nothing(page):
     page.world.recorder.message_sent = note
     page.let(90.0)  # in which fire and gas would have been reported, and guards sent
     assert sent == []
-    assert not page.world.run.dva.core.book.total
+    assert not page.world.run.dva.core.events.total
 
 
 @pytest.mark.parametrize("what", ["server_stop", "server_start"])

@@ -43,8 +43,8 @@ def ordered(page):
 
 def event(page):
     return (
-        next(iter(page.world.run.dva.core.book.open.values()), None)
-        or list(page.world.run.dva.core.book.closed.values())[-1]
+        next(iter(page.world.run.dva.core.events.open.values()), None)
+        or list(page.world.run.dva.core.events.closed.values())[-1]
     )
 
 
@@ -179,12 +179,12 @@ def test_nobody_stands_in_a_wall_or_in_somebody_else(page):
 def test_a_person_reports_an_event(page):
     assert page.do("guard_join", guard="guard-2")[0]
     x, y = guard(page).walking.place
-    before = len(page.world.run.dva.core.book.open)
+    before = len(page.world.run.dva.core.events.open)
     done, _ = page.do("guard_report", kind="gas_leak", x_m=x, y_m=y, severity="high")
     assert done
     page.let(0.5)
     found = [e for e in page.told("events")[-1]["events"] if e["kind"] == "gas_leak"]
-    assert len(page.world.run.dva.core.book.open) == before + 1
+    assert len(page.world.run.dva.core.events.open) == before + 1
     assert found[0]["severity"] == "high"
     for wrong in ({"kind": "war"}, {"severity": 7}, {"x_m": math.inf}):
         about = {"kind": "fire", "x_m": x, "y_m": y, "severity": "low"} | wrong

@@ -270,8 +270,8 @@ def test_the_age_of_an_event_is_that_of_its_state(page):
     page.let(20.0)
     event = page.told("events")[-1]["events"][0]
     assert (event["state"], event["over"]) == ("assigned", False)
-    book = page.world.run.dva.core.book
-    assert event["since_ms"] == round(1000 * book.open[event["number"]].times["assigned"])
+    events = page.world.run.dva.core.events
+    assert event["since_ms"] == round(1000 * events.open[event["number"]].times["assigned"])
 
 
 def test_the_age_of_a_command_is_the_links_delay_and_no_more_than_that_by_much(driving):

@@ -203,7 +203,7 @@ class Office:
     # --- what is so --------------------------------------------------------------------
 
     def event(self, number: int = 1) -> Event:
-        event = self.core.book.get(number)
+        event = self.core.events.get(number)
         assert event is not None
         return event
 

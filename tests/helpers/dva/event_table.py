@@ -46,7 +46,7 @@ class Case:
     def __init__(self) -> None:
         rules = Rules(escalate_after=WAITS, containment=True, max_attempts=MOST, order_limit=LIMIT)
         self.core: Dva = Office(rules=rules).core
-        self.event: Event = self.core.book.add("fire", HERE, 0.5, BEGAN, contain=True)
+        self.event: Event = self.core.events.add("fire", HERE, 0.5, BEGAN, contain=True)
 
     def into(self, state: str) -> None:
         """Bring the event into a state, at its beginning."""
@@ -79,7 +79,7 @@ class Case:
             case "CALL_AWAY" if orders.may_preempt(event, now):
                 orders.redirect(event, now)
             case "REPORT" if event.open:
-                self.core.book.merge(event, 0.9)
+                self.core.events.merge(event, 0.9)
             case "DEADLINE":
                 orders.give_up(now)
             case "ORDER_LIMIT" if event.open:

@@ -139,7 +139,7 @@ class Walk:
         self.check(name)
 
     def _take(self, sends: list[Send]) -> None:
-        assert self.memory.keep(self.core, self.core.book.changes(), self.now) is None
+        assert self.memory.keep(self.core, self.core.events.changes(), self.now) is None
         self.in_flight += sends
 
     def say(self, source: str, body: m.Body, number: int | None = None) -> list[Send]:
@@ -155,8 +155,8 @@ class Walk:
         return self.dice.choice([d for d, kind in DEVICES.items() if not kinds or kind in kinds])
 
     def _some_event(self) -> int:
-        newest = self.core.book.total
-        known = list(self.core.book.open) or [newest]
+        newest = self.core.events.total
+        known = list(self.core.events.open) or [newest]
         return self.dice.choice([*known, *known, max(1, newest), newest + 1])
 
     def _place(self) -> m.Position:
@@ -228,7 +228,7 @@ class Walk:
 
     def _found(self) -> list[Send]:
         number = self._some_event()
-        event, device = self.core.book.get(number), self._any()
+        event, device = self.core.events.get(number), self._any()
         if event is not None and event.sent and self.dice.random() < 0.8:
             device = self.dice.choice(sorted(event.sent))
         finding = self.dice.choice(["confirmed", "confirmed", "refuted", "contained", "detected"])
@@ -243,7 +243,7 @@ class Walk:
     def _decide(self) -> list[Send]:
         """Somebody at a control room decides: mostly what can be, and about what is there."""
         number, device = self._some_event(), self._any("Guard", "Robot")
-        event = self.core.book.get(number)
+        event = self.core.events.get(number)
         seen = None if event is None or self.dice.random() < 0.4 else event.handling.decisions
         if event is not None and event.holder and self.dice.random() < 0.3:
             device = event.responder or device
@@ -295,9 +295,9 @@ class Walk:
                 self.core.note(beat, self.now)
         sends = self.core.tick(self.now)
         assert self.core.next_deadline() > self.now
-        ends = (e.waiting_since for e in self.core.book.waiting.values())
+        ends = (e.waiting_since for e in self.core.events.waiting.values())
         assert all(self.now < since + self.rules.escalate_after for since in ends)
-        pending = {n for n, e in self.core.book.open.items() if e.state is State.PENDING}
+        pending = {n for n, e in self.core.events.open.items() if e.state is State.PENDING}
         assert self.core.dispatcher.auctions.running.keys() <= pending
         return sends
 
@@ -318,22 +318,22 @@ class Walk:
 
     def check(self, after: str) -> None:
         """All invariants."""
-        core, book = self.core, self.core.book
-        assert sum(book.counts.values()) == book.total, after
+        core, events = self.core, self.core.events
+        assert sum(events.counts.values()) == events.total, after
         for state in State:
             if state in (State.PENDING, *LOOKS):
-                here = sum(e.state is state for e in book.open.values())
-                assert book.counts[state] == here, (after, state)
-        assert all(event.open for event in book.open.values()), after
-        assert not any(event.open for event in book.closed.values()), after
-        waiting = {n for n, e in book.open.items() if e.waits_for is not None}
-        assert book.waiting.keys() == waiting, after
+                here = sum(e.state is state for e in events.open.values())
+                assert events.counts[state] == here, (after, state)
+        assert all(event.open for event in events.open.values()), after
+        assert not any(event.open for event in events.closed.values()), after
+        waiting = {n for n, e in events.open.items() if e.waits_for is not None}
+        assert events.waiting.keys() == waiting, after
         for device, event in core.orders.engaged.pairs():
             assert device in (event.responder, event.operator, event.actor), after
-            assert book.get(event.number) is event, after
-        for event in (*book.open.values(), *book.closed.values()):
+            assert events.get(event.number) is event, after
+        for event in (*events.open.values(), *events.closed.values()):
             self._check_event(event, after)
-        looked = [e.responder for e in book.open.values() if e.state in LOOKS]
+        looked = [e.responder for e in events.open.values() if e.state in LOOKS]
         assert len(looked) == len(set(looked)), after
         assert not core.dispatcher.situations._bound_for.keys() & set(core.orders.engaged), after
 
@@ -361,7 +361,7 @@ class Walk:
 
     def recover(self) -> float:
         """Let everybody obey; returns the time until no event is open [s]."""
-        began, left = self.now, len(self.core.book.open)
+        began, left = self.now, len(self.core.events.open)
         self.in_flight.clear()
         for device in DEVICES:
             self.alive[device] = True
@@ -371,17 +371,17 @@ class Walk:
             body = m.PermissionRevocation(grant.robot, grant.holder, grant.session)
             self._take(self.say(grant.holder, body))
         self._take(self.say(ROOMS[0], m.SetDispatch("automatic")))
-        for event in list(self.core.book.open.values()):
+        for event in list(self.core.events.open.values()):
             if event.handling.taken_off:  # whom the policy may not send there, it does not
                 self._take(self.say(ROOMS[0], m.Escalate(event.number)))
         # What was begun ends by its limit; then each event takes a few seconds of somebody's.
         bound = 2 * LIMIT + 20.0 + 30.0 * left
-        while self.core.book.open:
+        while self.core.events.open:
             self._take(self.pass_time(1.0))
             while self.in_flight:
                 self._obey(self.in_flight.pop(0))
             self.check("recovery")
-            assert self.now - began < bound, (self.rules, self.policy, self.core.book.open)
+            assert self.now - began < bound, (self.rules, self.policy, self.core.events.open)
         return self.now - began
 
     def _obey(self, send: Send) -> None:
@@ -453,14 +453,14 @@ def _watch(core: Dva) -> None:
 
 def snapshot(core: Dva) -> dict[str, Any]:
     """All that a core must know again after it was killed."""
-    book, permissions = core.book, core.sessions.permissions
+    events, permissions = core.events, core.sessions.permissions
     lasts = core.sessions.with_something_open()
     return {
-        "open": {n: repr(_with_sets_in_order(e)) for n, e in book.open.items()},
-        "closed": {n: repr(_with_sets_in_order(e)) for n, e in sorted(book.closed.items())},
-        "waiting": set(book.waiting),
-        "counts": book.counts,
-        "total": book.total,
+        "open": {n: repr(_with_sets_in_order(e)) for n, e in events.open.items()},
+        "closed": {n: repr(_with_sets_in_order(e)) for n, e in sorted(events.closed.items())},
+        "waiting": set(events.waiting),
+        "counts": events.counts,
+        "total": events.total,
         "engaged": sorted((device, event.number) for device, event in core.orders.engaged.pairs()),
         "devices": [
             e.device for i, e in core.registry.entries.items() if not e.silent or i in lasts

@@ -48,7 +48,7 @@ class Staffed:
 
     @property
     def event(self) -> Any:
-        return self.run.dva.core.book.get(1)
+        return self.run.dva.core.events.get(1)
 
 
 @pytest.fixture

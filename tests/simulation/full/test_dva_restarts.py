@@ -63,8 +63,8 @@ class Killed:
 
     @property
     def events(self) -> list[Event]:
-        book = self.dva.core.book
-        return sorted((*book.open.values(), *book.closed.values()), key=lambda e: e.number)
+        events = self.dva.core.events
+        return sorted((*events.open.values(), *events.closed.values()), key=lambda e: e.number)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_a_dva_that_is_killed_again_and_again_loses_nothing(tmp_path):
     killed = Killed(tmp_path, [12.0, 25.0, 41.0, 66.0, 93.0, 128.0], away=3.0)
     assert [e.kind for e in killed.events] == ["fire", "gas_leak", "flood"]
     assert [e.state for e in killed.events] == [State.CONTAINED] * 3
-    assert killed.dva.core.book.total == 3
+    assert killed.dva.core.events.total == 3
 
 
 def test_neither_kills_nor_a_link_that_loses_leave_an_event_hanging(tmp_path):

@@ -24,7 +24,7 @@ from dva_sim.agents.robot.faults import RobotFaults
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.core.dispatcher import Dispatcher
-from dva_sim.core.events import EventBook, State
+from dva_sim.core.events import EventTable, State
 from dva_sim.core.orders import Orders
 from dva_sim.core.registry import Registry
 from dva_sim.core.sessions import Sessions
@@ -332,10 +332,10 @@ def test_what_a_dva_remembers_of_an_earlier_life_breaks_no_rule():
     run = made({"horizon_s": 60})
     run.run()
     page, terms = page_of(run.dva), terms_of(run.scenario)
-    (event,) = page.book.closed.values()
+    (event,) = page.events.closed.values()
     assert "confirmed" in event.times
-    pending = page.book.add("fire", m.Position(38.66, -9.2), 0.5, 0.0)
-    page.book.move(pending, State.ASSIGNED, 0.5)
+    pending = page.events.add("fire", m.Position(38.66, -9.2), 0.5, 0.0)
+    page.events.move(pending, State.ASSIGNED, 0.5)
     pending.responder = id_of("guard", 1)
     facts: list[Any] = []
     log = FactLog(facts.append, (), lambda _: STANDS)
@@ -343,7 +343,7 @@ def test_what_a_dva_remembers_of_an_earlier_life_breaks_no_rule():
     report = m.EventReport(2, "fire", pending.position, 0.5, 0.9, "confirmed")
     data = encode(m.Message(DVA, 9, id_of("guard", 1), "12:00:00", 0, report))
     log.delivered(1.2, id_of("guard", 1), DVA, data)
-    page.book.move(pending, State.CONFIRMED, 1.2)
+    page.events.move(pending, State.CONFIRMED, 1.2)
     log.shows(1.5, page)
     found = {verdict.rule: verdict.state for verdict in judged(facts, terms)}
     assert (found["S6"], found["S7"]) == ("held", "held")
@@ -410,35 +410,37 @@ def test_motors_that_ignore_their_limit_break_s4():
 @pytest.mark.parametrize(
     "lose",
     [
-        lambda book, event: book.open.pop(event.number),
-        lambda book, event: book.counts.update({State.ASSIGNED: book.counts[State.ASSIGNED] + 1}),
-        lambda book, event: book.closed.update({event.number: event}),
-        lambda book, event: setattr(event, "state", State.ON_SCENE),
+        lambda events, event: events.open.pop(event.number),
+        lambda events, event: events.counts.update(
+            {State.ASSIGNED: events.counts[State.ASSIGNED] + 1}
+        ),
+        lambda events, event: events.closed.update({event.number: event}),
+        lambda events, event: setattr(event, "state", State.ON_SCENE),
     ],
     ids=["lost", "counted twice", "open and closed", "in a state nobody counted"],
 )
-def test_a_book_that_loses_or_doubles_an_event_breaks_s6(lose):
+def test_an_event_table_that_loses_or_doubles_an_event_breaks_s6(lose):
     run = made(EARLY)
     run.clock.run(10.0)
     assert broken(run) == set()
-    book = run.dva.core.book
-    lose(book, next(iter(book.open.values())))
+    events = run.dva.core.events
+    lose(events, next(iter(events.open.values())))
     run.clock.run(11.0)
     assert "S6" in broken(run)
 
 
 @pytest.mark.invariant("S6")
 def test_a_report_that_the_dva_thanks_for_and_forgets_breaks_s6(monkeypatch):
-    def forgetful(self: EventBook, *args: Any, **more: Any) -> Any:
+    def forgetful(self: EventTable, *args: Any, **more: Any) -> Any:
         event = honest(self, *args, **more)
         del self.open[event.number], self.waiting[event.number]
         self.total -= 1
         self.counts[event.state] -= 1
         return event
 
-    honest = EventBook.add
+    honest = EventTable.add
     run = made(EARLY)
-    monkeypatch.setattr(EventBook, "add", forgetful)
+    monkeypatch.setattr(EventTable, "add", forgetful)
     run.clock.run(10.0)
     assert "S6" in broken(run)
 
@@ -457,7 +459,7 @@ def test_an_order_that_is_kept_for_ever_breaks_s6(monkeypatch):
 @pytest.mark.invariant("S6")
 def test_an_event_that_is_over_and_counts_as_something_else_breaks_s6():
     run = played()
-    counts = run.dva.core.book.counts
+    counts = run.dva.core.events.counts
     assert counts[State.CONFIRMED] == 1
     counts[State.CONFIRMED], counts[State.EXPIRED] = 0, 1
     run.show_page()
@@ -514,7 +516,7 @@ def test_a_planted_bug_breaks_its_rule_in_an_ordinary_run(mutant, rule):
 def test_times_out_of_order_break_s7():
     run = made(EARLY)
     run.clock.run(10.0)
-    event = next(iter(run.dva.core.book.open.values()))
+    event = next(iter(run.dva.core.events.open.values()))
     event.times["assigned"] = event.times["detected"] - 1.0
     run.clock.run(11.0)
     assert broken(run) == {"S7"}
@@ -549,7 +551,7 @@ def test_a_forgery_makes_no_honest_robot_a_breaker_of_rules(forged):
 def test_a_count_below_zero_breaks_s6():
     run = staged()
     run.clock.run(10.0)
-    counts = run.dva.core.book.counts
+    counts = run.dva.core.events.counts
     counts[State.ESCALATED] -= 1
     counts[State.CONFIRMED] += 1
     run._watch()
@@ -618,7 +620,7 @@ def test_a_wait_that_begins_again_for_ever_breaks_s6(monkeypatch):
     honest = Orders.give_up
 
     def patient(self: Orders, now: float) -> Any:
-        for event in self.book.waiting.values():
+        for event in self.events.waiting.values():
             event.waiting_since = now
         return honest(self, now)
 
@@ -649,7 +651,7 @@ def test_an_event_that_nobody_has_confirmed_breaks_s6(monkeypatch):
     def hasty(self: Orders, event: Any, device: str, now: float) -> None:
         honest(self, event, device, now)
         if event.state is State.ASSIGNED:
-            self.book.move(event, State.CONFIRMED, now)
+            self.events.move(event, State.CONFIRMED, now)
 
     assert broken(played()) == set()
     monkeypatch.setattr(Orders, "departed", hasty)
