@@ -255,8 +255,8 @@ class ControlRooms:
     def _is_sent(event: Event, device: str, task: str) -> bool:
         if task == "confirm":
             return event.state in (State.ASSIGNED, State.ON_SCENE) and event.responder == device
-        stands_by = event.state is not State.CONFIRMED
-        return event.actor == device and stands_by == (task == "stand_by")
+        stand_by = event.state is not State.CONFIRMED
+        return event.actor == device and stand_by == (task == "stand_by")
 
     def _may_look(self, body: m.Assign, event: Event) -> None:
         """Nobody is taken from a scene, and from the way only by who knows of it."""

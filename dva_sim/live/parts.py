@@ -36,7 +36,7 @@ from dva_sim.ros.options import OpenPort
 from dva_sim.ros.server import RosbridgeServer
 from dva_sim.simulation.full.control_room import add_dispatcher, add_dva, add_operator
 from dva_sim.simulation.full.dva_trace import traced
-from dva_sim.simulation.full.observations import STANDS, FactLog, motion_of, page_of
+from dva_sim.simulation.full.observations import STATIONARY, FactLog, motion_of, page_of
 from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.run import FILM_PERIOD, WATCH_PERIOD
 from dva_sim.simulation.full.stage import Stage
@@ -129,7 +129,7 @@ class DvaPart:
         agent, clock = self._agent, stage.clock
         agent.on_fact = lambda fact: recorder.put("fact", fact.row())
         page = partial(page_of, agent)
-        log = FactLog(recorder.observe, (), lambda _: STANDS, page, keeps_sent=False)
+        log = FactLog(recorder.observe, (), lambda _: STATIONARY, page, keeps_sent=False)
         recorder.log = log
         clock.every(WATCH_PERIOD, lambda: log.shows(clock.now, page()))
 

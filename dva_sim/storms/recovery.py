@@ -20,7 +20,7 @@ from dva_sim.storms.plan import PROBES_LAST, RECOVERS_WITHIN
 
 AGAIN = 1.0  # between two attempts of a probe [s]
 USED_LATELY = 30.0  # a robot that obeyed somebody so lately needs no probe [s]
-STANDS_AFTER = 5.0  # an emergency was answered [s]
+STOPPED_AFTER = 5.0  # an emergency was answered [s]
 LISTED = 30  # times without a break that the DVA has to list everybody, a second apart
 LIST = "the list"
 BEATS_WITHIN = 30.0  # of the end the DVA has heard the heartbeat of everybody [s]
@@ -200,7 +200,7 @@ class RecoveryProbes:
     def _stop(self, robot: str) -> None:
         def answered(reply: m.Reply) -> None:
             self._open[robot] = "moves after an emergency"
-            self._clock.call_after(STANDS_AFTER, self._look, robot)
+            self._clock.call_after(STOPPED_AFTER, self._look, robot)
 
         self._probe.ask(
             robot, m.Emergency(), answered, lambda: self._clock.call_after(AGAIN, self._stop, robot)

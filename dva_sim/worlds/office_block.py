@@ -301,7 +301,7 @@ def assign(layout: Layout, bases: int) -> list[tuple[FloorCell, Use, str]]:
     left, uses = list(layout.cells), dict[FloorCell, tuple[Use, str]]()
     for use, name, wish in _needs(layout):
         bays = [bay for bay in uses if uses[bay][0] is ROBOT_BAY]
-        if use is not ROBOT_BAY or sum(len(stands(bay)) for bay in bays) < bases:
+        if use is not ROBOT_BAY or sum(len(base_positions(bay)) for bay in bays) < bases:
             cell = min(left, key=wish, default=None)
             if cell is not None:
                 left.remove(cell)
@@ -357,7 +357,7 @@ def _by_size(cell: FloorCell, numbers: Iterator[int]) -> tuple[Use, str]:
     return use, f"{use.name} {number}"
 
 
-def stands(bay: FloorCell) -> list[tuple[float, float]]:
+def base_positions(bay: FloorCell) -> list[tuple[float, float]]:
     """Return the positions of robots in a bay [m]: rows from the wall opposite its door."""
     columns = 1 + int((bay.width - 2 * BASE_WALL) / BASE_GAP + 1e-6)
     rows = 1 + int((bay.depth - BASE_WALL - APPROACH) / BASE_GAP + 1e-6)
@@ -483,7 +483,7 @@ def _people_and_robots(
     block: OfficeBlock, layout: Layout, rooms: list[tuple[FloorCell, Use, str]]
 ) -> Iterator[Feature]:
     bays = [cell for cell, _, name in rooms if name.startswith("Robot bay")]
-    spots = [(bay, spot) for bay in bays for spot in stands(bay)]
+    spots = [(bay, spot) for bay in bays for spot in base_positions(bay)]
     for bay, spot in spots[: block.robot_bases]:
         yield _feature("robot_base", _point(*spot), heading_deg=90.0 * bay.outwards)
     for bay in bays:

@@ -341,7 +341,7 @@ class FakeWorld(FakePhones, FakeControlRoom):
             "holder_label": f"console {seat.name}" if seat else None,
             "session_age_s": 1.0 if seat else None,
             "watchdog_left_s": None if left is None else round(max(0.0, left), 2),
-            "stands": "nobody has started it" if seat and robot.mode == "Idle" else "",
+            "stop_reason": "nobody has started it" if seat and robot.mode == "Idle" else "",
             "set_speed_mps": round(robot.speed, 3),
             "set_turn_rate_radps": 0.0,
             "queue": 0,

@@ -66,7 +66,7 @@ def test_who_has_not_told_where_it_is_is_sent_nowhere():
     office.busy(GUARD, ROBOT)
     office.register(OTHER_GUARD, "Guard")
     assert office.fire(12) == []
-    office.stands(OTHER_GUARD, 500, now=1.0)
+    office.report_place(OTHER_GUARD, 500, now=1.0)
     assert [send.to for send in office.tick(2.0)] == [OTHER_GUARD]
 
 

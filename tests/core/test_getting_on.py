@@ -49,7 +49,7 @@ def test_who_set_out_and_stands_still_loses_it_too(office):
     office.tick(1.0)
     office.progress(GUARD, "departed", 5.0)
     for now, metres in ((6.0, 0.0), (20.0, 1.0), (40.0, 2.0), (60.0, 2.2), (69.0, 2.4)):
-        office.stands(GUARD, metres, now)
+        office.report_place(GUARD, metres, now)
         assert sent_to(office.tick(now)) == []
     assert sent_to(office.tick(70.0)) == [OTHER_GUARD]
     assert office.core.counters["did not move"] == 1
@@ -59,7 +59,7 @@ def test_who_keeps_on_moving_keeps_the_order_and_nothing_more_is_owed_on_scene(o
     send_a_guard(office)
     office.progress(GUARD, "departed", 1.0)
     for now in range(2, 200):
-        office.stands(GUARD, 0.05 * now, float(now))
+        office.report_place(GUARD, 0.05 * now, float(now))
         assert sent_to(office.tick(float(now))) == []
     office.progress(GUARD, "arrived", 200.0)
     for now in range(201, 800, 20):
@@ -141,7 +141,7 @@ def test_who_says_from_afar_that_it_has_arrived_loses_the_order_as_if_it_stood_s
         office.progress(GUARD, state, 1.0)
     for now in range(2, 33):
         assert office.event().state is State.ASSIGNED
-        office.stands(GUARD, 0.0, float(now))
+        office.report_place(GUARD, 0.0, float(now))
         given = office.tick(float(now))
     assert sent_to(given) == [OTHER_GUARD]
     assert counted(office.core.counters, "from afar") == 1
@@ -153,7 +153,7 @@ def test_who_is_nearly_there_when_it_says_so_has_arrived_with_its_next_position(
     send_a_guard(office)
     office.progress(GUARD, "arrived", 10.0)
     assert office.event().state is State.ASSIGNED
-    office.stands(GUARD, 2.5, 12.0)
+    office.report_place(GUARD, 2.5, 12.0)
     assert (office.event().state, office.event().times["arrived"]) == (State.ON_SCENE, 12.0)
     for now in range(13, 200):
         assert office.tick(float(now)) == []

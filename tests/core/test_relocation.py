@@ -91,12 +91,12 @@ def test_an_order_interrupts_the_way_and_the_guard_may_be_sent_again_after_it():
 def test_a_guard_that_has_arrived_is_bound_for_nowhere():
     office = office_of(Eastward())
     office.tick(1.0)
-    office.stands(GUARD, 90, now=80.0)
-    office.stands(GUARD, 0, now=81.0)
+    office.report_place(GUARD, 90, now=80.0)
+    office.report_place(GUARD, 0, now=81.0)
     assert office.tick(82.0) == []
-    office.stands(GUARD, 90, now=90.0)
+    office.report_place(GUARD, 90, now=90.0)
     office.tick(91.0)
-    office.stands(GUARD, 0, now=92.0)
+    office.report_place(GUARD, 0, now=92.0)
     assert office.tick(93.0) == [Send(GUARD, THERE)]
 
 

@@ -54,14 +54,14 @@ class PlainWorld:
     def tick(self, speeds, walks):
         """One tick with what is wanted of everybody."""
         for body, (speed, turn_rate) in zip(self.robots, speeds, strict=True):
-            stands, rests = speed == turn_rate == 0, push_robot(body, speed, turn_rate)
-            if not stands and body in self.locks:
+            is_still, rests = speed == turn_rate == 0, push_robot(body, speed, turn_rate)
+            if not is_still and body in self.locks:
                 self.space.remove(*self.locks.pop(body))
-            self.braked[body] = self.braked[body] + DT if stands and not rests else 0.0
+            self.braked[body] = self.braked[body] + DT if is_still and not rests else 0.0
             late = self.braked[body] > 0.5 / 1.0 + 8 * 0.15
             if (rests or late) and body not in self.locks:
                 self.lock(body)
-            if stands and body in self.locks:
+            if is_still and body in self.locks:
                 body.force, body.torque = (0.0, 0.0), 0.0
         for body, wanted in zip(self.people, walks, strict=True):
             push_person(body, wanted)

@@ -109,8 +109,8 @@ class CloseQuarters:
         self._turning = abs(ahead.bearing) > limit
         safe = self._person.caution * look / max(delay, SHORTEST)
         speed = max(min(habits.slowly * self._reach.speed, safe), habits.crawl_mps)
-        stands = self._turning or ahead.remaining < stop_before
-        return Intent(0.0 if stands else speed, turn)
+        stops = self._turning or ahead.remaining < stop_before
+        return Intent(0.0 if stops else speed, turn)
 
 
 ATTEMPTS = 3  # source: the document's app: after three sends without effect the link is lost

@@ -70,7 +70,7 @@ class GuardAgent(OnFoot):
         self._way_out = WayOut(device.clock, planner, walking, self.exposure, self._safe_places)
         self.activity = "waiting"
         self._is_there, self._contain, self._smoke = is_there, contain, smoke
-        self._protocol = GuardProtocol(device.dva, walker.mobilisation, self._stands_at)
+        self._protocol = GuardProtocol(device.dva, walker.mobilisation, self._is_at)
         self.exposure.start(self._felt)
         device.serve(self._on_request)
 
@@ -149,7 +149,7 @@ class GuardAgent(OnFoot):
             return self._post, lambda at: math.dist(at, place) >= off  # too near: back off
         return place, lambda at: math.dist(at, place) <= off
 
-    def _stands_at(self, place: m.Position) -> bool:
+    def _is_at(self, place: m.Position) -> bool:
         return math.dist(self.walking.place, self._xy(place)) < self._habits.is_there_m
 
     def _is_near_enough(self, order: m.Order, place: Point, at: Point) -> bool:

@@ -67,7 +67,7 @@ class GuardProtocol:
     errand: Errand | None = None
     ready_at: float = 0.0
     unfit: str = ""
-    _stands_at: int | None = None
+    _at_event: int | None = None
     _announced: OrderedDict[int, tuple[m.TaskAnnouncement, float]] = field(
         default_factory=OrderedDict
     )
@@ -99,7 +99,7 @@ class GuardProtocol:
 
     def is_over(self, at_event: bool = False) -> None:
         """The errand is done with; the guard waits where it is, which may be at the event."""
-        self._stands_at = self.order.event_id if at_event and self.order else None
+        self._at_event = self.order.event_id if at_event and self.order else None
         self.errand = None
 
     def _ordered(self, order: m.Order, now: float) -> GuardDecision:
@@ -126,9 +126,9 @@ class GuardProtocol:
         """Set out on an errand; a guard under way, or on scene, need not get ready again."""
         order = errand.order
         if self.errand is None:
-            is_there = order is not None and order.event_id == self._stands_at
+            is_there = order is not None and order.event_id == self._at_event
             self.ready_at = now if is_there else now + self.mobilisation
-        self.errand, self._stands_at = errand, None
+        self.errand, self._at_event = errand, None
         return GuardDecision(m.OK, changed=True)
 
     # --- auctions ----------------------------------------------------------------------

@@ -75,7 +75,7 @@ class PersonGuard(OnFoot):
         self.alert = ""
         self._stage = ""  # of the order: departed, arrived
         self._order_at: Point = walking.place
-        self._protocol = GuardProtocol(device.dva, 0.0, self._stands_at)
+        self._protocol = GuardProtocol(device.dva, 0.0, self._is_at)
         self.exposure.start(self._felt)
         device.serve(self._on_request)
 
@@ -163,7 +163,7 @@ class PersonGuard(OnFoot):
             return
         self._publish_status()
         errand = self._protocol.errand
-        if errand is not None and errand.order is None and self._stands_at(errand.place):
+        if errand is not None and errand.order is None and self._is_at(errand.place):
             self._protocol.is_over()
         far = math.dist(self._order_at, (x, y)) > SET_OUT
         if self.order is not None and self.answered and far:
@@ -284,7 +284,7 @@ class PersonGuard(OnFoot):
         position = m.Position(*self.device.frame.to_latlon(*self.walking.place))
         self.device.publish(STATUS, m.PersonStatus(self.activity, position))
 
-    def _stands_at(self, place: m.Position) -> bool:
+    def _is_at(self, place: m.Position) -> bool:
         here = self._walker.habits.work.is_there_m
         return math.dist(self.walking.place, self._xy(place)) < here
 

@@ -261,8 +261,8 @@ class Pilot:
             aside = self._step_aside(seen, route, along, blocked.by)
             if aside is not None:
                 return aside
-        stands = seen.now - max(self._moved, self._blocked_since) > AROUND_AFTER
-        if stands and seen.now - self._looked_around > AROUND_AGAIN:
+        is_stuck = seen.now - max(self._moved, self._blocked_since) > AROUND_AFTER
+        if is_stuck and seen.now - self._looked_around > AROUND_AGAIN:
             around = self._way_around(seen)
             if around is not None:
                 return around
@@ -279,9 +279,9 @@ class Pilot:
 
     def _is_taken(self, left: float, other: Nearby) -> bool:
         """Return True if somebody stands at the goal, and the robot is as near as it can be."""
-        stands = math.hypot(other.vx, other.vy) < STILL
+        is_stationary = math.hypot(other.vx, other.vy) < STILL
         gap = math.dist((other.x, other.y), self._goal) - other.radius
-        return stands and left < CLOSE_BY and gap < self._radius + other.keep
+        return is_stationary and left < CLOSE_BY and gap < self._radius + other.keep
 
     def _lets_pass(self, seen: Sensed, other: Nearby) -> bool:
         """Return True if it should step aside: once for each who goes first and does not leave."""

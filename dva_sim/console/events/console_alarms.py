@@ -47,7 +47,7 @@ class RunFacts:
         by_row = {n: labels[robot] for n, robot in enumerate(self._run.field.robots)}
         for row in robots:
             driven = row["mode"] == Mode.TELEOPERATION.value and row["watchdog_left_s"] == 0.0
-            if driven and "first command" not in row["stands"]:
+            if driven and "first command" not in row["stop_reason"]:
                 yield by_row.get(row["i"], str(row["i"])), "its watchdog stopped it"
 
     def broken(self) -> Iterable[Breach]:

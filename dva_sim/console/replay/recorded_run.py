@@ -184,7 +184,7 @@ class RecordedRun:
             "holder_label": holder and self.playback.labels.get(holder, holder),
             "session_age_s": None if drive is None else round(now - drive.ordered, 1),
             "watchdog_left_s": None,
-            "stands": "",
+            "stop_reason": "",
             "set_speed_mps": round(speed, 3),
             "set_turn_rate_radps": round(turn_rate, 3),
             "queue": 0,

@@ -81,7 +81,7 @@ class RobotLines:
             "mode": row["mode"],
             "hand": None,
             "holder": row["holder_label"],
-            "stands": row["stands"],
+            "stop_reason": row["stop_reason"],
             "link_lost": False,
             "notice": "",
             "emergency": self._emergency(now),

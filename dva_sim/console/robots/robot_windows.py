@@ -183,19 +183,19 @@ class RobotWindows:
                 window.robot.device.tell(window.notice, "mode")
 
     def lines(
-        self, watched: Iterable[str], stands: Callable[[RobotAgent], str]
+        self, watched: Iterable[str], reason_of: Callable[[RobotAgent], str]
     ) -> Iterator[RobotWindowLine]:
         """A line for each robot that somebody looks at.
 
         Args:
             watched: Those, by id.
-            stands: Reason why a robot stands, in words.
+            reason_of: Reason why a robot stands, in words.
         """
         for id_tag in watched:
-            yield self._line(id_tag, self.by_id[id_tag], stands)
+            yield self._line(id_tag, self.by_id[id_tag], reason_of)
 
     def _line(
-        self, id_tag: str, window: RobotWindow, stands: Callable[[RobotAgent], str]
+        self, id_tag: str, window: RobotWindow, reason_of: Callable[[RobotAgent], str]
     ) -> RobotWindowLine:
         robot, now = window.robot, window.robot.device.clock.now
         point, body, faults = robot.set_point, robot.body, window.faults
@@ -210,7 +210,7 @@ class RobotWindows:
             "mode": self._mode(window),
             "hand": window.number,
             "holder": self._labels.get(robot.holder[0] or "", robot.holder[0]),
-            "stands": stands(robot),
+            "stop_reason": reason_of(robot),
             "link_lost": robot.controller.mode is Mode.TELEOPERATION and 0.0 < point.until <= now,
             "notice": window.notice,
             "emergency": window.emergency,

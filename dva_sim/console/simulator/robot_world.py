@@ -19,7 +19,7 @@ from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited, name_of_page
 from dva_sim.console.robots.robot_station import LISTENING, OwnStation
 from dva_sim.console.robots.robot_windows import RobotWindows
-from dva_sim.console.robots.stands import why_stands
+from dva_sim.console.robots.stop_reasons import stop_reason
 from dva_sim.console.run.lag import LagRule
 from dva_sim.console.run.real_links import ConsoleSockets
 from dva_sim.console.run.recorder import ConsoleRecorder
@@ -232,12 +232,12 @@ class RobotWorld:
         self._news.tell(self.feed.positions())
 
     def _tell_windows(self) -> None:
-        def stands(robot: RobotAgent) -> str:
+        def reason_of(robot: RobotAgent) -> str:
             if self.station.state != LISTENING:
                 return f"it is {self.station.state}"
-            return why_stands(robot, self.clock.now, self.lag.held)
+            return stop_reason(robot, self.clock.now, self.lag.held)
 
-        for line in self.windows.lines(self.screens.watched, stands):
+        for line in self.windows.lines(self.screens.watched, reason_of):
             self._news.tell(line)
 
     def _tell_news(self) -> None:

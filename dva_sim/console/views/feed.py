@@ -9,7 +9,7 @@ from dva_sim.agents.people.bystander import SAFE
 from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.robot import RobotAgent
-from dva_sim.console.robots.stands import why_stands
+from dva_sim.console.robots.stop_reasons import stop_reason
 from dva_sim.console.run.played_run import PlayedRun
 from dva_sim.console.views.things import Things, camera_shown
 from dva_sim.console.wire.events import EventFacts, StoryLine
@@ -121,7 +121,7 @@ class Feed:
             "holder_label": None if holder is None else run.stage.labels.get(holder, holder),
             "session_age_s": round(held_for, 1) if holder else None,
             "watchdog_left_s": round(max(0.0, point.until - now), 2) if driven else None,
-            "stands": why_stands(robot, now, held_by_lag),
+            "stop_reason": stop_reason(robot, now, held_by_lag),
             "set_speed_mps": round(point.speed, 3) if now < point.until else 0.0,
             "set_turn_rate_radps": round(point.turn_rate, 3) if now < point.until else 0.0,
             "queue": len(robot.inbox),

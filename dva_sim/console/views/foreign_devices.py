@@ -23,7 +23,7 @@ def foreign_robot_row(number: int, mode: str) -> RobotRow:
     return {
         "i": number,
         "mode": mode,
-        "stands": "",
+        "stop_reason": "",
         "pattern": None,
         "battery": None,
         "holder": None,

@@ -42,7 +42,7 @@ class RobotRow(TypedDict):
 
     i: int
     mode: str
-    stands: str
+    stop_reason: str
     pattern: str | None
     battery: float | None
     holder: str | None
@@ -139,7 +139,7 @@ class RobotWindowLine(TypedDict):
     mode: str
     hand: int | None
     holder: str | None
-    stands: str
+    stop_reason: str
     link_lost: bool
     notice: str
     emergency: EmergencyShown | None

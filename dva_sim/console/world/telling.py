@@ -16,7 +16,7 @@ from dva_sim.console.events.rooms import ConsoleRooms
 from dva_sim.console.guards.played_guards import PlayedGuards
 from dva_sim.console.phones.phones import Phones
 from dva_sim.console.robots.robot_windows import RobotWindows
-from dva_sim.console.robots.stands import why_stands
+from dva_sim.console.robots.stop_reasons import stop_reason
 from dva_sim.console.run.lag import LagRule
 from dva_sim.console.run.recorder import ConsoleRecorder
 from dva_sim.console.run.sliders import LinkSliders
@@ -137,10 +137,10 @@ class PublishingWorld:
         self._tell_alarms(rows["robots"])
 
     def _tell_windows(self) -> None:
-        def stands(robot: RobotAgent) -> str:
-            return why_stands(robot, self.clock.now, self.lag.held)
+        def reason_of(robot: RobotAgent) -> str:
+            return stop_reason(robot, self.clock.now, self.lag.held)
 
-        for line in self.windows.lines(self.screens.watched, stands):
+        for line in self.windows.lines(self.screens.watched, reason_of):
             self._news.tell(line, line["i"])
 
     def _tell_devices(self) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from dva_sim.experiments.results.results import Results, as_it_stands, quoted
+from dva_sim.experiments.results.results import Results, escaped, quoted
 from dva_sim.kernel.csv_cells import ACTS, harmless, harmless_row
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.resources import refuse_to_replace
@@ -97,7 +97,7 @@ def _write_csv(source: Path, path: Path) -> None:
     import duckdb
 
     with duckdb.connect(config={"threads": 1}) as connection:
-        rows = connection.read_parquet(as_it_stands(source))
+        rows = connection.read_parquet(escaped(source))
         columns = ", ".join(
             f"{_CELLS.get(str(kind), '{0}').format(quoted(n))} AS {quoted(harmless(n))}"
             for n, kind in zip(rows.columns, rows.types, strict=True)

@@ -388,7 +388,7 @@ class Results:
     def _read(self, name: str, columns: str, rows: str, part: str | None = None) -> Frame:
         import duckdb
 
-        file = as_it_stands(self.path_of(name))
+        file = escaped(self.path_of(name))
         values = [file] if part is None else [file, part]
         try:
             with _database().cursor() as cursor:
@@ -428,7 +428,7 @@ def _database() -> DuckDBPyConnection:
     return duckdb.connect(config={"threads": 1, "enable_external_file_cache": False})
 
 
-def as_it_stands(path: Path) -> str:
+def escaped(path: Path) -> str:
     """A path for DuckDB, to which `?`, `*` and `[` in it would mean several files."""
     return re.sub(r"[?*\[]", r"[\g<0>]", str(path))
 

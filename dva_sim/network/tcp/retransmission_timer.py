@@ -237,7 +237,7 @@ class Alarm:
             fresh: Something new was sent.
             probing: True if a tail-loss probe may be sent.
         """
-        if not (advanced or self.doubt) and self._stands(fresh, probing):
+        if not (advanced or self.doubt) and self._stays_set(fresh, probing):
             return
         if advanced:
             self._timeout_at = now + self.timeout()
@@ -250,7 +250,7 @@ class Alarm:
             self.kind, at = PROBE, min(at, now + self._probe_time(len(board.queue)))
         self._timer.set(max(at, now))
 
-    def _stands(self, fresh: bool, probing: bool) -> bool:
+    def _stays_set(self, fresh: bool, probing: bool) -> bool:
         """Return True if the timer may stay as set; setting it again would round it differently."""
         if self._timer.deadline == inf:
             return False

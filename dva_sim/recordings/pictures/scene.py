@@ -64,7 +64,9 @@ class Scene:
         ax, site = self._ax, self._moments.recording.site
         draw_site(ax, site, small_marks=points_per_metre(ax) > style.ROOMY, least=style.LEAST)
         # What hazards must not cover is drawn after them.
-        self._upper: list[Any] = [artist for artist in ax.get_children() if _stands_out(artist)]
+        self._upper: list[Any] = [
+            artist for artist in ax.get_children() if _is_above_hazards(artist)
+        ]
         for artist in self._upper:
             artist.set_animated(True)
         return ax.get_xlim(), ax.get_ylim()
@@ -138,7 +140,7 @@ class _Sheet:
         renderer.draw_image(renderer.new_gc(), 0, 0, self._pixels)
 
 
-def _stands_out(artist: Artist) -> bool:
+def _is_above_hazards(artist: Artist) -> bool:
     """Return True if a part of the site is drawn above hazards: walls, doors, names."""
     return artist.get_zorder() > LAYER and not isinstance(artist, Axis | Spine)
 

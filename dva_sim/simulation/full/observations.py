@@ -122,7 +122,7 @@ class RobotMotion(NamedTuple):
     powered: bool = True
 
 
-STANDS = RobotMotion("Idle", 0.0, 0.0)
+STATIONARY = RobotMotion("Idle", 0.0, 0.0)
 
 
 def motion_of(robot: RobotAgent) -> RobotMotion:

@@ -218,7 +218,7 @@ class Witness:
                 _end(self, session, now)
         self.registrations.append(registration)
 
-    def stands(self, when: float) -> None:
+    def note_stop(self, when: float) -> None:
         """Note that an emergency has stopped it, or should have; no hand drives it any longer."""
         self.stopped, self.hand = max(self.stopped, when), None
 
@@ -417,7 +417,7 @@ class SafetyAudit:
         message, body = asked.message, asked.message.body
         match body:
             case m.Emergency():  # it acts whenever it comes, though its bytes never change
-                witness.stands(now)
+                witness.note_stop(now)
             case m.PermissionRevocation() if asked.source == self._dva:
                 _end(witness, body.session, now)
         if code != m.OK:
@@ -526,7 +526,7 @@ class SafetyAudit:
         elif done.what == "lets go":
             witness.hand, witness.allowed = None, min(witness.allowed, now)
         elif done.what == "stops":
-            witness.stands(now)
+            witness.note_stop(now)
         else:
             if witness.stopped > witness.ordered:
                 found.append(("S3", "obeys a hand after an emergency, before it is taken again"))
@@ -592,7 +592,7 @@ class SafetyAudit:
             body, by = message.body, at + witness.obeys_within
             if isinstance(body, m.Emergency):
                 if not witness.has_stood_since(at):
-                    witness.stands(by)
+                    witness.note_stop(by)
             elif source != self._dva:
                 pass
             elif isinstance(body, m.PermissionRevocation):

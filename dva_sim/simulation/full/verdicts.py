@@ -126,7 +126,7 @@ class Judge:
         self._missing = 0
 
     def _motion_of(self, robot: str) -> o.RobotMotion:
-        return self._motions.get(robot, o.STANDS)
+        return self._motions.get(robot, o.STATIONARY)
 
     def take(self, fact: Any) -> None:
         """Judge one more fact."""

@@ -96,8 +96,8 @@ class Goal(ABC):
 
     Attributes:
         flat: True if the cursor moves only along x.
-        stands: True if the target is stationary; one that takes another's place has no velocity,
-            and nobody leads it.
+        is_stationary: True if the target does not move; one that takes another's place has no
+            velocity, and nobody leads it.
         path: The middle line, if the cursor is led along one.
         tolerance: Half the width of the target or tunnel [m].
         edge: Distance from the start at which a moving target turns back [m].
@@ -108,7 +108,7 @@ class Goal(ABC):
     flat = False
     is_pushed = False
     edge = math.inf
-    stands = True
+    is_stationary = True
     path: Route | None = None
     tolerance: float
 
@@ -195,7 +195,7 @@ class CursorTrial(Trial[Sighting]):
         tx, ty = self.goal.target(now)
         self._motion.add(Places(now, x, y, target_x=tx, target_y=ty))
         vx, vy, tvx, tvy = self._motion.velocities()
-        if self.goal.stands:
+        if self.goal.is_stationary:
             tvx = tvy = 0.0
         return Sighting(
             tick=round(1000 * now),

@@ -96,7 +96,7 @@ class PointGoal(ToTarget):
     def __init__(self, task: Pointing, way: Wandering, width: float, press: float) -> None:
         self._task, self._way, self.width = task, way, width
         self.amplitude = way.amplitude
-        self.flat, self.stands = task.axes == 1, not task.target_mps
+        self.flat, self.is_stationary = task.axes == 1, not task.target_mps
         self.tolerance, self.edge = 0.5 * (width - task.cursor_m), way.edge
         self._press, self._pressed_at, self._presses = press, math.inf, 0
         self._inside_since: float | None = None
@@ -177,7 +177,7 @@ class TrackGoal(ToTarget):
     flat = True
 
     def __init__(self, task: Tracking, phases: list[float]) -> None:
-        self.stands = self.is_pushed = task.moves == "cursor"
+        self.is_stationary = self.is_pushed = task.moves == "cursor"
         self._task, self.tolerance = task, 0.0
         self._waves = list(zip(task.amplitudes_m, task.frequencies, phases, strict=True))
         self._targets: list[float] = []
@@ -186,13 +186,13 @@ class TrackGoal(ToTarget):
 
     @override
     def target(self, now: float) -> Pair:
-        return (0.0 if self.stands else self._sum(now)), 0.0
+        return (0.0 if self.is_stationary else self._sum(now)), 0.0
 
     @override
     def pushed(self, now: float, wanted: Velocity) -> Velocity:
         # The command is kept, as the answer to the push.
         self._told = wanted[0]
-        return (wanted[0] + self._sum(now), wanted[1]) if self.stands else wanted
+        return (wanted[0] + self._sum(now), wanted[1]) if self.is_stationary else wanted
 
     def _sum(self, now: float) -> float:
         return sum(a * math.sin(w * now + p) for a, w, p in self._waves)
@@ -204,8 +204,8 @@ class TrackGoal(ToTarget):
             return False
         self._steps, self._dt = self._steps + 1, SAMPLE_STEPS * dt
         if self._steps % SAMPLE_STEPS == 1:
-            self._targets.append(self._sum(now - dt if self.stands else now))
-            self._cursors.append(-self._told if self.stands else x)
+            self._targets.append(self._sum(now - dt if self.is_stationary else now))
+            self._cursors.append(-self._told if self.is_stationary else x)
         return self._steps * dt >= task.record_s - 0.5 * dt
 
     @override

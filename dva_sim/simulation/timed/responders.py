@@ -34,7 +34,7 @@ class ShiftWorld(Protocol):
     def says_arrived(self, unit: Unit, job: Job) -> None:
         """Tell the DVA that a unit is where it was sent."""
 
-    def stands(self, unit: Unit, activity: str) -> None:
+    def publish_place(self, unit: Unit, activity: str) -> None:
         """Publish where a unit is."""
 
     def incident_at(self, event: int) -> Incident:
@@ -347,7 +347,7 @@ class Unit:
         self.job = None
         self._ticket += 1
         self.jobs[job.order.task] += state == DONE
-        world.stands(self, "waiting")
+        world.publish_place(self, "waiting")
         world.say(job.voice, m.OrderProgress(job.order.event_id, state))
         if self.group.after == "stay" and not world.needs_people(job.incident):
             self.equipped = False
@@ -366,7 +366,7 @@ class Unit:
         self._leave()
         if self.group.after == "stay" or self.here() is self.base:
             self.equipped = False
-            self.world.stands(self, "waiting")
+            self.world.publish_place(self, "waiting")
         else:
             self._walk_idle(self.base)
 
@@ -387,7 +387,7 @@ class Unit:
         self._stop()
         self.place = leg.goal
         self.equipped = False
-        self.world.stands(self, "waiting")
+        self.world.publish_place(self, "waiting")
 
     # --- the small print -------------------------------------------------------------------
 
@@ -426,7 +426,7 @@ class Unit:
         if job is None:
             if self.leg is not None:
                 self._stop()
-                self.world.stands(self, "waiting")
+                self.world.publish_place(self, "waiting")
             return None
         self._stop()
         ready_at = self._ready_at if job.phase == "ready" else None
@@ -435,7 +435,7 @@ class Unit:
         self._turn_to(job, "dropped")
         self.world.freed(self, job)
         self.job = None
-        self.world.stands(self, "waiting")
+        self.world.publish_place(self, "waiting")
         return ready_at
 
     def _turn_to(self, job: Job, phase: str) -> None:

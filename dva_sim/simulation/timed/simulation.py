@@ -145,7 +145,7 @@ class Shift:
 
     def _begin_shift(self, units: list[Unit]) -> None:
         for unit in units:
-            self.stands(unit, "waiting")
+            self.publish_place(unit, "waiting")
         self.mail.tick()
 
     # --- a run ---------------------------------------------------------------------------
@@ -341,7 +341,7 @@ class Shift:
         self.told[unit.number] = None if event is None else event.position
         self.mail.say(job.voice, m.OrderProgress(job.order.event_id, "arrived"))
 
-    def stands(self, unit: Unit, activity: str) -> None:
+    def publish_place(self, unit: Unit, activity: str) -> None:
         """Publish where a unit is."""
         self._publish(unit, unit.here(), activity)
 

@@ -112,7 +112,7 @@ def test_without_a_name_one_is_called_by_ones_page(page):
 def test_pages_are_told_how_the_log_stands(page):
     assert page.ask("event_acknowledge", event=1)["ok"]
     page.let(0.5)
-    stands = page.told("audit")[-1]
+    line = page.told("audit")[-1]
 
-    assert (stands["rows"], stands["lasting"], stands["problem"]) == (page.keeper.number, True, "")
-    assert stands["hash"] == page.keeper.head
+    assert (line["rows"], line["lasting"], line["problem"]) == (page.keeper.number, True, "")
+    assert line["hash"] == page.keeper.head

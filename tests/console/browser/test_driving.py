@@ -103,7 +103,7 @@ def test_keys_steer_while_they_are_held(page, keys, speed, turn):
 
 def test_a_robot_moves_while_a_key_is_held(page):
     with held(page, "ArrowUp"):
-        expect(page.locator(".stands")).to_contain_text("Set point 0.50 m/s")
+        expect(page.locator(".stop-reason")).to_contain_text("Set point 0.50 m/s")
         expect(page.get_by_role("slider", name="Speed")).to_have_value("0.5")
     expect(page.get_by_role("slider", name="Speed")).to_have_value("0")
 
@@ -308,7 +308,7 @@ def test_two_robots_get_the_same_hand_under_two_patterns(fake, shared):
     assert taken[0]["robots"] == [0, 1]
     with held(page, "ArrowUp"):
         for place in (0, 1):
-            expect(page.locator(".stands").nth(place)).to_contain_text("Set point 0.50 m/s")
+            expect(page.locator(".stop-reason").nth(place)).to_contain_text("Set point 0.50 m/s")
     expect(page.get_by_role("img", name="What robot-2 sees")).to_be_visible()
     page.get_by_role("button", name="Release control").click()
     expect(mode).not_to_contain_text("Teleoperation")

@@ -71,13 +71,13 @@ def drilled(address, shared, folder: Path) -> Callable[..., Page]:
             page.get_by_role("button", name=word, exact=True) for word in ("Pause", "Play")
         )
 
-        def stands() -> bool:
+        def is_paused() -> bool:
             if pause.is_visible():
                 with suppress(TimeoutError):  # at its end it stands by itself meanwhile
                     pause.click(timeout=5_000)
             return play.is_visible()
 
-        assert becomes(stands)
+        assert becomes(is_paused)
         page.get_by_role("slider", name="Replay position").press("Home")
         assert becomes(lambda: shown(page) == 0)
         return page

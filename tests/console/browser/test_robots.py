@@ -247,7 +247,7 @@ def test_over_real_links_all_windows_are_the_same(programs, visit):
         expect(page.get_by_role("region", name="Side view")).to_contain_text("0.50 m/s")
     expect(page.locator(".picture-age")).to_contain_text("old")
     with driving(page), held(page, "ArrowUp"):
-        expect(page.locator(".stands")).to_contain_text("Set point 0.50 m/s")
+        expect(page.locator(".stop-reason")).to_contain_text("Set point 0.50 m/s")
     page.goto(f"{address}#/robots/robot-1")
     expect(page.get_by_role("table", name="Messages")).to_contain_text("SetTeleOp")
 

@@ -18,7 +18,7 @@ def event(number: int = 1, **more: Any) -> dict[str, Any]:
 
 
 def robot(index: int, **more: Any) -> dict[str, Any]:
-    return {"i": index, "mode": "Teleoperation", "watchdog_left_s": 2.0, "stands": ""} | more
+    return {"i": index, "mode": "Teleoperation", "watchdog_left_s": 2.0, "stop_reason": ""} | more
 
 
 @pytest.fixture
@@ -88,7 +88,7 @@ def test_a_safety_rule_that_is_broken_is_a_critical_alarm_until_somebody_has_see
 
 
 def test_a_robot_that_waits_for_its_first_command_is_not(alarms):
-    waits = robot(0, watchdog_left_s=0.0, stands="waits for the first command: ...")
+    waits = robot(0, watchdog_left_s=0.0, stop_reason="waits for the first command: ...")
 
     assert texts(alarms, robots=[waits]) == []
 

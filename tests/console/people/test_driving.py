@@ -261,7 +261,7 @@ def test_a_robot_that_pushes_against_something_says_so_while_it_creeps(driving):
         if robot.body.in_contact and robot.body.speed < 0.05:
             break
     driving.let(0.6)
-    shown = driving.told("rows")[-1]["robots"][0]["stands"]
+    shown = driving.told("rows")[-1]["robots"][0]["stop_reason"]
     assert not before
     assert any(word in shown for word in ("way", "stuck"))
 

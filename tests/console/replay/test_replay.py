@@ -352,8 +352,8 @@ def test_the_rows_of_an_audit_log_are_those_of_the_recording_that_is_played(tmp_
     assert rows_of(path) == rows
     assert rows_of(path, after=1) == rows[1:]
     assert lines.lines["scene"]["replay"]["audit"]
-    stands = lines.lines["audit"]
-    assert (stands["rows"], stands["hash"], stands["file"]) == (2, rows[1].hash, "a.mcap")
+    line = lines.lines["audit"]
+    assert (line["rows"], line["hash"], line["file"]) == (2, rows[1].hash, "a.mcap")
 
     lines.ask("open_recording", "2", name="b.mcap")
     assert rows_of(path) == []

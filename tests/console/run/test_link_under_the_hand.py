@@ -110,7 +110,7 @@ def test_over_a_long_link_a_robot_is_still_taken_and_says_why_it_stands(monkeypa
     assert done, text
     page.want(0.3)
     page.let(20.0)
-    shown = page.told("rows")[-1]["robots"][0]["stands"]
+    shown = page.told("rows")[-1]["robots"][0]["stop_reason"]
     assert "3 s" in shown
 
 
@@ -148,7 +148,7 @@ def test_until_the_first_command_comes_the_robot_says_what_it_waits_for(monkeypa
     assert page.do("link", delay_s=0.5)[0]
     page.let(10.0)
     page.sets_out(then=0.6)
-    shown = page.told("rows")[-1]["robots"][0]["stands"]
+    shown = page.told("rows")[-1]["robots"][0]["stop_reason"]
     assert "connection" in shown
 
 

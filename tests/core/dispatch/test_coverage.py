@@ -11,8 +11,8 @@ REACH = [[20, 120], [120, 20]]
 AT_FIRST, AT_SECOND = [0, 100], [100, 0]
 
 
-def advice(team, stands, demand, eta=(), gain_s=10.0, bound_for=(), reach=REACH):
-    seen = situation(team, list(eta), cover=cover(stands, reach, demand, bound_for))
+def advice(team, to_posts, demand, eta=(), gain_s=10.0, bound_for=(), reach=REACH):
+    seen = situation(team, list(eta), cover=cover(to_posts, reach, demand, bound_for))
     return list(Coverage(gain_s=gain_s).advise(seen, RNG))
 
 
@@ -29,9 +29,9 @@ def test_of_two_at_one_place_one_moves():
 
 
 def test_who_is_on_its_way_counts_as_there_and_is_left_alone():
-    stands = [AT_FIRST, AT_FIRST]
-    assert advice("gg", stands, [0.5, 0.5], bound_for=(1, None)) == []
-    assert advice("gg", stands, [0.5, 0.5], bound_for=(None, 1)) == []
+    to_posts = [AT_FIRST, AT_FIRST]
+    assert advice("gg", to_posts, [0.5, 0.5], bound_for=(1, None)) == []
+    assert advice("gg", to_posts, [0.5, 0.5], bound_for=(None, 1)) == []
 
 
 def test_who_is_a_few_steps_away_counts_as_there():

@@ -72,7 +72,7 @@ class Office:
         self.core = self.new_core()
         for id_tag, kind in TEAM.items():
             self.register(id_tag, kind)
-        self.stands(GUARD, 0)
+        self.report_place(GUARD, 0)
         self.status(ROBOT, 10)
 
     def new_core(self) -> Dva:
@@ -101,7 +101,7 @@ class Office:
         """A device registers; a guard or robot tells where it is, too [m]."""
         sends = self.say(id_tag, m.Registration(kind.lower(), kind, ADDRESS), now)[1]
         if at is not None:
-            (self.stands if kind == "Guard" else self.status)(id_tag, at, now)
+            (self.report_place if kind == "Guard" else self.status)(id_tag, at, now)
         return sends
 
     def say(self, source: str, body: m.Body, now: float = 0.0) -> tuple[m.Reply, list[Send]]:
@@ -127,7 +127,7 @@ class Office:
     def is_in(self, mode: str, now: float = 0.0, robot: str = ROBOT) -> None:
         self._publish(robot, m.RobotStatus(mode, east(10), 0.0, 0.0, 0.0, 5), now)
 
-    def stands(self, guard: str, metres: float, now: float = 0.0) -> None:
+    def report_place(self, guard: str, metres: float, now: float = 0.0) -> None:
         self._publish(guard, m.PersonStatus("waiting", east(metres)), now)
 
     def beat(self, *devices: str, now: float) -> None:

@@ -34,7 +34,7 @@ from dva_sim.protocol.codec import encode
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.event_ledger import SILENT_AFTER
 from dva_sim.simulation.full.observation_json import as_plain, of_plain
-from dva_sim.simulation.full.observations import STANDS, FactLog, page_of, terms_of
+from dva_sim.simulation.full.observations import STATIONARY, FactLog, page_of, terms_of
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.safety_checks import CHECKED, LEASE
 from dva_sim.simulation.full.stage import DVA, id_of
@@ -338,7 +338,7 @@ def test_what_a_dva_remembers_of_an_earlier_life_breaks_no_rule():
     page.events.move(pending, State.ASSIGNED, 0.5)
     pending.responder = id_of("guard", 1)
     facts: list[Any] = []
-    log = FactLog(facts.append, (), lambda _: STANDS)
+    log = FactLog(facts.append, (), lambda _: STATIONARY)
     log.shows(1.0, page)
     report = m.EventReport(2, "fire", pending.position, 0.5, 0.9, "confirmed")
     data = encode(m.Message(DVA, 9, id_of("guard", 1), "12:00:00", 0, report))

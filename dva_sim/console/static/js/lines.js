@@ -95,8 +95,8 @@
  */
 /**
  * State of a robot.
- * @typedef {{i: number, mode: string, stands: string, pattern: string | null, battery: number |
- *   null, holder: string | null, holder_label: string | null, session_age_s: number | null,
+ * @typedef {{i: number, mode: string, stop_reason: string, pattern: string | null, battery: number
+ *   | null, holder: string | null, holder_label: string | null, session_age_s: number | null,
  *   watchdog_left_s: number | null, set_speed_mps: number | null, set_turn_rate_radps: number |
  *   null, queue: number | null, lost: number | null, commands_hz: number | null, refused: number |
  *   null, timeouts: number | null, by_hand?: boolean, camera?: string | null, sensors?: string[]}}
@@ -245,7 +245,7 @@
 /**
  * Contents of a robot's windows.
  * @typedef {{k: 'robot', t: number, i: number, station: Station, mode: string, hand: number |
- *   null, holder: string | null, stands: string, link_lost: boolean, notice: string,
+ *   null, holder: string | null, stop_reason: string, link_lost: boolean, notice: string,
  *   emergency: Emergency | null, speed_mps: number | null, turn_rate_radps: number | null,
  *   now_mps: number, now_radps: number, watchdog_left_s: number | null, one_way: LatencyFigures |
  *   null, loop: LatencyFigures | null, replies: LatencyFigures | null, faults: Faults,

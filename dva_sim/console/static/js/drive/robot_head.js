@@ -17,7 +17,7 @@ export function RobotHead({ robot, place }) {
     ${place > 0 && html`<button type="button" class="plain" aria-label=${`Remove ${robot.label} from this page`}
       title=${`Remove ${robot.label} from this page`} disabled=${isHeld()}
       onClick=${() => chooseRobots([driven.peek()[0].label])}>×</button>`}
-    <${Watchdog} robot=${robot} /><${Stands} robot=${robot} />
+    <${Watchdog} robot=${robot} /><${StopReason} robot=${robot} />
   </div>`;
 }
 
@@ -65,11 +65,11 @@ function Watchdog({ robot }) {
 }
 
 /** @param {{robot: import('../lines.js').Thing}} props */
-function Stands({ robot }) {
+function StopReason({ robot }) {
   const row = rowOf(robot.i);
   const drive = driveOf(robot.i);
   const speed = row?.set_speed_mps ?? 0;
-  const text = row?.stands ? `Stopped: ${row.stands}` : `Set point ${speed.toFixed(2)} m/s`;
+  const text = row?.stop_reason ? `Stopped: ${row.stop_reason}` : `Set point ${speed.toFixed(2)} m/s`;
   const counts = drive ? `${drive.sent} sent, ${drive.refused} refused, ${drive.timeouts} timed out` : '';
-  return html`<span class="stands">${text} <span class="soft">${counts}</span></span>`;
+  return html`<span class="stop-reason">${text} <span class="soft">${counts}</span></span>`;
 }

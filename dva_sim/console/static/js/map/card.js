@@ -76,5 +76,5 @@ function robotLines(key) {
     <dt>Held by</dt><dd>${row?.holder_label || row?.holder || 'nobody'}</dd>
     ${isAttached.value && html`<dt>Camera</dt><dd>${row?.camera ?? 'unknown'}</dd>
       <dt>Sensors</dt><dd>${row?.sensors?.join(', ') || 'unknown'}</dd>`}
-    ${row?.stands && html`<dt>Stands</dt><dd>${row.stands}</dd>`}`;
+    ${row?.stop_reason && html`<dt>Stands</dt><dd>${row.stop_reason}</dd>`}`;
 }

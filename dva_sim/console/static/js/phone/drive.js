@@ -153,7 +153,7 @@ function feelDrive() {
   });
   effect(() => {
     void rows.value;
-    const touches = CONTACT.includes(rowOf(robot.value?.i ?? -1)?.stands ?? '');
+    const touches = CONTACT.includes(rowOf(robot.value?.i ?? -1)?.stop_reason ?? '');
     if (touches && !touched && isDriving.value) vibrate('contact');
     touched = touches;
   });

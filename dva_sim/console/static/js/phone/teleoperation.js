@@ -105,7 +105,7 @@ function Hint({ one }) {
   if (choices.value.hold && tilts.value && !thumb.value) return 'Hold your thumb on the picture and tilt.';
   const blind = Math.floor(pictureAge(one.i) / 1000);
   if (blind >= TELLING_S) return `No picture for ${blind} s: the link may be lost. The robot stops by itself.`;
-  const why = rowOf(one.i)?.stands;
+  const why = rowOf(one.i)?.stop_reason;
   return why ? `Stopped: ${why}.` : 'Driving. Swipe down to stop.';
 }
 

@@ -57,13 +57,13 @@ function Head({ robot }) {
 function Reasons({ robot }) {
   const shown = windowOf(robot.i);
   if (!shown) return html`<p class="reason" role="status" aria-label="Reason">Waiting for its status …</p>`;
-  const { emergency, mode, stands, notice, link_lost: lost } = shown;
+  const { emergency, mode, stop_reason: stopReason, notice, link_lost: lost } = shown;
   const stop = mode === 'Emergency' && emergency;
   const text = stop
     ? `Emergency stop by ${emergency.by} at ${clockText(emergency.at_ms)}: the robot waits for a new order.`
     : lost
-      ? `Link lost: ${stands}`
-      : stands && `Stands: ${stands}`;
+      ? `Link lost: ${stopReason}`
+      : stopReason && `Stands: ${stopReason}`;
   return html`<p class=${stop || lost ? 'reason warning' : 'reason'} role="status" aria-label="Reason">
     <span>${text || 'It moves.'}${notice && ` ${notice}.`}</span></p>`;
 }

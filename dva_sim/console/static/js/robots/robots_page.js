@@ -46,5 +46,5 @@ function Row({ robot }) {
     <td>${row?.holder_label ?? row?.holder ?? '–'}</td>
     <td class="n">${(row?.set_speed_mps ?? 0).toFixed(2)} m/s</td>
     <td class="n">${percentText(row?.battery)}</td>
-    <td class="soft">${row?.stands ?? ''}</td></tr>`;
+    <td class="soft">${row?.stop_reason ?? ''}</td></tr>`;
 }

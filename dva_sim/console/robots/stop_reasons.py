@@ -10,7 +10,7 @@ HELD_BACK = 0.25  # of the speed that was asked for: what creeps in contact is h
 LAG = "held: this machine cannot keep up with real time"
 
 
-def why_stands(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
+def stop_reason(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
     """Return why a robot stands; empty if it moves.
 
     Args:
