@@ -45,7 +45,7 @@ from dva_sim.simulation.scenario import Scenario
 
 BYTES_PER_SECOND = 1024 * 1024  # of a part; a drive takes a twentieth
 MOST_FACTS = 20_000  # of which one knows that they were said
-MOST_STRANGERS = 200  # devices of another make whose messages are kept
+MOST_FOREIGN = 200  # devices of another make whose messages are kept
 _ENDS = re.compile(
     rb"<DestinationID>([0-9A-F:]{17})</DestinationID>.{0,200}?<SourceID>([0-9A-F:]{17})<", re.DOTALL
 )
@@ -74,7 +74,7 @@ class LiveRecorder(Recorder):
         self.log: FactLog | None = None
         self._filmed, self._missing = set[str](), 0
         self.is_own: Callable[[str], bool] = lambda _: False
-        self._strangers: set[str] = set()
+        self._foreign: set[str] = set()
         self._second, self._room = 0, BYTES_PER_SECOND
         self._drawn: dict[int, tuple[int, int]] = {}
         self._facts: dict[str, Any] = {}
@@ -160,12 +160,12 @@ class LiveRecorder(Recorder):
         """Return True for a message from somebody who keeps no record for us."""
         if self.is_own(source) or self._room <= 0:
             return False
-        if source not in self._strangers and len(self._strangers) >= MOST_STRANGERS:
+        if source not in self._foreign and len(self._foreign) >= MOST_FOREIGN:
             self.counters[_NOT_KEPT] += 1
             return False
         if not self._is_message(data):
             return False  # it is counted where it is refused
-        self._strangers.add(source)
+        self._foreign.add(source)
         return True
 
     def _is_message(self, data: bytes) -> bool:

@@ -192,7 +192,7 @@ def _at_hang_up(has_keys: bool, peer: str, code: int) -> tuple[Reason, str]:
 RECONNECT_FIRST = 250  # [ms]
 RECONNECT_MAX = 4_000  # [ms]
 PATIENCE = 3  # times that a peer may hang up in the handshake before it is told
-STRANGERS_TOLD = 100  # unknown keys that are told one by one; there can be any number
+UNKNOWN_KEYS_REPORTED = 100  # unknown keys that are told one by one; there can be any number
 EVENTS_AT_ONCE = 1_000  # read from a monitor before the loop has its turn again
 
 # A monitor that nobody reads stops all traffic of its context when it is full.
@@ -257,7 +257,7 @@ class Security:
         self._handshakes: dict[str, dict[_Way, _Handshake]] = {}  # by peer
         self._greetings: dict[Socket, tuple[_Way, Greeting]] = {}
         self._told: set[Refusal] = set()
-        self._strangers: set[tuple[str, bytes]] = set()
+        self._unknown_keys: set[tuple[str, bytes]] = set()
         self.refused: Counter[tuple[str, Reason]] = Counter()
         self._zap = None if ring is None else self._open_zap()
 
@@ -419,16 +419,16 @@ class Security:
         assert self._zap is not None
         self._zap.send_multipart([version, request, *status, b""])
         if owner is None:
-            self._tell_stranger(device, key, address.decode())
+            self._report_unknown_key(device, key, address.decode())
 
-    def _tell_stranger(self, device: str, key: bytes, address: str) -> None:
+    def _report_unknown_key(self, device: str, key: bytes, address: str) -> None:
         self.refused[device, Reason.UNKNOWN_KEY] += 1
-        if (device, key) in self._strangers or len(self._strangers) >= STRANGERS_TOLD:
+        if (device, key) in self._unknown_keys or len(self._unknown_keys) >= UNKNOWN_KEYS_REPORTED:
             return
-        self._strangers.add((device, key))
+        self._unknown_keys.add((device, key))
         shown = z85.encode(key).decode()[:8] if len(key) == 32 else ""
         why = f"an unknown key ({shown}...) tried to connect from {address}"
-        if len(self._strangers) == STRANGERS_TOLD:
+        if len(self._unknown_keys) == UNKNOWN_KEYS_REPORTED:
             why += "; there are many, no more will be told"
         self._tell(Refusal(device, None, "", Reason.UNKNOWN_KEY, why))
 

@@ -33,7 +33,7 @@ class Bench:
         )
 
     def _standing(self, letter: Letter) -> Standing:
-        kinds = {"s": Standing.STRANGER, "d": Standing.DVA}
+        kinds = {"s": Standing.OTHER, "d": Standing.DVA}
         return kinds.get(str(letter.request.peer)[:1] if letter.request else "", Standing.HOLDER)
 
     def _handle(self, letter: Letter) -> None:
@@ -237,7 +237,7 @@ def test_who_becomes_the_holder_while_it_waits_has_the_holders_turn():
         bench.ask(b"%d" % number, peer=f"s {number}")
     bench.ask(b"start", peer="s last")
     bench.inbox._waiting._standing = lambda letter: (
-        Standing.HOLDER if letter.data == b"start" else Standing.STRANGER
+        Standing.HOLDER if letter.data == b"start" else Standing.OTHER
     )
     bench.clock.run(0.11)
     assert bench.done == [b"0", b"start"]

@@ -267,7 +267,7 @@ def test_one_hang_up_is_kept_for_the_time_out_but_not_told(ring, other_ring, mak
 
 
 def test_strangers_without_number_are_not_told_without_end(ring, make, monkeypatch):
-    monkeypatch.setattr(module, "STRANGERS_TOLD", 3)
+    monkeypatch.setattr(module, "UNKNOWN_KEYS_REPORTED", 3)
     server = make(ring, ROBOT)
     _, endpoint = server.bind(zmq.ROUTER)
     for _ in range(6):
@@ -278,7 +278,7 @@ def test_strangers_without_number_are_not_told_without_end(ring, make, monkeypat
     run([server], lambda: server.security.refused[ROBOT, Reason.UNKNOWN_KEY] == 6)
     assert len(server.said) == 3
     assert "no more" in str(server.said[-1])
-    assert len(server.security._strangers) == 3
+    assert len(server.security._unknown_keys) == 3
 
 
 def test_a_loop_that_is_late_does_not_stop_the_traffic(ring, make):

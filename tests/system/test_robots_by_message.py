@@ -318,7 +318,7 @@ def test_a_frame_is_published_when_it_has_been_encoded_one_at_a_time():
 def test_nobody_can_talk_a_robot_to_death():
     """Twenty strangers send rubbish, fifty a second each, while the DVA drives the robot."""
     served: dict[str, list[float]] = {"alone": [], "flooded": []}
-    for name, strangers in (("alone", 0), ("flooded", 20)):
+    for name, senders in (("alone", 0), ("flooded", 20)):
         run = staged()
         send(run, 2.0, m.PermissionGrant(DVA, "both", 5))
         send(run, 3.0, m.StartTeleOp())
@@ -327,7 +327,7 @@ def test_nobody_can_talk_a_robot_to_death():
             answered = lambda _, t=begun, s=served[name]: s.append(run.clock.now - t)  # noqa: B023,E731
             ask = partial(run.dva.device.ask, ROBOT, m.SetTeleOp(0.1, 0.3), answered, session=5)
             run.clock.call_at(begun, ask)
-        for number in range(strangers):
+        for number in range(senders):
             wire = run.network.connect(f"stranger-{number}", ROBOT, lambda *_: None, True)
             for tag in range(250):
                 run.clock.call_at(1.0 + tag / 50, wire.send, tag, b"<msg>rubbish %d</msg>" % tag)
@@ -341,7 +341,7 @@ def test_nobody_can_talk_a_robot_to_death():
 
 
 HOLDER, SERVICE = id_of("operator", 1), 0.05
-STRANGERS = (1, 20)
+SENDERS = (1, 20)
 ANSWERED_BY_ITSELF: tuple[m.Body, ...] = (
     m.GetSensorInfo(),
     m.GetSensorInfo(ROBOT),
@@ -423,11 +423,11 @@ class Driven:
         elif not self.commands.busy:
             self.commands.request(data, lambda _: None)
 
-    def flood(self, strangers: int, source: str, body: m.Body, lasts: float = 0.6) -> None:
+    def flood(self, senders: int, source: str, body: m.Body, lasts: float = 0.6) -> None:
         """Strangers send so, 25 a second each, over connections that are new."""
         service, begun = self.run.network.service(ROBOT), self.clock.now
         assert service is not None
-        for stranger in range(strangers):
+        for sender in range(senders):
             peer = next(self.numbers)
             outbox = Outbox(source or f"02:00:00:0F:{peer >> 8:02X}:{peer & 255:02X}")
             session = 77 << 32 if source == HOLDER else 0
@@ -437,7 +437,7 @@ class Driven:
                 service(Request(data, lambda _: None, peer=peer))
                 return self.clock.now < begun + lasts - 0.1
 
-            self.clock.every(0.04, say, start=begun + 0.001 * stranger)
+            self.clock.every(0.04, say, start=begun + 0.001 * sender)
         self.clock.run(begun + lasts)
 
     def cry(self) -> None:
@@ -453,11 +453,11 @@ def test_no_valid_message_of_strangers_keeps_the_holder_waiting(pattern):
     """The holder's command waits for one message of others, whatever they send, however many."""
     driven = Driven(pattern)
     for source, body in FLOODS:
-        for strangers in STRANGERS:
+        for senders in SENDERS:
             applied = len(driven.waits)
-            driven.flood(strangers, source, body)
+            driven.flood(senders, source, body)
             assert driven.robot.controller.mode == "Teleoperation", body
-            assert len(driven.waits) - applied >= 2, (strangers, body)
+            assert len(driven.waits) - applied >= 2, (senders, body)
     assert max(driven.waits) < SERVICE + 1e-4
     assert driven.robot.controller.grant is not None
     assert not driven.run.recorder.violations
@@ -474,11 +474,11 @@ def test_what_only_the_holder_may_say_costs_a_robot_that_is_driven_nothing():
 @pytest.mark.parametrize("body", [body for _, body in FLOODS[:1]] + [m.Emergency()])
 def test_no_flood_holds_up_an_emergency_and_none_outlasts_it(body):
     driven = Driven("pub-sub")
-    for strangers in STRANGERS:
+    for senders in SENDERS:
         cries = [0.1 + 0.1537 * number for number in range(3)]
         for cry in cries:
             driven.clock.call_after(cry, driven.cry)
-        driven.flood(strangers, "", body)
+        driven.flood(senders, "", body)
         assert len(driven.answered) == len(cries)
         driven.clock.run(driven.clock.now + 0.5)
         driven.start()

@@ -44,10 +44,10 @@ class Standing(IntEnum):
 
     HOLDER = 0  # has proved it: by the session, or as the robot has subscribed to it
     DVA = 1  # says so; without keys anybody can
-    STRANGER = 2
+    OTHER = 2
 
 
-HOLDER, DVA, STRANGER = Standing  # a member is looked up in its class fifteen times as slowly
+HOLDER, DVA, OTHER = Standing  # a member is looked up in its class fifteen times as slowly
 
 
 class Letter(NamedTuple):
@@ -231,7 +231,7 @@ class CommandQueue:
         self._paused = self._busy = self._waking = self._was_urgent = False
         self._emergencies: list[Letter] = []
         self._waiting = FairQueue(limit, standing)
-        self._last, self._turns = HOLDER, [DVA, STRANGER]
+        self._last, self._turns = HOLDER, [DVA, OTHER]
         self._rested = -math.inf  # strangers are, from then on [s]
         self.longest = self.superseded = self.overflowed = 0
 
@@ -319,7 +319,7 @@ class CommandQueue:
             self._take_more()
         duration = self.service()
         if duration > 0.0:
-            if self._last is STRANGER and not self._was_urgent:
+            if self._last is OTHER and not self._was_urgent:
                 self._rested = self._clock.now + (1.0 + REST) * duration
             self._clock.call_after(duration, self._done, letters)
             return False
@@ -342,7 +342,7 @@ class CommandQueue:
             return None
         lines, others = self._waiting.next_lines(), self._turns
         for one in (*others, HOLDER) if self._last is HOLDER else (HOLDER, *others):
-            if one not in lines or (one is STRANGER and self._strangers_rest()):
+            if one not in lines or (one is OTHER and self._others_rest()):
                 continue
             self._last = one
             if one is not HOLDER:
@@ -350,7 +350,7 @@ class CommandQueue:
             return self._waiting.pop(lines[one])
         return None
 
-    def _strangers_rest(self) -> bool:
+    def _others_rest(self) -> bool:
         """Return True if unknown senders have to wait although nobody else does.
 
         Behind a message of the holder there is most time until its next one.

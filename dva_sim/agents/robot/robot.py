@@ -41,7 +41,7 @@ from dva_sim.worlds.planning import Planner
 
 HOLDERS_ONLY = m.StartTeleOp | m.StopTeleOp | m.SetTeleOp | Mission | m.CancelMission
 DVAS_ONLY = m.PermissionGrant | m.PermissionRevocation | m.TaskAnnouncement | m.TaskAward
-NOT_STRANGERS = HOLDERS_ONLY | DVAS_ONLY
+RESTRICTED = HOLDERS_ONLY | DVAS_ONLY
 DRIVING = m.StartTeleOp, m.SetTeleOp
 LONGEST_HELD = 1e6  # [s]
 WHATEVER_WAITS = 1 << 40  # a message goes however much waits before the link [B]
@@ -300,9 +300,9 @@ class RobotAgent:
         any processing, unless a word of the DVA waits that may make one of them the holder.
         """
         message = None if self.device.silent else self.device.admit(request)
-        if message is None or not isinstance(body := message.body, NOT_STRANGERS):
+        if message is None or not isinstance(body := message.body, RESTRICTED):
             return message
-        if self._standing_of(message) is not queue.STRANGER:
+        if self._standing_of(message) is not queue.OTHER:
             return message
         is_informed = self.inbox.hears_the_dva or self.controller.inquiry.is_open
         if (is_informed or not self._is_driven()) and isinstance(body, HOLDERS_ONLY):
@@ -315,7 +315,7 @@ class RobotAgent:
     def _standing_of(self, message: m.Message) -> Standing:
         if self.controller.knows(message):
             return queue.HOLDER
-        return queue.DVA if message.source == self.controller.dva else queue.STRANGER
+        return queue.DVA if message.source == self.controller.dva else queue.OTHER
 
     def _standing(self, letter: Letter) -> Standing:
         """Return the standing of a publisher: the holder, since the robot subscribed to it."""
