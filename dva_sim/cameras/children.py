@@ -15,7 +15,7 @@ from dva_sim.serving.pipes import LineKinds, LinePipe
 
 SERVING_WITHIN = 30.0  # from the start of the web process to its first word [s]
 END_WITHIN = 0.8  # for a child to end by itself once it is asked to [s]
-MOST_SAID = 10_000  # of what a child says on standard error [B]
+MOST_STDERR = 10_000  # of what a child says on standard error [B]
 # Lines for the process that draws pictures.
 PAINTED = LineKinds(
     newest=frozenset({"frame", "picture"}), kept=frozenset({"scene", "contain", "ready"})
@@ -83,13 +83,13 @@ class Child:
         code = self.process.poll()
         if code is None:
             return f"the {self.name} has closed its pipe"
-        output = self._said()
+        output = self._error_lines()
         text = output[-1].removeprefix("dva-sim: ").removeprefix(ERROR) if output else _code(code)
         return f"the {self.name} has ended: {text}"
 
-    def _said(self) -> list[str]:
+    def _error_lines(self) -> list[str]:
         assert self.process.stderr is not None
-        return self.process.stderr.read()[-MOST_SAID:].decode(errors="replace").split("\n")[:-1]
+        return self.process.stderr.read()[-MOST_STDERR:].decode(errors="replace").split("\n")[:-1]
 
     def end(self) -> None:
         """Close its pipe: it ends by that."""

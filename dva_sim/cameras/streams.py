@@ -43,7 +43,7 @@ class CameraStreams:
 
     Args:
         watch: Called with the numbers of the robots that are watched, and True if they changed.
-        said: Returns the robots that are watched elsewhere.
+        watched_elsewhere: Returns the robots that are watched elsewhere.
 
     Attributes:
         skipped: Pictures that viewers were too slow for.
@@ -52,9 +52,9 @@ class CameraStreams:
     def __init__(
         self,
         watch: Callable[[list[int], bool], object],
-        said: Callable[[], Iterable[int]] = tuple,
+        watched_elsewhere: Callable[[], Iterable[int]] = tuple,
     ) -> None:
-        self._watch, self._said = watch, said
+        self._watch, self._watched_elsewhere = watch, watched_elsewhere
         self._unpacker = Unpacker()
         self._newest: dict[int, tuple[Picture, float]] = {}
         self._drawn = asyncio.Condition()
@@ -100,7 +100,9 @@ class CameraStreams:
     def tell(self, again: bool = False) -> None:
         """Report the robots that are watched, if they have changed."""
         looked_at = {viewer.robot for viewer in self._viewers}
-        robots = frozenset(looked_at | self._lingering.keys()) | frozenset(self._said())
+        robots = frozenset(looked_at | self._lingering.keys()) | frozenset(
+            self._watched_elsewhere()
+        )
         new = robots != self._told
         self._told = robots
         if new or (again and robots):

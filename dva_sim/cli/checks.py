@@ -13,7 +13,7 @@ from dva_sim.kernel.errors import ConfigError, ExitCode, error_line
 from dva_sim.kernel.labels import visible
 from dva_sim.protocol.mistakes import READ_BYTES, check_message
 from dva_sim.testing.files import FileVerdict, NotReadError, check_file, schema_text
-from dva_sim.testing.promises import TRIALS, CheckedKind, said, tried
+from dva_sim.testing.promises import TRIALS, CheckedKind, error_with_line, tried
 
 STDIN: Final = "-"
 LINK: Final = "link"
@@ -84,7 +84,7 @@ def _try(kind: str, trial: CheckedKind, name: str, options: Mapping[str, Any]) -
         _say(f"{name}: {error}")
         return INVALID
     except SystemExit as error:
-        _say(f"{name}: {kind}: invalid, ends the program: {said(error)}")
+        _say(f"{name}: {kind}: invalid, ends the program: {error_with_line(error)}")
         return INVALID
     for text in outcome.broken:
         _say(f"{name}: {text}")

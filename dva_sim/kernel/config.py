@@ -75,7 +75,7 @@ class Key:
         return self.zero if isinstance(self.zero, str) else self.title if self.zero else ""
 
 
-def keys_said_of(model: Any) -> dict[str, Key]:
+def titled_keys(model: Any) -> dict[str, Key]:
     """Every dotted key of a model that says how it is called, in the order of the model."""
     values: dict[str, Key] = {}
     for path, info in fields_below(model):

@@ -145,7 +145,7 @@ class Plugins(Generic[T]):
         except ConfigError as error:
             raise ConfigError(f"{self.kind} {name!r}: {error}") from None
         except FAILURES as error:
-            problem = f"{self.kind} {name!r} cannot be made: {said(error)}"
+            problem = f"{self.kind} {name!r} cannot be made: {error_text(error)}"
             raise ConfigError(problem) from error
 
     def _check_options(
@@ -204,7 +204,7 @@ class Plugins(Generic[T]):
         try:
             found = offers[name].load()
         except FAILURES as error:
-            problem = f"{offers[name].value} cannot be loaded: {said(error)}"
+            problem = f"{offers[name].value} cannot be loaded: {error_text(error)}"
             raise ConfigError(f"{self.kind} {name!r}: {problem}") from error
         return self._right_class(name, found)
 
@@ -238,7 +238,7 @@ class Guard:
                 return float(one), float(other)
             self._count(f"answers {one!r}, {other!r}")
         except FAILURES as error:
-            self._count(said(error))
+            self._count(error_text(error))
         return None
 
     def _held(self, what: str, value: float, least: float, most: float) -> float:
@@ -263,7 +263,7 @@ def stamp_of(name: str) -> int:
     return file.stat().st_mtime_ns if file.is_file() else 0
 
 
-def said(error: BaseException) -> str:
+def error_text(error: BaseException) -> str:
     """An error in one line."""
     text = " ".join(str(error).split())
     now = name_now(error.name) if isinstance(error, ModuleNotFoundError) else ""
@@ -283,7 +283,9 @@ def _run(path: Path, kind: str) -> ModuleType:
     except OSError as error:
         raise ConfigError(f"cannot be read: {error.strerror or error}", path) from None
     except FAILURES as error:
-        raise ConfigError(f"cannot be loaded: {said(error)}", path, _line(error, path)) from error
+        raise ConfigError(
+            f"cannot be loaded: {error_text(error)}", path, _line(error, path)
+        ) from error
     return module
 
 

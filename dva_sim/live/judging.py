@@ -22,8 +22,9 @@ from dva_sim.simulation.full.observations import MOST_SENT, Arrived, FactGap, Sa
 from dva_sim.simulation.full.verdicts import Judge, Verdict
 
 WAITS = 10.0  # for the lines of a part that is silent or behind [s]
-HERE, SEEN, SAID, FRAME = "here", "seen", "sent", "frame"  # first words of the lines that count
-JUDGED: Final = HERE, SEEN, SAID, FRAME
+# First words of the lines that count.
+HERE, SEEN, SENT_LINE, FRAME = "here", "seen", "sent", "frame"
+JUDGED: Final = HERE, SEEN, SENT_LINE, FRAME
 _STARTS: Final = tuple(f'["{word}"'.encode() for word in JUDGED)
 
 Line = list[Any]
@@ -44,12 +45,12 @@ class Facts:
         """Remember the devices of this run and the messages they have sent, in any order."""
         if line[0] == HERE:
             self._here.update(line[2])
-        elif line[0] == SAID:
+        elif line[0] == SENT_LINE:
             self._senders.note(line[2], line[4].encode())
 
     def fact(self, line: Line) -> Any:
         """Return the fact in a line; None if it holds none."""
-        if line[0] == SAID:
+        if line[0] == SENT_LINE:
             _, time, source, to, text = line
             return Sent(time, source, to, len(text), text.encode())
         if line[0] == FRAME:

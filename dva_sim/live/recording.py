@@ -26,7 +26,7 @@ from dva_sim.core.events import Event
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.recorder import Moment, Recorder
-from dva_sim.live.judging import FRAME, HERE, JUDGED, SAID, SEEN, LiveJudge
+from dva_sim.live.judging import FRAME, HERE, JUDGED, SEEN, SENT_LINE, LiveJudge
 from dva_sim.live.options import LiveOptions
 from dva_sim.live.pipes import Inlets
 from dva_sim.live.recorded_lines import FORMAT, MOST_BYTES, RunLines, lines_of_part, make_recording
@@ -148,7 +148,7 @@ class LiveRecorder(Recorder):
             return
         destination, source = ends[1].decode(), ends[2].decode()
         if sent or (self.keeps and self._is_news(source, payload)):
-            self.put(SAID, now, node if sent else source, destination, payload.decode())
+            self.put(SENT_LINE, now, node if sent else source, destination, payload.decode())
         if sent or self.log is None:
             return
         if self._room <= 0:

@@ -12,7 +12,7 @@ from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.recorder import Moment, Sent, TrackPoint
 from dva_sim.kernel.streams import Streams
-from dva_sim.live.judging import SAID, observation_of
+from dva_sim.live.judging import SENT_LINE, observation_of
 from dva_sim.protocol.messages import Position
 from dva_sim.recordings import channels
 from dva_sim.recordings.messages import ChannelMessage
@@ -64,7 +64,7 @@ class RunningChannels:
     def take(self, line: Line) -> Iterator[ChannelMessage]:
         """Return the messages in a line; a line that says nothing of interest has none."""
         word, *rest = line
-        if word == SAID:
+        if word == SENT_LINE:
             yield self._went(*rest)
         elif word in READ:
             yield from getattr(self, f"_{word}")(*rest) or ()

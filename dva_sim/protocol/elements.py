@@ -78,13 +78,13 @@ class Form:
         """Return the leaves as seen from a message of which this is an attribute."""
         return [(f"{name}.{path}", write) for path, write in self._leaves]
 
-    def write(self, said: Any) -> str:
+    def write(self, body: Any) -> str:
         """Return a message as the elements around its fields, and these.
 
         Raises:
             ProtocolError: a value that the schema cannot hold.
         """
-        values = zip(self._writers, self._values(said), strict=True)
+        values = zip(self._writers, self._values(body), strict=True)
         return self._text % tuple([write(value) for write, value in values])
 
     def read(self, element: _Element) -> Any:
@@ -101,7 +101,7 @@ def _values_of(names: list[str]) -> Callable[[Any], tuple[Any, ...]]:
     """Return what takes the values of these attributes from a message."""
     if len(names) > 1:
         return attrgetter(*names)
-    return lambda said: tuple([attrgetter(name)(said) for name in names])
+    return lambda body: tuple([attrgetter(name)(body) for name in names])
 
 
 def _inner(hint: Any) -> Any:

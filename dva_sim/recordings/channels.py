@@ -397,7 +397,7 @@ def fact_of(time: float, content: Mapping[str, Any]) -> Fact:
 _IN_SECONDS = {name: f"{name}_s" for name in ("arrival_in", "advised_in", "waited")}
 
 
-def said(playback: Playback) -> Iterator[ChannelMessage]:
+def network_messages(playback: Playback) -> Iterator[ChannelMessage]:
     """All messages as they went onto the network, among the facts that rules are judged by.
 
     Of a camera's frame, what it stands for. What happens at the same moment stays in its order.

@@ -53,7 +53,7 @@ class RawRecords:
         made_by: The profile and the library that its head names.
         about: Its metadata, if they are ours.
         files: Attached files, by name.
-        said: Content of the messages, with their time [s], by topic.
+        contents: Content of the messages, with their time [s], by topic.
         ends: Source and destination of the channels of XML, by topic.
         order: Facts and messages in the order of the file: time [s], topic, content.
         time: Time of the last message [s].
@@ -65,7 +65,7 @@ class RawRecords:
     made_by: tuple[str, str] = ("", "")
     about: dict[str, str] | None = None
     files: dict[str, bytes] = field(default_factory=dict)
-    said: dict[str, list[tuple[float, Any]]] = field(default_factory=lambda: defaultdict(list))
+    contents: dict[str, list[tuple[float, Any]]] = field(default_factory=lambda: defaultdict(list))
     ends: dict[str, dict[str, str]] = field(default_factory=dict)
     order: list[tuple[float, str, Any]] = field(default_factory=list)
     time: float = 0.0
@@ -104,7 +104,7 @@ class RawRecords:
 
     def _not_ours(self) -> str:
         """Describe a complete file without our metadata."""
-        if channels.HAZARDS in self.said or any(map(is_camera, self.said)):
+        if channels.HAZARDS in self.contents or any(map(is_camera, self.contents)):
             return self._filtered("metadata")
         profile, library = (f"{text!r:.60}" for text in self.made_by)
         return (
@@ -133,7 +133,7 @@ class RawRecords:
             self.time = record.log_time / messages.NS
             is_json = channel.message_encoding == "json"
             content = json.loads(record.data) if is_json else record.data
-            self.said[channel.topic].append((self.time, content))
+            self.contents[channel.topic].append((self.time, content))
             if is_xml or channel.topic.startswith(channels.OBSERVED) or is_camera(channel.topic):
                 self.order.append((self.time, channel.topic, content))
         elif isinstance(record, Channel):

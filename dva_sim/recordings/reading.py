@@ -200,7 +200,7 @@ def _opened(raw: RawRecords) -> Opened:
     scenario = Scenario.model_validate(json.loads(raw.files[SCENARIO]))
     files = {n.removeprefix(SITE): d for n, d in raw.files.items() if n.startswith(SITE)}
     site = writing.unpack(files, scenario, run["seed"])
-    records = raw.said.get(channels.HAZARDS, [])
+    records = raw.contents.get(channels.HAZARDS, [])
     incidents = [_incident(n, entry, records) for n, entry in enumerate(run["incidents"], 1)]
     contained = {int(number): time for number, time in run["contained_s"].items()}
     playback = Playback(
@@ -216,15 +216,15 @@ def _opened(raw: RawRecords) -> Opened:
         contained=contained,
         endings=[] if raw.is_cut else [_ending(entry) for entry in run.get("endings", [])],
         events=[_event(entry) for entry in run.get("events", [])],
-        facts=[channels.fact_of(time, held) for time, held in raw.said.get(channels.FACTS, ())],
+        facts=[channels.fact_of(time, held) for time, held in raw.contents.get(channels.FACTS, ())],
     )
     tables = _tables(raw.files[TABLES]) if TABLES in raw.files else None
     traces = {
         topic.removeprefix(channels.DECISIONS): [entry["line"] for _, entry in item]
-        for topic, item in raw.said.items()
+        for topic, item in raw.contents.items()
         if topic.startswith(channels.DECISIONS)
     }
-    audit = [json.loads(entry["row"]) for _, entry in raw.said.get(channels.AUDIT, ())]
+    audit = [json.loads(entry["row"]) for _, entry in raw.contents.get(channels.AUDIT, ())]
     terms = None
     if writing.HELD_TO in run:
         terms = terms_of(scenario, run[writing.HELD_TO])
@@ -305,7 +305,7 @@ def _surroundings(
     if any(isinstance(hazard, RecordedHazard) for hazard in hazards):
         grids = {
             topic.removeprefix(channels.GRIDS): entry
-            for topic, entry in raw.said.items()
+            for topic, entry in raw.contents.items()
             if topic.startswith(channels.GRIDS)
         }
         return RecordedSurroundings(site, hazards, grids)
@@ -319,17 +319,17 @@ def _recorder(raw: RawRecords, run: Mapping[str, Any]) -> Recorder:
     recorder = Recorder(keep_traffic=True)
     recorder.timeline = [
         Moment(time, log["name"], log["message"], log["kind"])
-        for time, log in raw.said[channels.STORY]
+        for time, log in raw.contents[channels.STORY]
     ]
     end = raw.time if raw.is_cut else inf
-    for topic in raw.said:
+    for topic in raw.contents:
         name, _, what = topic[1:].partition("/")
         if what == channels.POSE:
-            modes = raw.said.get(f"/{name}/{channels.ACTIVITY}", [])
-            recorder.tracks[name] = _track(raw.said[topic], modes, run["sampled_s"], end)
+            modes = raw.contents.get(f"/{name}/{channels.ACTIVITY}", [])
+            recorder.tracks[name] = _track(raw.contents[topic], modes, run["sampled_s"], end)
     robots = {run["labels"][robot]: robot for robot in run["radii_m"]}
     for name, robot in robots.items():
-        seen = raw.said.get(f"/{name}/{channels.SEEN}")
+        seen = raw.contents.get(f"/{name}/{channels.SEEN}")
         if seen:
             recorder.views[robot] = [_point(time, content, "seen") for time, content in seen]
     recorder.traffic = sorted(_traffic(raw, run), key=lambda sent: sent.time)
@@ -343,13 +343,13 @@ def _point(time: float, content: Mapping[str, Any], mode: str) -> TrackPoint:
 
 
 def _track(
-    said: list[tuple[float, Any]], modes: list[tuple[float, Any]], period: float, end: float
+    contents: list[tuple[float, Any]], modes: list[tuple[float, Any]], period: float, end: float
 ) -> list[TrackPoint]:
     """The samples of a track as they were taken, with those left out of somebody who stands."""
     track: list[TrackPoint] = []
     turns, mode = iter([*modes, (inf, {"activity": ""})]), ""
     since, following = next(turns)
-    for time, content in said:
+    for time, content in contents:
         while since <= time:
             mode, (since, following) = following["activity"], next(turns)
         here = _point(time, content, mode)
@@ -368,7 +368,7 @@ def _left_out(before: TrackPoint, until: float, period: float) -> Iterator[Track
 
 def _traffic(raw: RawRecords, run: Mapping[str, Any]) -> Iterator[Sent]:
     ids = {name: device for device, name in channels.names_of(run["labels"]).items()}
-    for topic, entry in raw.said.items():
+    for topic, entry in raw.contents.items():
         if topic in raw.ends:
             ends = raw.ends[topic]["source"], raw.ends[topic]["destination"]
             yield from (Sent(time, *ends, len(data), data) for time, data in entry)
@@ -383,14 +383,14 @@ def _drives(raw: RawRecords, run: Mapping[str, Any]) -> list[DriveLog]:
         DriveLog(**{key.removesuffix("_s"): entry[key] for key in writing.DRIVE})
         for entry in run["drives"]
     ]
-    for topic, said in raw.said.items():
-        for time, shown in said if topic.endswith(f"/{channels.SCREEN}") else ():
+    for topic, contents in raw.contents.items():
+        for time, shown in contents if topic.endswith(f"/{channels.SCREEN}") else ():
             drives[shown["drive"]].frames.append(Shown(shown["captured_s"], time, 0))
-        for time, made in said if topic.endswith(f"/{channels.COMMANDS}") else ():
+        for time, made in contents if topic.endswith(f"/{channels.COMMANDS}") else ():
             command = time, made["speed_m_s"], made["turn_rate_rad_s"]
             drives[made["drive"]].commands.append(command)
     for drive in drives:
-        for time, item in raw.said.get(f"/{run['labels'][drive.robot]}/{channels.APPLIED}", ()):
+        for time, item in raw.contents.get(f"/{run['labels'][drive.robot]}/{channels.APPLIED}", ()):
             if drive.ordered <= time and (drive.ended is None or time <= drive.ended):
                 drive.applied.append(_applied(time, item))
     return drives

@@ -230,7 +230,7 @@ def every_message(playback: Playback) -> Iterator[ChannelMessage]:
     yield from channels.told(playback)
     yield from channels.facts(playback)
     yield from channels.commanded(playback)
-    yield from channels.said(playback)
+    yield from channels.network_messages(playback)
     yield from channels.applied(playback)
     yield from channels.shown(playback)
 

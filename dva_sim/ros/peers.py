@@ -79,7 +79,7 @@ class RosPeer:
         self.wants: dict[str, PeerTopic] = {}
         self.driver: RosDriver | None = None
         self._room, self._filled_at, self._dropped = BURST, host.now(), 0
-        self._said: dict[str, float] = {}
+        self._reported_at: dict[str, float] = {}
 
     def take(self, data: bytes) -> None:
         """Take a message, unless too many have come."""
@@ -187,10 +187,10 @@ class RosPeer:
     def say(self, what: str) -> None:
         """Say what was refused; the same no more than once in a while."""
         now = self._host.now()
-        if now - self._said.get(what, -math.inf) >= SAY_AGAIN:
-            if len(self._said) > MOST_TOPICS:
-                self._said.clear()
-            self._said[what] = now
+        if now - self._reported_at.get(what, -math.inf) >= SAY_AGAIN:
+            if len(self._reported_at) > MOST_TOPICS:
+                self._reported_at.clear()
+            self._reported_at[what] = now
             self._send({"op": "status", "level": "error", "msg": what})
 
     def _send(self, operation: Json) -> None:

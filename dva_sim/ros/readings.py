@@ -205,10 +205,10 @@ class RosReader:
                 raise BadReading(f"ranges has {_shown(value)}, not a number")
         return tuple(round(value, 3) for value in nearest)
 
-    def _check_frame(self, where: str, said: Any, kind: str) -> None:
+    def _check_frame(self, where: str, frame: Any, kind: str) -> None:
         wanted = getattr(self._profile.frames, kind)
-        if not isinstance(said, str) or _bare(said) != _bare(wanted):
-            raise BadReading(f"{where} is {_shown(said)}, not {wanted!r}: see frames.{kind}")
+        if not isinstance(frame, str) or _bare(frame) != _bare(wanted):
+            raise BadReading(f"{where} is {_shown(frame)}, not {wanted!r}: see frames.{kind}")
 
     def _placed(self, pose: Any, place: str, rotation: str) -> tuple[float, float, float]:
         scale = self._profile.units.metres

@@ -269,26 +269,26 @@ class RosbridgeServer:
             answer(False, {"message": f"there is no service {service}; see /rosapi/services"})
             return
 
-        def said(done: bool, text: str) -> None:
+        def on_result(done: bool, text: str) -> None:
             answer(True, {"success": done, "message": text})
 
         if word == "emergency_stop":
-            self._gateway.emergency(name, said)
+            self._gateway.emergency(name, on_result)
         elif word == "take_control":
-            self._let_take(peer, robot, said)
+            self._let_take(peer, robot, on_result)
         elif peer.driver is None:
-            said(False, "it is not yours")
+            on_result(False, "it is not yours")
         else:
-            peer.driver.release(robot.id_tag, said)
+            peer.driver.release(robot.id_tag, on_result)
 
     def _let_take(
-        self, peer: RosPeer, robot: KnownRobot, said: Callable[[bool, str], object]
+        self, peer: RosPeer, robot: KnownRobot, on_result: Callable[[bool, str], object]
     ) -> None:
         peer.driver = peer.driver or self._gateway.driver()
         if peer.driver is None:
-            said(False, "too many clients are in control")
+            on_result(False, "too many clients are in control")
             return
-        peer.driver.take(robot.id_tag, said)
+        peer.driver.take(robot.id_tag, on_result)
 
     def _rosapi(self, service: str, args: Json) -> Json:
         topics, services, kind = self.topics(), self.services(), str(args.get("type", ""))

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
-from dva_sim.kernel.config import Key, Scalar, keys_said_of
+from dva_sim.kernel.config import Key, Scalar, titled_keys
 from dva_sim.kernel.measure import Measure
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import percent, without_unit
@@ -56,7 +56,7 @@ def _keys() -> dict[str, Key]:
     """Return the names in the scenarios' fields; a key has one name in all models."""
     values: dict[str, Key] = {}
     for model in reversed(MODELS.values()):
-        values |= keys_said_of(model.scenario)
+        values |= titled_keys(model.scenario)
     return values
 
 
@@ -73,7 +73,7 @@ def _measures() -> dict[str, Measure]:
 
 def stated_conditions(models: Iterable[str]) -> dict[str, str]:
     """Keys that a table of conditions may state, with their words there, of some models."""
-    there = (keys_said_of(MODELS[name].scenario) for name in models if name in MODELS)
+    there = (titled_keys(MODELS[name].scenario) for name in models if name in MODELS)
     return {path: key.condition for entry in there for path, key in entry.items() if key.condition}
 
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Measure
-from dva_sim.kernel.plugins import FAILURES, Plugins, said, stamp_of
+from dva_sim.kernel.plugins import FAILURES, Plugins, error_text, stamp_of
 
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]{0,59}")
 
@@ -138,7 +138,7 @@ def value_of(measure: RunMeasure, recording: Any) -> float:
         if math.isfinite(answer):
             return float(answer)
     except FAILURES as error:
-        raise ConfigError(f"measure {name!r} cannot be taken: {said(error)}") from error
+        raise ConfigError(f"measure {name!r} cannot be taken: {error_text(error)}") from error
     raise ConfigError(f"measure {name!r} is {answer!r}; should be a finite number, or None")
 
 

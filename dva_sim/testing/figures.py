@@ -28,7 +28,7 @@ from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.plugins import FAILURES
-from dva_sim.testing.promises import Case, Outcome, broken_in, kept, said
+from dva_sim.testing.promises import Case, Outcome, broken_in, error_with_line, kept
 from dva_sim.testing.results import SHAPES, Shape, make_up
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ RAISES: Final = "raises"
 EMPTY: Final = "does not say in one line what is missing where nothing was measured"
 CHANGES: Final = "draws otherwise when it is drawn again"
 NAME: Final = "gives a drawing of another name than its own"
-UNSAID: Final = "does not say how it is read"
+UNEXPLAINED: Final = "does not say how it is read"
 NUMBERS: Final = "draws a number that is not in its CSV"
 SMALL: Final = "has words that are too small"
 COLOUR: Final = "has a colour that is not the palette's"
@@ -115,12 +115,12 @@ def _tried(
             one, problems = _drawn(make(), reading, took)
         except ConfigError as error:
             if shape.missing < 1 or "\n" in str(error):
-                yield RAISES, said(error)
+                yield RAISES, error_with_line(error)
             return
         except FAILURES as error:
             is_read_only = "read-only" in str(error)
             promise = TOUCHES if is_read_only else EMPTY if shape.missing >= 1 else RAISES
-            yield promise, said(error)
+            yield promise, error_with_line(error)
             return
         yield from problems
         if one is None:
@@ -167,9 +167,9 @@ def _faults(drawn: Drawn, figure: ReportFigure) -> Iterator[Case]:
     if drawn.name != figure.name:
         yield NAME, f"{drawn.name!r} for {figure.name!r}"
     if not drawn.title or not drawn.caption.rstrip().endswith((".", "!", "?")):
-        yield UNSAID, f"title {drawn.title!r}, caption {drawn.caption!r}; should be sentences"
+        yield UNEXPLAINED, f"title {drawn.title!r}, caption {drawn.caption!r}; should be sentences"
     if drawn.figure is None:
-        yield UNSAID, "there is no figure in it; should be what finish() gives"
+        yield UNEXPLAINED, "there is no figure in it; should be what finish() gives"
         return
     yield from _small_words(drawn.figure)
     yield from _other_colours(drawn.figure)

@@ -29,7 +29,7 @@ from dva_sim.core.dispatch import (
 )
 from dva_sim.kernel.plugins import FAILURES
 from dva_sim.protocol.event_kinds import EVENT_KINDS
-from dva_sim.testing.promises import Case, Outcome, is_slow, kept, line, said
+from dva_sim.testing.promises import Case, Outcome, error_with_line, is_slow, kept, line
 
 _PLACE: Final = 400.0  # edge of the site [m]
 _PACE: Final = {"guard": (1.3, 20.0), "robot": (0.35, 4.0)}  # [m/s], mobilisation [s]
@@ -292,7 +292,9 @@ def _ask(policy: Policy, situation: Situation, seed: int) -> _Answer:
     try:
         advice = policy.advise(situation, rng)
     except FAILURES as error:
-        return _Answer((), time.perf_counter() - started, (("raises", f"{said(error)} "),))
+        return _Answer(
+            (), time.perf_counter() - started, (("raises", f"{error_with_line(error)} "),)
+        )
     took = time.perf_counter() - started
     changed = before != _contents(situation)
     return _Answer(advice, took, (("changes the situation", ""),) if changed else ())

@@ -93,7 +93,7 @@ def part_by_part(parts: Iterable[Callable[[], Iterable[Case]]]) -> Iterator[Case
         try:
             broken = list(part())
         except FAILURES as error:
-            broken = [("raises", said(error))]
+            broken = [("raises", error_with_line(error))]
         yield from broken
         if broken:
             return
@@ -105,7 +105,7 @@ def line(promise: str, cases: Sequence[str]) -> str:
     return f"{promise}: {cases[0]}{more}"
 
 
-def said(error: BaseException) -> str:
+def error_with_line(error: BaseException) -> str:
     """An error in one line, with the line of the file that it comes from."""
     frame = traceback.extract_tb(error.__traceback__)[-1]
     text = " ".join(f"{type(error).__name__}: {error}".split())

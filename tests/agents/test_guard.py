@@ -407,7 +407,7 @@ def test_who_was_to_look_and_sees_nothing_there_has_failed(dva):
 
 
 @pytest.mark.parametrize(
-    ("kind", "depth", "said"),
+    ("kind", "depth", "expected"),
     [
         ("gas_leak", 2.9, ["departed", "confirmed", "done"]),
         ("gas_leak", 3.1, ["departed", "failed"]),
@@ -416,13 +416,13 @@ def test_who_was_to_look_and_sees_nothing_there_has_failed(dva):
     ],
 )
 def test_who_is_driven_back_has_seen_a_fire_by_its_smoke_and_nothing_else_through_it(
-    dva, kind, depth, said
+    dva, kind, depth, expected
 ):
     dva.guard(air=hot, smoke=lambda a, b: depth)
     dva.there = {kind}
     dva.say(GUARD, m.Order(1, kind, dva.position(FAR), None))
     dva.run_for(60.0)
-    assert dva.progress(1) == said
+    assert dva.progress(1) == expected
 
 
 def test_no_guard_walks_through_a_door_behind_which_nobody_survives(dva):

@@ -25,7 +25,7 @@ class World:
     """A DVA's permissions, a robot, what is under way between them, and a forger.
 
     Attributes:
-        said: From the DVA to the robot, in order.
+        to_robot: From the DVA to the robot, in order.
         asked: The robot's question, until the DVA has taken it.
         answers: Replies of the DVA on their way to the robot.
         given: Every session that the DVA has given, and to whom.
@@ -36,7 +36,7 @@ class World:
         self.rng, self.now, self.number = random.Random(seed), 0.0, 0
         self.dva = Permissions(lambda: self.rng.getrandbits(32), own=DVA)
         self.robot = RobotController(ROBOT, DVA, Limits(3.0, 6.0))
-        self.said, self.asked = deque[m.Body](), 0
+        self.to_robot, self.asked = deque[m.Body](), 0
         self.answers = deque[m.Reply]()
         self.given: dict[int, str] = {}
         self.over: set[int] = set()
@@ -53,17 +53,17 @@ class World:
         grant, is_news = self.dva.request(ROBOT, holder, "both")
         if grant is not None and is_news:
             self.given[grant.session] = holder
-            self.said.append(m.PermissionGrant(holder, "both", grant.session))
+            self.to_robot.append(m.PermissionGrant(holder, "both", grant.session))
 
     def revokes(self) -> None:
         grant = self.dva.grants.get(ROBOT)
         if grant is not None:
             self.dva.end(grant.session)
-            self.said.append(m.PermissionRevocation(ROBOT, grant.holder, grant.session))
+            self.to_robot.append(m.PermissionRevocation(ROBOT, grant.holder, grant.session))
 
     def says(self) -> None:
-        if self.said:
-            body = self.said.popleft()
+        if self.to_robot:
+            body = self.to_robot.popleft()
             assert self.tell(DVA, body) == m.OK
             if isinstance(body, m.PermissionRevocation):
                 self.over.add(body.session)

@@ -14,7 +14,7 @@ LAN = "192.0.2.7"  # nobody has it (RFC 5737), and nothing is opened here
 
 
 @pytest.fixture
-def said(monkeypatch: pytest.MonkeyPatch) -> object:
+def warnings_of(monkeypatch: pytest.MonkeyPatch) -> object:
     """Runs a command that would listen; its lines on stderr."""
 
     def nothing(*_: object, **__: object) -> None:
@@ -66,9 +66,9 @@ PAGES = [
     ],
 )
 def test_what_listens_beyond_this_machine_without_keys_or_a_token_is_said_in_a_line(
-    said, command, names
+    warnings_of, command, names
 ):
-    (line,) = said(command)
+    (line,) = warnings_of(command)
     assert unnamed(line, *names) == []
 
 
@@ -93,12 +93,12 @@ def test_what_listens_beyond_this_machine_without_keys_or_a_token_is_said_in_a_l
         f"robot --host {LAN} --keys keys",
     ],
 )
-def test_nothing_is_said_on_this_machine_or_with_keys_or_a_token(said, command):
-    assert said(command) == []
+def test_nothing_is_said_on_this_machine_or_with_keys_or_a_token(warnings_of, command):
+    assert warnings_of(command) == []
 
 
-def test_both_are_said_where_both_are_open(said):
-    lines = said(f"console --links real --no-token --host {LAN}")
+def test_both_are_said_where_both_are_open(warnings_of):
+    lines = warnings_of(f"console --links real --no-token --host {LAN}")
     assert [TOKEN in lines[0], FORGERS in lines[1]] == [True, True]
 
 
@@ -112,7 +112,7 @@ def test_an_address_of_which_nobody_knows_is_not_taken_for_this_machine(tmp_path
     [("--camera-port 0", True), ("--camera-port 0 --only dva", False), ("", False)],
 )
 def test_pictures_beyond_this_machine_are_said_though_devices_have_keys(
-    said, tmp_path, more, is_open
+    warnings_of, tmp_path, more, is_open
 ):
-    found = said(f"live drive-to-event --host {LAN} --keys {tmp_path} {more}")
+    found = warnings_of(f"live drive-to-event --host {LAN} --keys {tmp_path} {more}")
     assert [LAN in line and "leave out --camera-port" in line for line in found] == [True] * is_open

@@ -147,18 +147,18 @@ def test_another_question_other_settings_and_other_configurations_are_told(folde
 
 
 @pytest.mark.parametrize(
-    ("conditions", "code", "said"),
+    ("conditions", "code", "expected"),
     [
         (["mean(drive_time_s) > +4 s"], 4, "failed: mean(drive_time_s) > +4 s"),
         (["mean(drive_time_s) > +6 s"], 0, "passed: mean(drive_time_s) > +6 s"),
         (["max(contacts) > 9", "mean(drive_time_s) > +4 s"], 4, "passed: max(contacts) > 9"),
     ],
 )
-def test_a_gate_ends_with_4_if_a_condition_holds(folders, conditions, code, said):
+def test_a_gate_ends_with_4_if_a_condition_holds(folders, conditions, code, expected):
     words = [word for condition in conditions for word in ("--fail-if", condition)]
     ended, out, _ = command("compare", folders["cheap"], folders["later"], *words)
     assert ended == code
-    assert said in out
+    assert expected in out
 
 
 def test_runs_that_failed_are_told(folders):
@@ -167,7 +167,7 @@ def test_runs_that_failed_are_told(folders):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "expected"),
     [
         (["show", "."], "holds no finished results"),
         (["show", "{cheap}", "--table", "flights"], "no table 'flights'; tables: runs, tracks"),
@@ -176,10 +176,10 @@ def test_runs_that_failed_are_told(folders):
         (["compare", "{cheap}", "{later}", "--measure", "speed"], "measure 'speed' is not in both"),
     ],
 )
-def test_a_mistake_ends_with_2_and_one_line(folders, words, said):
+def test_a_mistake_ends_with_2_and_one_line(folders, words, expected):
     code, _, err = command(*(word.format(**folders) for word in words))
     assert code == 2
-    assert said in err
+    assert expected in err
     assert len(err.strip().splitlines()) == 1
 
 

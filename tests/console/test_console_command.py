@@ -38,7 +38,7 @@ def running(programs, *words):
 
 
 def address_of(program):
-    return re.search(r"^Console: (http://127\.0\.0\.1:\d+/\S*)$", program.said, re.MULTILINE)[1]
+    return re.search(r"^Console: (http://127\.0\.0\.1:\d+/\S*)$", program.output, re.MULTILINE)[1]
 
 
 class Client:
@@ -218,8 +218,8 @@ def test_what_was_driven_and_recorded_holds_every_rule(programs, tmp_path, links
         assert page.do("emergency", robots="all")[0]
     console.send(signal.SIGINT)
     assert console.ends() == 0
-    assert "run.mcap written" in console.said
-    assert all(f"\n{rule} held: " in console.said for rule in RULES)
+    assert "run.mcap written" in console.output
+    assert all(f"\n{rule} held: " in console.output for rule in RULES)
     check = call("check", tmp_path / "run.mcap")
     assert check.returncode == 0, check.stdout + check.stderr
     replay = call("replay", tmp_path / "run.mcap")
@@ -261,7 +261,7 @@ def test_a_console_whose_robots_break_rules_says_so_at_once_and_at_its_end(
     assert console.ends() == 1
     (complaint,) = console.complained
     assert unnamed(complaint, "error: ", "S1, S4") == []
-    assert "S4 broken: robot-1, at" in console.said
+    assert "S4 broken: robot-1, at" in console.output
     check = call("check", tmp_path / "run.mcap")
     assert check.returncode == 1
     assert "S4 broken: robot-1, at" in check.stdout
@@ -270,7 +270,7 @@ def test_a_console_whose_robots_break_rules_says_so_at_once_and_at_its_end(
 def test_a_second_address_is_for_those_who_only_look(programs, console):
     address = address_of(console)
     console.wait_to_say("Look only: ")
-    look = re.search(r"^Look only: (\S+)$", console.said, re.MULTILINE)[1]
+    look = re.search(r"^Look only: (\S+)$", console.output, re.MULTILINE)[1]
     base, _, token = look.partition("?token=")
     headers = {"Authorization": f"Bearer {token}", "Content-Type": "application/json"}
     assert address.partition("?token=")[0] == base
@@ -293,9 +293,9 @@ def test_phones_get_an_address_by_https_and_a_code(programs, monkeypatch, tmp_pa
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
     console = running(programs, *PHONES)
     console.wait_to_say("Each phone must trust this computer once: https://127.0.0.1:")
-    address = re.search(r"^Phone: (https://127\.0\.0\.1:\d+/\?token=\S{32})$", console.said, re.M)
+    address = re.search(r"^Phone: (https://127\.0\.0\.1:\d+/\?token=\S{32})$", console.output, re.M)
     assert address
-    assert "█▀" in console.said
+    assert "█▀" in console.output
     kept = tmp_path / "data" / "dva-sim" / "phones"
     assert {path.name for path in kept.iterdir()} == {"authority.pem", "console.pem"}
     assert address[1].partition("=")[2] not in "".join(console.complained)
@@ -308,7 +308,7 @@ def test_where_no_certificate_can_be_kept_all_else_goes_on(programs, monkeypatch
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
     console = running(programs, *PHONES)
     console.wait_to_say("no address for phones: no certificate can be kept in")
-    assert "Phone:" not in console.said
+    assert "Phone:" not in console.output
     with client(address_of(console)) as page:
         assert page.do("take", robots=[0])[0]
     console.send(signal.SIGINT)

@@ -32,8 +32,8 @@ def search(root, folder, *options):
     )
 
 
-def coverage(said):
-    return [int(number) for number in re.findall(r"\bcov: (\d+)", said)]
+def coverage(output):
+    return [int(number) for number in re.findall(r"\bcov: (\d+)", output)]
 
 
 def test_a_short_search_finds_nothing_wrong(tmp_path):

@@ -36,7 +36,7 @@ def unexplained(source: str) -> list[str]:
         for body in bodies
         for node, after in zip(body, [*body[1:], None], strict=True)
         for name in _constants(node)
-        if not MARK.search(_said(node, after, comments))
+        if not MARK.search(_text_of(node, after, comments))
     ]
 
 
@@ -54,7 +54,7 @@ def _constants(node: ast.stmt) -> list[str]:
     return [name for name in names if is_number and name.isupper()]
 
 
-def _said(node: ast.stmt, after: ast.stmt | None, comments: dict[int, str]) -> str:
+def _text_of(node: ast.stmt, after: ast.stmt | None, comments: dict[int, str]) -> str:
     assert node.end_lineno is not None
     reports = [comments.get(line, "") for line in range(node.lineno, node.end_lineno + 1)]
     if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):

@@ -9,7 +9,7 @@ import pytest
 
 from dva_sim.agents.robot.controller import Decision, RobotController
 from dva_sim.kernel.recorder import Sent
-from dva_sim.live.judging import FRAME, HERE, SAID, SEEN, LiveJudge
+from dva_sim.live.judging import FRAME, HERE, SEEN, SENT_LINE, LiveJudge
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
 from dva_sim.simulation import scenario as scenarios
@@ -57,11 +57,11 @@ def line_of(fact: Any) -> Line:
         word, time, text = as_plain(fact)
         return [SEEN, time, word, text]
     if isinstance(fact.payload, bytes):
-        return [SAID, fact.time, fact.source, fact.destination, fact.payload.decode()]
+        return [SENT_LINE, fact.time, fact.source, fact.destination, fact.payload.decode()]
     return [FRAME, fact.time, fact.source, fact.payload.observation, fact.payload.captured]
 
 
-def said_by_parts(run: Run) -> dict[int, list[Line]]:
+def lines_by_part(run: Run) -> dict[int, list[Line]]:
     """The lines of each part."""
     lines: dict[int, list[Line]] = defaultdict(list)
     for device in run.stage.devices:
@@ -92,14 +92,14 @@ def judged(run: Run, lines: dict[int, list[Line]], seed: int = 1) -> dict[str, s
 def test_an_honest_run_holds_every_rule_whichever_part_is_read_first(seed):
     run = drive()
     assert run.field.robots[ROBOT].applied > 50
-    assert judged(run, said_by_parts(run), seed) == dict.fromkeys(RULES, "held")
+    assert judged(run, lines_by_part(run), seed) == dict.fromkeys(RULES, "held")
 
 
 @pytest.mark.invariant("S3")
 def test_a_robot_that_answers_an_emergency_and_drives_on_is_found_out(monkeypatch):
     monkeypatch.setattr(RobotController, "_emergency", lambda *_: Decision(m.OK, "stopped"))
     run = drive()
-    found = judged(run, said_by_parts(run))
+    found = judged(run, lines_by_part(run))
     assert {rule for rule, state in found.items() if state == "broken"} == {"S3"}
 
 
@@ -107,7 +107,7 @@ def test_a_robot_that_answers_an_emergency_and_drives_on_is_found_out(monkeypatc
 def test_no_rule_is_broken_by_two_clocks_that_differ(ahead):
     """Each rule compares times of one part; the DVA and the phones are on another machine."""
     run = drive()
-    lines = said_by_parts(run)
+    lines = lines_by_part(run)
     for part in (AT_DVA, REST):
         lines[part] = [_later(line, ahead) for line in lines[part]]
     assert judged(run, lines) == dict.fromkeys(RULES, "held")
@@ -121,7 +121,7 @@ def _later(line: Line, seconds: float) -> Line:
 
 def test_without_the_world_robots_are_not_judged_and_without_the_dva_no_events():
     run = drive(10.0)
-    lines = said_by_parts(run)
+    lines = lines_by_part(run)
     alone = judged(run, {WORLD: lines[WORLD]})
     assert [alone[rule] for rule in RULES] == ["held"] * 5 + ["not judged"] * 2
     alone = judged(run, {AT_DVA: lines[AT_DVA]})
@@ -130,7 +130,7 @@ def test_without_the_world_robots_are_not_judged_and_without_the_dva_no_events()
 
 def test_what_could_not_be_said_leaves_every_rule_unjudged():
     run = drive(10.0)
-    lines = said_by_parts(run)
+    lines = lines_by_part(run)
     lines[WORLD].insert(50, [SEEN, lines[WORLD][50][1], "gap", {"missing": 3}])
     assert judged(run, lines) == dict.fromkeys(RULES, "not judged")
 
@@ -150,13 +150,13 @@ def test_a_judge_that_has_failed_has_held_nothing():
 # --- who has really said it ----------------------------------------------------------------
 
 
-def said(time: float, source: str, to: str, body: m.Body, session: int, number: int) -> Sent:
+def sent(time: float, source: str, to: str, body: m.Body, session: int, number: int) -> Sent:
     data = encode(m.Message(to, number, source, "12:00:00", session, body))
     return Sent(time, source, to, len(data), data)
 
 
 def reply(time: float, to: str, number: int) -> Sent:
-    return said(time, ROBOT, to, m.Reply(number, m.OK, ""), 0, 900 + number)
+    return sent(time, ROBOT, to, m.Reply(number, m.OK, ""), 0, 900 + number)
 
 
 @pytest.mark.invariant("S5")
@@ -164,11 +164,11 @@ def reply(time: float, to: str, number: int) -> Sent:
 def test_a_permission_that_nobody_but_its_own_words_says_the_dva_gave_is_none(is_forged):
     """Two operators; the robot believes what one of them says and answers in the DVA's name."""
     scenario = scenarios.build(scenarios.load("drive-to-event"), {"operator.count": 2})
-    grant = said(1.0, DVA, ROBOT, m.PermissionGrant(PHONE, "both", 5), 5, 1)
-    question = said(1.1, ROBOT, DVA, m.GetGrant(), 0, 3)
+    grant = sent(1.0, DVA, ROBOT, m.PermissionGrant(PHONE, "both", 5), 5, 1)
+    question = sent(1.1, ROBOT, DVA, m.GetGrant(), 0, 3)
     confirmed = m.Reply(3, m.OK, "", m.Permission(PHONE, "both", 5))
-    answer = said(1.2, DVA, ROBOT, confirmed, 0, 4)
-    start = said(1.2, PHONE, ROBOT, m.StartTeleOp(), 5, 2)
+    answer = sent(1.2, DVA, ROBOT, confirmed, 0, 4)
+    start = sent(1.2, PHONE, ROBOT, m.StartTeleOp(), 5, 2)
     facts: list[Any] = [
         Arrived(1.1, DVA, ROBOT, grant.payload),
         reply(1.1, DVA, 1),

@@ -78,8 +78,8 @@ def test_a_run_with_keys_goes_like_one_without(programs, tmp_path):
     assert (made.returncode, unnamed(made.stdout, "ours", "made 4 ")) == (0, [])
     run = programs.start(*LIVE, "--keys", "ours")
     assert run.ends() == 0, run.complained
-    assert unnamed(run.said, "mode Teleoperation", "(the script is done)") == []
-    assert unnamed(run.said, "handshake", "refused a connection") == [
+    assert unnamed(run.output, "mode Teleoperation", "(the script is done)") == []
+    assert unnamed(run.output, "handshake", "refused a connection") == [
         "handshake",
         "refused a connection",
     ]

@@ -12,7 +12,7 @@ from dva_sim.simulation import scenario as scenarios
 
 @pytest.mark.system
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "expected"),
     [
         (["--set", "operator.strategy=oracle"], "only in virtual time"),
         (["--set", "nonsense"], "should be key=value"),
@@ -42,7 +42,9 @@ from dva_sim.simulation import scenario as scenarios
         (["--record", "/proc"], "nothing can be written in folder '/proc'"),
     ],
 )
-def test_a_mistake_ends_in_one_line_before_anything_is_started(tmp_path, monkeypatch, words, said):
+def test_a_mistake_ends_in_one_line_before_anything_is_started(
+    tmp_path, monkeypatch, words, expected
+):
     for name in ("there.mcap", "cut.mcap.part", "dva.trace.jsonl", "robot-1.trace.jsonl"):
         folder = tmp_path / ("traces" if name.endswith("jsonl") else "")
         folder.mkdir(exist_ok=True)
@@ -52,7 +54,7 @@ def test_a_mistake_ends_in_one_line_before_anything_is_started(tmp_path, monkeyp
     ended = call("live", "drive-to-event", "--for", "60", *words, cwd=tmp_path)
     assert ended.returncode == 2
     (line,) = ended.stderr.splitlines()
-    assert unnamed(line, "error: ", said) == []
+    assert unnamed(line, "error: ", expected) == []
     assert (tmp_path / "there.mcap").read_text() == "of an earlier run"
 
 

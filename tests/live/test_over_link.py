@@ -36,7 +36,7 @@ def test_the_end_of_a_run_tells_what_became_of_the_packets(programs):
     need_link()
     run = programs.start(*SCRIPTED, "--link", "delay_s=0.05", "--for", "0.5")
     assert run.ends() == 0, run.complained
-    assert unnamed(run.said, "to the robots: ", "from the robots: ", "emulator late by: ") == []
+    assert unnamed(run.output, "to the robots: ", "from the robots: ", "emulator late by: ") == []
     assert programs.processes() == {}
 
 

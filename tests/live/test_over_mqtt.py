@@ -22,8 +22,8 @@ def test_a_whole_run_keeps_the_rules(programs):
     """A drive, an emergency, a command that comes too late, a second drive."""
     run = programs.start(*LIVE)
     assert run.ends() == 0, run.complained
-    assert unnamed(run.said, "200 of 200 commands obeyed", "emergency: obeyed", *RULES) == []
-    assert "one more command: refused (wrong mode)" in run.said
+    assert unnamed(run.output, "200 of 200 commands obeyed", "emergency: obeyed", *RULES) == []
+    assert "one more command: refused (wrong mode)" in run.output
     assert programs.processes() == {}
 
 
@@ -34,9 +34,9 @@ def test_a_broker_that_is_killed_is_told_once_and_the_driven_robot_stands(progra
     broker = next(p for p, command in programs.processes().items() if "mosquitto" in command)
     os.kill(broker, signal.SIGKILL)
     assert run.ends() == 0, run.complained
-    assert run.said.count("MQTT broker") == 1
-    assert unnamed(run.said, *RULES) == []
-    assert "200 of 200" not in run.said
+    assert run.output.count("MQTT broker") == 1
+    assert unnamed(run.output, *RULES) == []
+    assert "200 of 200" not in run.output
     assert programs.processes() == {}
 
 
@@ -48,5 +48,5 @@ def test_robots_and_a_broker_may_be_at_either_end_of_a_link(programs, end):
     run.wait_to_say(f"DVA: 10.77.0.{1 if end == 'near' else 2}:", "sends 200 commands")
     run.send(signal.SIGINT)
     assert run.ends() == 0, run.complained
-    assert unnamed(run.said, "to the robots: ", *RULES) == []
+    assert unnamed(run.output, "to the robots: ", *RULES) == []
     wait_until(lambda: programs.processes() == {}, "all parts end")

@@ -62,12 +62,12 @@ def test_a_run_tells_its_story_shows_all_devices_and_ends_when_its_script_is_don
     assert run.ends() == 0, run.complained
     assert all_held(run)
     words = ("breaks out", "mode Teleoperation", "mode Idle", "200 of 200 commands")
-    assert unnamed(run.said, *words, "an emergency: obeyed", "refused (wrong mode)") == []
-    first, *lines = run.said.partition("after ")[0].splitlines()
+    assert unnamed(run.output, *words, "an emergency: obeyed", "refused (wrong mode)") == []
+    first, *lines = run.output.partition("after ")[0].splitlines()
     assert first.startswith("DVA: 127.0.0.1:")
     story = [float(line.split(" s ")[0]) for line in lines]
     assert story == sorted(story)
-    table = run.said[run.said.rindex("mode Idle") :]
+    table = run.output[run.output.rindex("mode Idle") :]
     words = ("(the script is done)", "robot-1", "operator-1", "event 1 (fire)")
     assert unnamed(table, *words, "pending") == []  # nobody who follows a script goes there
     assert run.complained == []
@@ -81,7 +81,7 @@ def test_a_run_tells_its_story_shows_all_devices_and_ends_when_its_script_is_don
 
 def all_held(run: Program) -> bool:
     """True if a run has reported each safety rule as held."""
-    return all(f"\n{rule} held: " in run.said for rule in RULES)
+    return all(f"\n{rule} held: " in run.output for rule in RULES)
 
 
 DEAF = f"""{BRIEFLY}
@@ -101,8 +101,8 @@ def test_a_robot_that_answers_an_emergency_and_ignores_it_lets_no_run_end_as_don
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     run = programs.start(*SCRIPTED, "--record", "run.mcap")
     assert run.ends() == 1
-    assert "an emergency: obeyed" in run.said
-    story, entry = [line for line in run.said.splitlines() if "S3 broken" in line]
+    assert "an emergency: obeyed" in run.output
+    story, entry = [line for line in run.output.splitlines() if "S3 broken" in line]
     assert re.fullmatch(r" +[\d.]+ s  robot-1 +S3 broken: .*", story)
     assert re.fullmatch(r"S3 broken: robot-1, at \d+\.\d s.*: .*", entry)
     (complaint,) = run.complained  # on a busy machine S1, too: it moves for longer than allowed
@@ -126,7 +126,7 @@ def test_a_run_leaves_a_recording_that_is_replayed_and_whose_decisions_hold(prog
     run = programs.start(*SCRIPTED, "--record", "run.mcap")
     assert run.ends() == 0, run.complained
     assert all_held(run)
-    assert "run.mcap written" in run.said
+    assert "run.mcap written" in run.output
     file = tmp_path / "run.mcap"
     assert count_in(file, b"<SetTeleOp>") == 20 + 1 + 10
     opened = read_recording(file)
@@ -145,7 +145,7 @@ def test_the_robots_go_on_when_the_disk_becomes_full(programs, tmp_path):
     run.wait_to_say("mode Teleoperation")
     resource.prlimit(run.process.pid, resource.RLIMIT_FSIZE, (50_000, 50_000))
     assert run.ends() == 2
-    assert unnamed(run.said, "20 of 20 commands", "(the script is done)") == []
+    assert unnamed(run.output, "20 of 20 commands", "(the script is done)") == []
     (complaint,) = run.complained
     assert unnamed(complaint, "error: run.mcap ", os.strerror(errno.EFBIG), "run.mcap.part") == []
     assert call("replay", tmp_path / "run.mcap.part").returncode == 0
@@ -154,14 +154,14 @@ def test_the_robots_go_on_when_the_disk_becomes_full(programs, tmp_path):
 def test_a_run_lasts_as_long_as_it_is_told_to(programs):
     run = programs.start(*SCRIPTED, "--for", "3")
     assert run.ends() == 0
-    assert "(time is up)" in run.said
+    assert "(time is up)" in run.output
     assert programs.processes() == {}
 
 
 def test_a_simulated_person_drives_to_the_fire_and_confirms_it(programs, tmp_path):
     run = programs.start("live", "drive-to-event", *NEAR, "--record", "traces")
     assert run.ends() == 0, run.complained
-    assert unnamed(run.said, "(settled)", "event 1 (fire)", "confirmed") == []
+    assert unnamed(run.output, "(settled)", "event 1 (fire)", "confirmed") == []
     assert all_held(run)
     assert programs.processes() == {}
     decided = list(replay(tmp_path / "traces" / "robot-1.trace.jsonl"))
@@ -177,8 +177,8 @@ def test_a_run_that_is_interrupted_ends_cleanly(programs):
     run.wait_to_say("mode Teleoperation")
     run.send(signal.SIGTERM)
     assert run.ends() == 0
-    assert "The run ended (interrupted)" in run.said
-    assert run.said.rindex("mode Idle") > run.said.rindex("mode Teleoperation")
+    assert "The run ended (interrupted)" in run.output
+    assert run.output.rindex("mode Idle") > run.output.rindex("mode Teleoperation")
     assert run.complained == []
     assert programs.processes() == {}
 
@@ -188,7 +188,7 @@ def test_a_run_can_be_interrupted_before_anything_has_happened(programs):
     programs.process_of("dva")
     run.send(signal.SIGINT)
     assert run.ends() == 0
-    assert unnamed(run.said, "(interrupted)", "no event") == []
+    assert unnamed(run.output, "(interrupted)", "no event") == []
     assert programs.processes() == {}
 
 
@@ -265,8 +265,8 @@ def test_three_parts_started_by_hand_work_together(programs, address):
         part.send(signal.SIGINT)
         assert part.ends() == 0
         assert part.complained == []
-    assert "robot-1" in dva.said
-    assert "operator-1" in operator.said
+    assert "robot-1" in dva.output
+    assert "operator-1" in operator.output
     programs.wait_for_none()
 
 
@@ -321,7 +321,7 @@ def test_a_dva_that_was_killed_remembers_its_events_and_goes_on_with_them(
     assert dva.ends() == -signal.SIGKILL
     again = programs.start(*live, *keeps, "--record", "second")
     again.wait_to_say("remembers 1 open event", "event 1 (fire) is confirmed")
-    assert "pending" not in again.said
+    assert "pending" not in again.output
     again.send(signal.SIGINT)
     assert again.ends() == 0
     traces = [tmp_path / life / "dva.trace.jsonl" for life in ("first", "second")]

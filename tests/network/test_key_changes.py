@@ -26,8 +26,8 @@ class Side:
     """One machine, with a folder of keys of its own."""
 
     def __init__(self, folder: Path, device: str) -> None:
-        self.folder, self.device, self.said = folder, device, list[str]()
-        self.network = SocketNetwork(LiveClock(), KeyRing(folder), self.said.append)
+        self.folder, self.device, self.reports = folder, device, list[str]()
+        self.network = SocketNetwork(LiveClock(), KeyRing(folder), self.reports.append)
         self.address = self.network.join(device)
         self.heard, self.answers = list[bytes](), list[bytes]()
 
@@ -81,8 +81,8 @@ class Both:
 
     def goes(self, side: Side) -> None:
         """A side notices that a key has gone; what was under way by then is let through."""
-        self.let(WITHIN, lambda: any("has gone" in line for line in side.said))
-        assert any("has gone" in line for line in side.said)
+        self.let(WITHIN, lambda: any("has gone" in line for line in side.reports))
+        assert any("has gone" in line for line in side.reports)
         self.let(0.2)
         self.forget()
         self.let(0.6)
@@ -111,7 +111,7 @@ def test_a_device_whose_key_is_taken_away_is_heard_no_more_and_hears_nothing(bot
     both.goes(both.robot)
     assert (both.operator.heard, both.operator.answers, both.senders) == ([], [], [])
     assert counted(both.robot.network.counters, "refused", "key") > 0
-    assert any(f"the key of {OPERATOR} has gone" in line for line in both.robot.said)
+    assert any(f"the key of {OPERATOR} has gone" in line for line in both.robot.reports)
     both.robot.gets_key_of(both.operator, away)
     assert both.talk()
 

@@ -129,8 +129,8 @@ def test_a_subscriber_that_ends_without_a_word_is_no_longer_wanted(world):
 def test_who_takes_the_client_id_of_a_device_is_noticed(world):
     """Nothing keeps a client of this machine from it; SECURITY.md says what follows."""
     with closing(Outsider(world, PHONE)):
-        world.run_until(lambda: world.said)
-    assert unnamed(world.said[0], PHONE) == []
+        world.run_until(lambda: world.reports)
+    assert unnamed(world.reports[0], PHONE) == []
 
 
 def test_when_the_broker_is_back_everything_goes_on(world):
@@ -138,16 +138,16 @@ def test_when_the_broker_is_back_everything_goes_on(world):
     listener = Listener(world, "news|")
     listener.await_a_mark()
     os.kill(world.broker.pid, signal.SIGKILL)
-    world.run_until(lambda: world.said)
+    world.run_until(lambda: world.reports)
     world.broker.close()
     world.broker = open_broker("127.0.0.1", world.port)
-    world.run_until(lambda: len(world.said) == 2)
+    world.run_until(lambda: len(world.reports) == 2)
     listener.await_a_mark()
     asker = Asker(world.network, timeout=1.0, peer=DVA, attempts=30)
     asker.ask(b"are you there?")
     world.run_until(asker.all_over)
     assert asker.replies() == [b"re: are you there?"]
-    assert [unnamed(line, f"127.0.0.1:{world.port}") for line in world.said] == [[], []]
+    assert [unnamed(line, f"127.0.0.1:{world.port}") for line in world.reports] == [[], []]
 
 
 # --- a robot that is driven ---------------------------------------------------------------
@@ -185,11 +185,11 @@ def test_a_driven_robot_stands_when_its_broker_is_killed():
         scene.until(lambda: speed() > 0.2)
         os.kill(world.broker.pid, signal.SIGKILL)
         scene.until(lambda: speed() < 0.01)
-        scene.until(lambda: world.said)
+        scene.until(lambda: world.reports)
         world.run_for(2.0)
         assert speed() < 0.01
-    assert len(world.said) == 1
-    assert unnamed(world.said[0], f"127.0.0.1:{world.port}") == []
+    assert len(world.reports) == 1
+    assert unnamed(world.reports[0], f"127.0.0.1:{world.port}") == []
 
 
 def test_a_port_that_is_taken_is_told_with_the_reason(world):

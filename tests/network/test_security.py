@@ -32,8 +32,8 @@ class End:
 
     def __init__(self, ring: KeyRing | None, device: str) -> None:
         self.context: zmq.Context[Socket] = zmq.Context()
-        self.poller, self.device, self.said = Poller(), device, list[Refusal]()
-        self.security = Security(self.context, self.poller, ring, self.said.append)
+        self.poller, self.device, self.refusals = Poller(), device, list[Refusal]()
+        self.security = Security(self.context, self.poller, ring, self.refusals.append)
         self.open: list[Socket] = []
 
     def socket(self, kind: int) -> Socket:
@@ -131,8 +131,8 @@ def receive(ends: list[End], socket: Socket) -> list[zmq.Frame]:
 
 def both_say(server: End, client: End, reason: Reason) -> tuple[str, str]:
     """Final lines of both ends: one each, with the same reason."""
-    run([server, client], lambda: server.said and client.said)
-    (at_server,), (at_client,) = server.said, client.said
+    run([server, client], lambda: server.refusals and client.refusals)
+    (at_server,), (at_client,) = server.refusals, client.refusals
     assert (at_server.reason, at_client.reason) == (reason, reason)
     assert (at_server.device, at_client.device) == (server.device, client.device)
     assert at_client.peer == server.device
@@ -162,7 +162,7 @@ def test_a_key_that_is_unknown_is_told_at_both_ends(
     key = half.public(OPERATOR).decode()[:8]
     assert unnamed(at_server, f"({key}...)", "127.0.0.1") == []
     assert not unnamed(at_client, ROBOT, f"the key of {OPERATOR}")
-    assert client.said[0].gave_up
+    assert client.refusals[0].gave_up
     assert server.security.refused[ROBOT, Reason.UNKNOWN_KEY] == 1
 
 
@@ -173,7 +173,7 @@ def test_a_wrong_server_key_is_told_at_both_ends(ring, other_ring, make, binds, 
     at_server, at_client = both_say(server, client, Reason.WRONG_SERVER_KEY)
     assert f"wrong public key of {ROBOT}" in at_server
     assert f"public key of {ROBOT}" in at_client
-    assert not client.said[0].gave_up
+    assert not client.refusals[0].gave_up
     assert server.security.refused[ROBOT, Reason.WRONG_SERVER_KEY] >= module.PATIENCE
 
 
@@ -206,7 +206,7 @@ def test_requests_and_replies_travel(ring, make, connects, encrypted):
     assert server.security.sender(request) == (OPERATOR if encrypted else None)
     router.send_multipart([who, b"", b"stopped"])
     assert receive(ends, asker)[-1].bytes == b"stopped"
-    assert server.said == client.said == []
+    assert server.refusals == client.refusals == []
     assert client.security.trouble(OPERATOR, ROBOT) is None
 
 
@@ -222,7 +222,7 @@ def test_what_is_published_arrives(ring, make, encrypted):
 
     run([server, client], published)
     assert subscriber.recv_multipart() == [b"status|", b"idle"]
-    assert server.said == client.said == []
+    assert server.refusals == client.refusals == []
 
 
 def test_several_devices_in_one_context(ring, make):
@@ -242,7 +242,7 @@ def test_a_refused_client_can_be_told_to_try_again(ring, other_ring, make, tmp_p
     subscriber.connect(cut(subscriber))
     run([server, client], lambda: server.security.refused[ROBOT, Reason.UNKNOWN_KEY] == 2)
     run([server, client], lambda: client.security.refused[OPERATOR, Reason.UNKNOWN_KEY] == 2)
-    assert len(server.said) == len(client.said) == 1  # once is enough
+    assert len(server.refusals) == len(client.refusals) == 1  # once is enough
     server.security._ring = half  # as if started again with the key known
     subscriber.connect(cut(subscriber))
     run([server, client], lambda: client.security.trouble(OPERATOR, ROBOT) is None)
@@ -254,7 +254,7 @@ def test_a_persistent_client_is_told_once(ring, other_ring, make, monkeypatch):
     server, client = make(ring, ROBOT), make(other_ring, OPERATOR)
     open_both(server, client, zmq.ROUTER, zmq.DEALER)
     run([server, client], lambda: client.security.refused[OPERATOR, Reason.WRONG_SERVER_KEY] > 20)
-    assert len(server.said) == len(client.said) == 1
+    assert len(server.refusals) == len(client.refusals) == 1
     assert len(client.security._handshakes) == 1
 
 
@@ -263,7 +263,7 @@ def test_one_hang_up_is_kept_for_the_time_out_but_not_told(ring, other_ring, mak
     open_both(server, client, zmq.ROUTER, zmq.REQ)
     run([server, client], lambda: client.security.trouble(OPERATOR, ROBOT))
     assert client.security.refused.total() < module.PATIENCE
-    assert client.said == []
+    assert client.refusals == []
 
 
 def test_strangers_without_number_are_not_told_without_end(ring, make, monkeypatch):
@@ -276,8 +276,8 @@ def test_strangers_without_number_are_not_told_without_end(ring, make, monkeypat
         stranger.curve_serverkey = ring.public(ROBOT)
         stranger.connect(endpoint)
     run([server], lambda: server.security.refused[ROBOT, Reason.UNKNOWN_KEY] == 6)
-    assert len(server.said) == 3
-    assert "no more" in str(server.said[-1])
+    assert len(server.refusals) == 3
+    assert "no more" in str(server.refusals[-1])
     assert len(server.security._unknown_keys) == 3
 
 
@@ -292,7 +292,7 @@ def test_a_loop_that_is_late_does_not_stop_the_traffic(ring, make):
             while plain.recv(100):
                 pass
     run([server], lambda: server.security.refused[ROBOT, Reason.PLAIN_CLIENT] == 2500)
-    assert len(server.said) == 1
+    assert len(server.refusals) == 1
 
 
 def test_a_peer_that_only_knocks_is_no_refusal(ring, make):
@@ -304,7 +304,7 @@ def test_a_peer_that_only_knocks_is_no_refusal(ring, make):
         web.sendall(b"GET / HTTP/1.1\r\n\r\n" + bytes(100))
     client.connect(zmq.REQ, ROBOT, endpoint).send(b"list")
     receive([server, client], router)
-    assert server.said == []
+    assert server.refusals == []
 
 
 @pytest.mark.parametrize("encrypted", [True, False])
@@ -313,9 +313,9 @@ def test_a_peer_that_keeps_silent_is_told(ring, make, monkeypatch, encrypted):
     client = make(ring if encrypted else None, OPERATOR)
     with tcp.create_server(("127.0.0.1", 0)) as mute:
         client.connect(zmq.REQ, ROBOT, f"tcp://127.0.0.1:{mute.getsockname()[1]}")
-        run([client], lambda: client.said)
-    assert client.said[0].reason == Reason.SILENT
-    assert f"is it {ROBOT} who listens there?" in str(client.said[0])
+        run([client], lambda: client.refusals)
+    assert client.refusals[0].reason == Reason.SILENT
+    assert f"is it {ROBOT} who listens there?" in str(client.refusals[0])
 
 
 def test_a_peer_that_hangs_up_without_keys_is_told(make):
@@ -327,10 +327,10 @@ def test_a_peer_that_hangs_up_without_keys_is_told(make):
         def hang_up() -> bool:
             with contextlib.suppress(BlockingIOError):
                 rude.accept()[0].close()
-            return bool(client.said)
+            return bool(client.refusals)
 
         run([client], hang_up)
-    assert client.said[0].reason == Reason.CLOSED
+    assert client.refusals[0].reason == Reason.CLOSED
 
 
 def test_without_an_open_door_nobody_gets_in(ring, make):
@@ -338,9 +338,9 @@ def test_without_an_open_door_nobody_gets_in(ring, make):
     router, endpoint = server.bind(zmq.ROUTER)
     server.security.close()
     client.connect(zmq.REQ, ROBOT, endpoint).send(b"list")
-    run([server, client], lambda: client.said)
+    run([server, client], lambda: client.refusals)
     # As good as it can know: hung up, or silent for too long if the machine was busy meanwhile.
-    assert client.said[0].reason in (Reason.WRONG_SERVER_KEY, Reason.SILENT)
+    assert client.refusals[0].reason in (Reason.WRONG_SERVER_KEY, Reason.SILENT)
     assert not router.poll(0)
 
 

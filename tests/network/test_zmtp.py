@@ -264,13 +264,13 @@ def test_what_conflates_keeps_the_newest_and_is_never_full():
 
 class Flow:
     def __init__(self) -> None:
-        self.said: list[str] = []
+        self.calls: list[str] = []
 
     def pause(self) -> None:
-        self.said.append("pause")
+        self.calls.append("pause")
 
     def resume(self) -> None:
-        self.said.append("resume")
+        self.calls.append("resume")
 
 
 def test_a_full_receiver_lets_its_connection_wait_until_half_is_read():
@@ -278,8 +278,8 @@ def test_a_full_receiver_lets_its_connection_wait_until_half_is_read():
     pipe.flow = flow
     for number in range(4):
         pipe.put(number)
-    assert flow.said == ["pause"]
+    assert flow.calls == ["pause"]
     pipe.take()
-    assert flow.said == ["pause"]
+    assert flow.calls == ["pause"]
     pipe.take()
-    assert flow.said == ["pause", "resume"]
+    assert flow.calls == ["pause", "resume"]

@@ -97,7 +97,7 @@ def test_a_gif_has_every_frame_and_moves(film, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("script", "said"),
+    ("script", "expected"),
     [
         ("echo 'Unknown encoder' >&2; exit 3", "ffmpeg .*: Unknown encoder"),
         ("head -c 100000 >/dev/null; kill -9 $$", "ended with -9"),
@@ -105,14 +105,14 @@ def test_a_gif_has_every_frame_and_moves(film, tmp_path):
     ],
 )
 def test_an_ffmpeg_that_fails_is_one_line_and_no_half_film(
-    film, tmp_path, monkeypatch, script, said
+    film, tmp_path, monkeypatch, script, expected
 ):
     ffmpeg_that(tmp_path, monkeypatch, script)
     folder = tmp_path / "out"
     folder.mkdir()
     (folder / "old.mp4").write_bytes(b"old")
     for name in ("film.mp4", "old.mp4"):
-        with pytest.raises(ConfigError, match=said) as error:
+        with pytest.raises(ConfigError, match=expected) as error:
             write_film(film, folder / name)
         assert len(str(error.value).splitlines()) == 1
     assert [(path.name, path.read_bytes()) for path in folder.iterdir()] == [("old.mp4", b"old")]
@@ -400,7 +400,7 @@ def test_everything_wanted_is_written_and_named(drive, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "expected"),
     [
         ({"video": "film.avi"}, "'film.avi' should end in .gif or .mp4"),
         ({"still": "a.gif"}, ".png, .pdf or .svg"),
@@ -414,14 +414,14 @@ def test_everything_wanted_is_written_and_named(drive, tmp_path):
         ({"strip": "a.png", "panels": 0}, "--panels 0 should be from 1 to 24"),
     ],
 )
-def test_what_cannot_be_drawn_is_said_before_the_run(options, said):
+def test_what_cannot_be_drawn_is_said_before_the_run(options, expected):
     paths = {key: Path(options[key]) for key in ("video", "still", "strip") if key in options}
-    with pytest.raises(ConfigError, match=said.replace("[", r"\[")):
+    with pytest.raises(ConfigError, match=expected.replace("[", r"\[")):
         Wanted(**(options | paths))
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "expected"),
     [
         ({"camera": "robot-9"}, "'robot-9' is unknown; known: robot-1, robot-2"),
         ({"at": "121"}, "--at 121 .* 120 s"),
@@ -429,10 +429,10 @@ def test_what_cannot_be_drawn_is_said_before_the_run(options, said):
         ({"at": "nan"}, "--at nan is not"),
     ],
 )
-def test_what_no_run_of_a_scenario_has_is_said_before_the_run(options, said, tmp_path):
+def test_what_no_run_of_a_scenario_has_is_said_before_the_run(options, expected, tmp_path):
     drill = scenarios.build(scenarios.load("fire-drill"), {"horizon_s": 120, "robot.count": 2})
     Wanted(still=tmp_path / "a.png", at="120", camera="robot-2").check(drill)
-    with pytest.raises(ConfigError, match=said):
+    with pytest.raises(ConfigError, match=expected):
         Wanted(still=tmp_path / "a.png", **options).check(drill)
 
 

@@ -30,7 +30,7 @@ def machine():
 
 def address(program, name):
     program.wait_to_say(f"{name}: ")
-    line = next(line for line in program.said.splitlines() if line.startswith(f"{name}: "))
+    line = next(line for line in program.output.splitlines() if line.startswith(f"{name}: "))
     return line.split()[1]
 
 
@@ -44,7 +44,7 @@ def test_a_robot_of_ros_is_driven_by_a_script_at_a_dva_and_stands_in_the_end(pro
         *("live", "drive-to-event", "--only", "operator", "--operators", "scripted"),
         *("--dva", where, "--for", "60"),
     )
-    assert becomes(lambda: "emergency: obeyed" in driver.said)
+    assert becomes(lambda: "emergency: obeyed" in driver.output)
     assert max(speed for speed, _ in machine.commands) > 0.0
     robot.send(signal.SIGINT)
     assert robot.ends() == 0

@@ -110,11 +110,11 @@ def test_odometry_that_is_not_as_it_should_be_is_refused_by_name(path, value, na
     assert unnamed(refused.value, named) == []
 
 
-@pytest.mark.parametrize("said", [None, [], 7, "odometry", {}, {"transforms": 4}])
-def test_what_is_no_message_at_all_is_refused(said):
+@pytest.mark.parametrize("expected", [None, [], 7, "odometry", {}, {"transforms": 4}])
+def test_what_is_no_message_at_all_is_refused(expected):
     read = reader()
     for take in (read.odometry, read.charge, read.picture, read.scan):
         with pytest.raises(BadReading):
-            take(said)
+            take(expected)
     with pytest.raises(BadReading):
-        read.transform(said, None)
+        read.transform(expected, None)

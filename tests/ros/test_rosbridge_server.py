@@ -103,8 +103,8 @@ def test_nobody_drives_without_control_and_two_cannot_have_it(world):
     first, second = driver(world), world.client()
     drive(world, first, 0.3, 0.1)
     second.twist(CMD, 0.5)
-    world.until(lambda: second.said)
-    assert unnamed(second.said[0], "take_control") == []
+    world.until(lambda: second.statuses)
+    assert unnamed(second.statuses[0], "take_control") == []
     taken = second.call(world, "/robot_1/take_control")
     assert (taken["success"], unnamed(taken["message"], "held")) == (False, [])
     assert world.robot("robot-1").set_point.speed != 0.5
@@ -139,8 +139,8 @@ def test_an_emergency_stops_a_robot_whoever_drives_it(world):
     assert other.call(world, "/robot_1/emergency_stop")["success"]
     world.until(lambda: not robot.is_moving)
     assert robot.controller.mode == "Idle"
-    world.until(lambda: client.twist(CMD, 0.3) or client.said)
-    assert unnamed(client.said[-1], "take_control") == []
+    world.until(lambda: client.twist(CMD, 0.3) or client.statuses)
+    assert unnamed(client.statuses[-1], "take_control") == []
 
 
 def test_speeds_are_clamped_and_reverse_means_to_stand(world):
@@ -219,8 +219,8 @@ def test_what_makes_no_sense_is_refused_in_one_line_and_the_drive_goes_on(world,
     client = driver(world)
     robot = drive(world, client, 0.3)
     client.say(BAD[bad])
-    world.until(lambda: client.said)
-    assert "\n" not in client.said[0]
+    world.until(lambda: client.statuses)
+    assert "\n" not in client.statuses[0]
     assert client.is_open
     drive(world, client, 0.2)
     assert math.isfinite(sum(robot.set_point))

@@ -3,7 +3,7 @@ from collections import defaultdict
 import pytest
 from helpers.wording import unnamed
 
-from dva_sim.kernel.config import keys_said_of
+from dva_sim.kernel.config import titled_keys
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import listing, number, percent
 from dva_sim.simulation.labels import (
@@ -99,7 +99,7 @@ def test_a_list_that_a_treatment_sets_is_told_one_by_one():
 def test_a_key_has_one_name_in_all_models():
     titles = defaultdict(set)
     for model in MODELS.values():
-        for path, key in keys_said_of(model.scenario).items():
+        for path, key in titled_keys(model.scenario).items():
             titles[path].add(key.title)
     assert {path: found for path, found in titles.items() if len(found) > 1} == {}
 

@@ -135,7 +135,7 @@ def test_the_program_itself_ends_a_mistake_with_one_line_and_exit_code_2(tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "expected"),
     [
         (["run", "req-rep-vs-pubsub"], "did you mean 'req-rep-vs-pub-sub'?"),
         (["run", "bad.yaml"], "bad.yaml:5:5: unknown key 'parts.drive.refrence'"),
@@ -149,7 +149,7 @@ def test_the_program_itself_ends_a_mistake_with_one_line_and_exit_code_2(tmp_pat
         (["episode", "inside.yaml"], "inside.yaml:2:1: unknown key 'robots'"),
     ],
 )
-def test_a_mistake_ends_in_one_line_and_exit_code_2(tmp_path, words, said):
+def test_a_mistake_ends_in_one_line_and_exit_code_2(tmp_path, words, expected):
     (tmp_path / "bad.yaml").write_text(
         "question: what?\nparts:\n  drive:\n    scenario: drive-to-event\n    refrence: {}\n"
     )
@@ -158,7 +158,7 @@ def test_a_mistake_ends_in_one_line_and_exit_code_2(tmp_path, words, said):
     (tmp_path / "inside.yaml").write_text("horizon_s: 5\nrobots: {}\n")
     ended = call(*words, cwd=tmp_path)
     assert ended.returncode == 2
-    assert said in ended.stderr
+    assert expected in ended.stderr
     assert len(ended.stderr.strip().splitlines()) == 1
     assert "Traceback" not in ended.stderr + ended.stdout
 

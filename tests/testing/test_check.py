@@ -110,7 +110,7 @@ def test_the_place_tells_the_kind_where_the_keys_do_not(check, here):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "expected"),
     [
         ("horizon_s: 5\nrobots: {}\n", "2:1: unknown key 'robots'; did you mean 'robot'?"),
         ("link:\n  delay_s: 0.1\n  los: 0.1\n", "3:3: unknown key 'link.los'; did you mean 'loss'"),
@@ -150,10 +150,10 @@ def test_the_place_tells_the_kind_where_the_keys_do_not(check, here):
         (BOMB, "1:1: has more than 20000"),
     ],
 )  # fmt: skip
-def test_a_mistake_is_told_in_one_line_at_its_place(check, text, said):
+def test_a_mistake_is_told_in_one_line_at_its_place(check, text, expected):
     code, lines = check(f__yaml=text)
     assert code == 1
-    assert lines[0].startswith(f"f.yaml:{said}")
+    assert lines[0].startswith(f"f.yaml:{expected}")
     assert len(lines) == 3
     assert lines[1].endswith(": invalid, 1 problem")
     assert lines[2] == "1 file: 1 invalid"
@@ -258,11 +258,11 @@ def test_the_commands_end_with_the_exit_code(here):
     assert call("check", GOOD).returncode == 0
     assert call("check", "lost.xml").returncode == 2
     assert call("check").returncode == 2
-    refused = call("check", "-", said=good.replace("0.56", "fast"))
+    refused = call("check", "-", stdin=good.replace("0.56", "fast"))
     assert refused.returncode == 1
     assert refused.stdout.startswith("-:12:9: TurnRate 'fast'")
     assert refused.stderr == ""
-    assert call("check", "-", said=good).stdout.startswith("-: message: valid")
+    assert call("check", "-", stdin=good).stdout.startswith("-: message: valid")
 
 
 def test_the_printed_schema_can_be_written_to_a_file(here):

@@ -111,7 +111,7 @@ class Refusing(Plain):
         (but(draw=careless), figures.OPEN, "panels()"),
         (but(draw=meddling), figures.TOUCHES, "read-only"),
         (but(draw=lambda self, _, r: r.table("events")["outcome"][0]), figures.EMPTY, "KeyError"),
-        (but(finish=speechless), figures.UNSAID, "caption ''"),
+        (but(finish=speechless), figures.UNEXPLAINED, "caption ''"),
         (but(tables=("runs", "nowhere")), figures.NEVER, "runs, nowhere"),
         (Misnamed, figures.NAME, "'other' for 'plain'"),
     ],

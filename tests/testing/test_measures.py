@@ -58,7 +58,7 @@ def test_the_shipped_example_keeps_its_promises():
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "expected"),
     [
         (measure(lambda *_: math.inf), "answers what is no finite number and not None: inf of"),
         (measure(lambda *_: "much"), "answers what is no finite number and not None: 'much' of"),
@@ -75,9 +75,9 @@ def test_the_shipped_example_keeps_its_promises():
         (measure(mean_time, low=2.0, high=1.0), "has bounds that nothing is within: 2 to 1"),
     ],
 )
-def test_a_broken_promise_is_told_in_a_plain_line(make, said):
+def test_a_broken_promise_is_told_in_a_plain_line(make, expected):
     outcome = tried(check_measure, make)
-    assert any(line.startswith(said) for line in outcome.broken), outcome.broken
+    assert any(line.startswith(expected) for line in outcome.broken), outcome.broken
 
 
 def test_a_measure_that_never_says_anything_earns_a_warning():
@@ -97,20 +97,20 @@ def test_a_measure_of_no_model_of_ours_cannot_be_tried():
 
 
 @pytest.mark.parametrize(
-    ("body", "said"),
+    ("body", "expected"),
     [
         ("def of(self, recording): return 1.0", "should say what it is: about = Measure"),
         ("about = Measure('a b', 'x')\n    def of(self, r): return 1.0", "is called 'a b'; should"),
         ("about = Measure('b_s', 'x')", "has no of(recording); should define it"),
     ],
 )
-def test_a_class_that_is_no_measure_is_refused_in_one_line(tmp_path, body, said):
+def test_a_class_that_is_no_measure_is_refused_in_one_line(tmp_path, body, expected):
     head = (
         "from dva_sim.kernel.measure import Measure\n"
         "from dva_sim.simulation.run_measures import RunMeasure\n"
     )
     (tmp_path / "mine.py").write_text(f"{head}class Mine(RunMeasure):\n    {body}\n")
-    with pytest.raises(ConfigError, match=said.replace("(", r"\(").replace(")", r"\)")):
+    with pytest.raises(ConfigError, match=expected.replace("(", r"\(").replace(")", r"\)")):
         load_measure("mine.py:Mine", tmp_path)
 
 

@@ -61,7 +61,7 @@ ROWS = '"heads": sum(recording), '
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "expected"),
     [
         ('Streams(seed)["coin"].integers(0, 2, min(scenario.throws, 20)).tolist()',
          "[random.randint(0, 1) for _ in range(9)]", "comes to something else with the same seed"),
@@ -84,9 +84,9 @@ ROWS = '"heads": sum(recording), '
          "        return (type(self), ())", "raises: "),
     ],
 )  # fmt: skip
-def test_a_broken_promise_is_told_in_a_plain_line(tmp_path, old, new, said):
+def test_a_broken_promise_is_told_in_a_plain_line(tmp_path, old, new, expected):
     outcome = tried(check_model, coin(tmp_path, (old, new)), {})
-    assert any(line.startswith(said) for line in outcome.broken), outcome.broken
+    assert any(line.startswith(expected) for line in outcome.broken), outcome.broken
 
 
 def test_a_model_that_heeds_no_seed_earns_a_warning(tmp_path):

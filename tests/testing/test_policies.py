@@ -91,7 +91,7 @@ def moves_all(self, situation, rng):
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "expected"),
     [
         (policy(lambda *_: None), "returns no sequence of advice: a NoneType in situation 1 "),
         (policy(lambda *_: (x for x in ())), "returns no sequence of advice: a generator"),
@@ -114,9 +114,9 @@ def moves_all(self, situation, rng):
         (policy(moves_all, relocates=True, preempts=True), "relocates somebody who is under way"),
     ],
 )  # fmt: skip
-def test_a_broken_promise_is_told_in_a_plain_line(fewer, make, said):
+def test_a_broken_promise_is_told_in_a_plain_line(fewer, make, expected):
     outcome = tried(check_policy, make, count=41)
-    assert any(line.startswith(said) for line in outcome.broken), outcome.broken
+    assert any(line.startswith(expected) for line in outcome.broken), outcome.broken
 
 
 def test_robots_beyond_the_operators_are_a_warning(fewer):

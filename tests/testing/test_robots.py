@@ -46,7 +46,7 @@ def brakes_beyond_zero(_along, turn, now, _speed):
 
 
 @pytest.mark.parametrize(
-    ("drive", "said"),
+    ("drive", "expected"),
     [
         (aims(lambda speed, turn: (2 * speed, turn)), "aims at a speed beyond the limits: ("),
         (aims(lambda speed, turn: (speed, 2 * turn)), "aims at a turn rate beyond the limit: ("),
@@ -63,13 +63,13 @@ def brakes_beyond_zero(_along, turn, now, _speed):
         (answers(lambda along, turn, *_: (max(along, 0.0), turn)), "within a minute: 0.5 m/s"),
     ],
 )
-def test_a_broken_promise_is_told_in_a_plain_line(fewer, drive, said):
+def test_a_broken_promise_is_told_in_a_plain_line(fewer, drive, expected):
     outcome = tried(check_robot, drive)
-    assert any(said in line for line in outcome.broken), outcome.broken
+    assert any(expected in line for line in outcome.broken), outcome.broken
 
 
 @pytest.mark.parametrize(
-    ("names", "options", "said"),
+    ("names", "options", "expected"),
     [
         (["robot", "servrobut"], [], "did you mean 'servrobot'?"),
         (["robot", "tracked"], ["scrub=2"], "option 'scrub' is 2; "),
@@ -77,10 +77,10 @@ def test_a_broken_promise_is_told_in_a_plain_line(fewer, drive, said):
         (["robot", "pibot"], ["steering_deg=90"], "is 90; should be in (0, 80)"),
     ],
 )
-def test_a_mistake_is_one_line(names, options, said, capsys):
+def test_a_mistake_is_one_line(names, options, expected, capsys):
     assert checks.check(names, options) == 1
     out = capsys.readouterr().out
-    assert said in out
+    assert expected in out
     assert len(out.splitlines()) == 2
 
 

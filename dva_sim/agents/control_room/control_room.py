@@ -98,19 +98,19 @@ class ControlRoomAgent:
         if message is not None:
             self._take(message.body)
 
-    def _take(self, said: object) -> None:
-        match said:
+    def _take(self, body: object) -> None:
+        match body:
             case m.EventStatus():
-                self._note(said)
+                self._note(body)
             case m.EventList(events=events):
                 for status in events:
                     self._note(status)
             case m.DispatchStatus():
-                self._switched(said)
+                self._switched(body)
             case m.DeviceList(devices=devices):
                 self.devices = {device.id_tag: device for device in devices}
             case m.AuditRecord():
-                self.on_record(said)
+                self.on_record(body)
 
     def _note(self, status: m.EventStatus) -> None:
         """Note the state of an event; replies may overtake publications."""

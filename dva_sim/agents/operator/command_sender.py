@@ -9,7 +9,7 @@ from dva_sim.agents.device import HOLDER, AgentDevice, command_topic
 from dva_sim.agents.operator.refusals import Refusals
 from dva_sim.agents.tilt import TiltApp, TiltCommand, TiltSources
 from dva_sim.kernel.makers import maker
-from dva_sim.kernel.plugins import FAILURES, said
+from dva_sim.kernel.plugins import FAILURES, error_text
 from dva_sim.kernel.recorder import DriveLog, make_issued
 from dva_sim.network.messaging import Requester, Subscription
 from dva_sim.network.patterns import PATTERNS, Pattern
@@ -190,7 +190,7 @@ class CommandSender:
             if type(self._pattern) in PATTERNS.values():
                 raise
             self.failures += 1
-            self.first_failure = self.first_failure or said(error)
+            self.first_failure = self.first_failure or error_text(error)
 
     # --- for the pattern -----------------------------------------------------------------
 

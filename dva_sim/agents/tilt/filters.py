@@ -19,7 +19,7 @@ from typing_extensions import override
 from dva_sim.agents.tilt.calibration import NEUTRAL, Reading
 from dva_sim.kernel import options
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.plugins import FAILURES, Guard, Plugins, said
+from dva_sim.kernel.plugins import FAILURES, Guard, Plugins, error_text
 
 BATCH: Final = 20  # source: the document: slots of the dissertation's buffer
 MOST_BATCH: Final = 1000  # design: samples of a batch
@@ -325,7 +325,7 @@ class GuardedFilter(Guard, Filter):
             self._took = True
         except FAILURES as error:
             self._took = False
-            self._count(said(error))
+            self._count(error_text(error))
 
     @override
     def value(self) -> Reading:
@@ -340,5 +340,5 @@ class GuardedFilter(Guard, Filter):
                 return float(age)
             self._count(f"is {age!r} samples old")
         except FAILURES as error:
-            self._count(said(error))
+            self._count(error_text(error))
         return 0.0

@@ -16,7 +16,7 @@ from typing_extensions import override
 
 from dva_sim.agents.tilt.calibration import LEVELS, MAX_TURN_DEG, NEUTRAL, Reading
 from dva_sim.kernel import options
-from dva_sim.kernel.plugins import FAILURES, Guard, Plugins, said
+from dva_sim.kernel.plugins import FAILURES, Guard, Plugins, error_text
 
 
 class Mapping(ABC):
@@ -284,7 +284,7 @@ class GuardedMapping(Guard, Mapping):
         try:
             self._mapping.begin()
         except FAILURES as error:
-            self._count(said(error))
+            self._count(error_text(error))
 
     @override
     def command(self, level: float, turn: float, dt: float) -> Reading:

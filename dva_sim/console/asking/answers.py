@@ -59,12 +59,12 @@ class Answers:
             del self.given[oldest]
             self._at.pop(oldest, None)
 
-        def said(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
+        def answer_with(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
             answer: DoneLine = {"k": "done", "id": number, "ok": ok, "text": text, **more}
             self.given[number], self._at[number] = answer, time.monotonic()
             tell(answer)
 
-        answering(do, said)
+        answering(do, answer_with)
 
 
 def answering(do: Callable[[OnResult], object], on_result: OnResult) -> None:

@@ -45,7 +45,7 @@ class Takeover:
         on_result: OnResult,
     ) -> None:
         self._agent, self._robot, self._reason = agent, robot, reason
-        self._event, self._seat, self._take, self._said = event, seat, take, on_result
+        self._event, self._seat, self._take, self._on_result = event, seat, take, on_result
         self._tries = 0
 
     def begin(self) -> None:
@@ -56,11 +56,11 @@ class Takeover:
             self._agent.ask(m.Revoke(self._robot, self._reason), self._revoked, self._lost)
 
     def _lost(self) -> None:
-        unanswered(self._said)
+        unanswered(self._on_result)
 
     def _revoked(self, reply: m.Reply) -> None:
         if reply.code != m.OK:
-            self._said(False, why(reply))
+            self._on_result(False, why(reply))
         elif self._event is None:
             self._ask_for_it()
         else:
@@ -97,7 +97,7 @@ class Takeover:
 
     def _taken(self, ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
         if ok or not self._has_another_try():
-            self._said(ok, text, **more)
+            self._on_result(ok, text, **more)
         else:
             self._agent.device.clock.call_after(AGAIN, self._ask_for_it)
 

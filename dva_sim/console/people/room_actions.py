@@ -130,7 +130,7 @@ class RoomActions:
     # --- robots -----------------------------------------------------------------------------
 
     @does("mission")
-    def _mission(self, client: str, line: MissionAsked, said: OnResult) -> None:
+    def _mission(self, client: str, line: MissionAsked, on_result: OnResult) -> None:
         """Have a robot go to an event by itself, and look at it."""
         status = self._rooms.listener.events.get(line["event"])
         if status is None:
@@ -141,10 +141,10 @@ class RoomActions:
         def send(room: ConsoleRoom, on_result: OnResult) -> None:
             send_on_mission(room.device, robot, label, body, on_result)
 
-        self._room(client, line, said, send)
+        self._room(client, line, on_result, send)
 
     @does("take_over")
-    def _take_over(self, client: str, line: TakeoverAsked, said: OnResult) -> None:
+    def _take_over(self, client: str, line: TakeoverAsked, on_result: OnResult) -> None:
         """Take a robot and its task from its driver into the client's own seat."""
         robot, reason = self._robot(line["robot"]), line["reason"]
 
@@ -174,4 +174,4 @@ class RoomActions:
                 on_result=ended,
             ).begin()
 
-        self._room(client, line, said, begin)
+        self._room(client, line, on_result, begin)

@@ -140,15 +140,17 @@ class PhoneSeat:
         if self.driven is None:
             self.new_tilt()
 
-    def take(self, said: Samples, came: float) -> bool:
+    def take(self, samples: Samples, came: float) -> bool:
         """Samples have come; whether one of them is new.
 
         Args:
-            said: New samples.
+            samples: New samples.
             came: Arrival time, real time [s].
         """
-        fresh = [pair for pair in zip(said.at, said.xyz, strict=True) if not self._is_old(pair[0])]
-        self._count(said, len(fresh))
+        fresh = [
+            pair for pair in zip(samples.at, samples.xyz, strict=True) if not self._is_old(pair[0])
+        ]
+        self._count(samples, len(fresh))
         if not fresh:
             return False
         reports = [at for at, _ in fresh]
@@ -159,7 +161,7 @@ class PhoneSeat:
         self._came = came
         driven = self.driven
         if driven is not None and self.tilts:
-            driven.tilted(said.first + len(said.at) - 1, self._at)
+            driven.tilted(samples.first + len(samples.at) - 1, self._at)
         elif driven is None:
             self.tilt.look(self._clock.now)  # the screen shows what would be sent
         return True
@@ -176,13 +178,13 @@ class PhoneSeat:
     def _is_old(self, told: float) -> bool:
         return self._times.is_old(told)
 
-    def _count(self, said: Samples, fresh: int) -> None:
-        gap = said.first - self._next
+    def _count(self, samples: Samples, fresh: int) -> None:
+        gap = samples.first - self._next
         if self.samples and gap > 0:
             self.lost += min(gap, MOST_GAP)
         self.samples += fresh
-        self._next = said.first + len(said.at)
-        if self._told and said.at[-1] < self._told[-1]:
+        self._next = samples.first + len(samples.at)
+        if self._told and samples.at[-1] < self._told[-1]:
             self._told.clear()
 
     # --- what it tells -----------------------------------------------------------------------

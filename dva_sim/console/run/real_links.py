@@ -129,7 +129,7 @@ class ConsoleSockets:
         )
         if self.crossing is not None:
             clock.every(LOOK_AT_LINK, self._look_at_link)
-        self._said = Senders(self.network.is_here)
+        self._senders = Senders(self.network.is_here)
 
     def begin(self) -> None:
         """Let the time of the emulated link, if there is one, begin with that of the world."""
@@ -181,12 +181,12 @@ class ConsoleSockets:
                 return
             to, source = ends[1].decode(), ends[2].decode()
             if sent:
-                self._said.note(node, payload)
+                self._senders.note(node, payload)
                 listener.sent(now, node, to, payload)
                 self._recorder.message_sent(now, node, to, len(payload), payload)
             else:
                 self._recorder.message_taken(node, payload)
-                listener.delivered(now, self._said.sender(source, payload), node, payload)
+                listener.delivered(now, self._senders.sender(source, payload), node, payload)
 
         self.network.watcher = note
 

@@ -92,19 +92,19 @@ def change_pattern(
     persons: Sequence[PersonAgent],
     robot: str,
     name: str,
-    said: Callable[[bool, str], object],
+    on_result: Callable[[bool, str], object],
 ) -> None:
     """Drive a robot by another pattern from the next drive on; a drive is stopped first."""
     agent = run.field.robots[robot]
 
     def change(ok: bool = True, text: str = "") -> None:
         if agent.controller.mode is Mode.TELEOPERATION:
-            said(False, text or f"{agent.device.label} is driven: it has to be stopped first")
+            on_result(False, text or f"{agent.device.label} is driven: it has to be stopped first")
             return
         run.stage.pattern_names[robot] = name
         agent.expect(run.stage.pattern_for(robot))
         run.recorder.tell(run.clock.now, agent.device.label, f"is driven by {name}", "link")
-        said(True, "")
+        on_result(True, "")
 
     holder = next((p.robots[robot] for p in persons if robot in p.robots), None)
     if holder is not None and holder.is_driven:

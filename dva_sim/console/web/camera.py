@@ -18,11 +18,13 @@ class ConsoleCameras(CameraStreams):
 
     Args:
         simulation: Simulation, which gets the list of watched robots.
-        said: Robots watched by pages that say so.
+        watched_elsewhere: Robots watched by pages that say so.
     """
 
-    def __init__(self, simulation: Simulation, said: Callable[[], Iterable[int]]) -> None:
-        super().__init__(self._say_watched, said)
+    def __init__(
+        self, simulation: Simulation, watched_elsewhere: Callable[[], Iterable[int]]
+    ) -> None:
+        super().__init__(self._say_watched, watched_elsewhere)
         self._simulation = simulation
         self._pipe: WatchedEnd | None = None
         self._ok = True

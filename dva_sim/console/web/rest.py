@@ -154,9 +154,9 @@ class Rest:
         except BadMessage as error:
             return problem(400, str(error))
 
-    def _robots_of(self, said: dict[str, Any]) -> dict[str, Any]:
+    def _robots_of(self, body: dict[str, Any]) -> dict[str, Any]:
         """The robots to stop: those that are known of a list, and all if none of it is."""
-        named, labels = said.get("robots", "all"), self._simulation.labels
+        named, labels = body.get("robots", "all"), self._simulation.labels
         if not isinstance(named, list):
             return {"robots": named}
         known = [
@@ -167,20 +167,20 @@ class Rest:
         ]
         return {"robots": known or "all"}
 
-    def _client(self, said: dict[str, Any], role: Role) -> str:
+    def _client(self, body: dict[str, Any], role: Role) -> str:
         """The name of the page or program that asks.
 
         Raises:
             NotAllowed: it shows no key that belongs to a seat of its role.
         """
-        if "key" in said:
-            known = self._hub.clients.find(said["key"], role)
+        if "key" in body:
+            known = self._hub.clients.find(body["key"], role)
             if known is None:
                 raise NotAllowed("key: no open page and no program of this role has this key")
             if known.asked:
                 known.asked = time.monotonic()
             return known.name
-        if "client" in said:
+        if "client" in body:
             raise NotAllowed("client: a name opens no seat; send the key of that page or program")
         return _program(role)
 

@@ -120,9 +120,9 @@ def _feed(process: subprocess.Popen[bytes], first: bytes, frames: Iterator[Any])
     process.wait()
 
 
-def _last_line(said: IO[bytes], process: subprocess.Popen[bytes]) -> str:
-    said.seek(0)
-    lines = said.read().decode(errors="replace").strip().splitlines()
+def _last_line(stderr: IO[bytes], process: subprocess.Popen[bytes]) -> str:
+    stderr.seek(0)
+    lines = stderr.read().decode(errors="replace").strip().splitlines()
     if lines:
         return lines[-1]
     return f"it ended with {process.returncode}; a negative number is the signal that killed it"

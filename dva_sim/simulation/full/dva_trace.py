@@ -268,10 +268,10 @@ class _Again:
                 return core.close()
         raise ValueError(f"{entry['do']!r} does not happen to a DVA")
 
-    def _answered(self, send: Send, said: str | None, now: float) -> list[Send]:
-        if said is None:
+    def _answered(self, send: Send, reply_xml: str | None, now: float) -> list[Send]:
+        if reply_xml is None:
             return self._core.undelivered(send, now)
-        reply = decode(said.encode()).body
+        reply = decode(reply_xml.encode()).body
         assert isinstance(reply, m.Reply)
         if reply.code == m.OK:
             return self._core.delivered(send, now, reply.content)

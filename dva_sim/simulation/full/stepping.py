@@ -84,9 +84,9 @@ class SteppedDrive:
         known = lambda: self._is_known and self._robot in robots  # noqa: E731
         self._pass_until(known, "the DVA does not come to know the robot and its driver")
         self._person.sit_down()
-        self._person.take([self._robot], self._said)
+        self._person.take([self._robot], self._on_result)
         self._pass_until(self._holds("held"), "the DVA gives no permission")
-        self._person.start(self._said)
+        self._person.start(self._on_result)
         self._pass_until(self._holds("driving"), "the robot does not start")
         self._pass_until(lambda: self.frame is not None, "no picture arrives")
         assert self.frame is not None
@@ -118,7 +118,7 @@ class SteppedDrive:
     def _holds(self, phase: str) -> Callable[[], bool]:
         return lambda: self.held is not None and self.held.phase == phase
 
-    def _said(self, done: bool, text: str) -> None:
+    def _on_result(self, done: bool, text: str) -> None:
         self._refusal = "" if done else text
 
     def _pass_until(self, reached: Callable[[], bool], otherwise: str) -> None:

@@ -125,11 +125,11 @@ def _suited(key: str, hint: Any, value: Any, scenario: TimedScenario) -> Any:
     return 1 / value.mean if is_rate else value.mean
 
 
-def _checked(key: str, hint: Any, value: Any, said: Any) -> Any:
+def _checked(key: str, hint: Any, value: Any, original: Any) -> Any:
     """A parameter, if it is of the kind that the formula wants."""
     if _wants_law(hint):
         return value
-    return _valid(TypeAdapter(hint), value, f"{key} {said!r} does not fit")
+    return _valid(TypeAdapter(hint), value, f"{key} {original!r} does not fit")
 
 
 def _valid(adapter: TypeAdapter[A], value: Any, wrong: str) -> A:

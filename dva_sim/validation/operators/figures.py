@@ -216,7 +216,7 @@ def _waiting(lines: ByLine, cells: Cells) -> Drawn:
     through(times, line, (delays.min(), delays.max()), color=SOFT, lw=1.0, zorder=1)
     times.set_ylabel("completion time [s]")
     r2 = lines["S13/linear"].found.value
-    times.set_title(f"Completion time: slope {round(line.slope, 2) + 0.0:.2f}, R² {_said(r2, 4)}")
+    times.set_title(f"Completion time: slope {round(line.slope, 2) + 0.0:.2f}, R² {_fixed(r2, 4)}")
     points(waits, delays.tolist(), [person_means(t, "waits") for t in cells.values()])
     waits.axhspan(line.slope - 0.5, line.slope + 0.5, color=FAINT, alpha=0.55, lw=0)
     waits.set(ylabel="waits in a trial", title="Waits, and the slope ± 0.5")
@@ -251,11 +251,11 @@ def _frames(lines: ByLine, cells: Cells) -> Drawn:
     left.legend(fontsize=8, title="frames")
     right.set_xlabel(f"delay + {c:.2f} / frame rate [s]")
     edge = ", factor at the edge of what was tried" if c in of.TRIED["S15/c"] else ""
-    right.set_title(f"On one line: R² {_said(lines['S15/collapse'].found.value, 3)}{edge}")
+    right.set_title(f"On one line: R² {_fixed(lines['S15/collapse'].found.value, 3)}{edge}")
     return captioned(figure, "frames")
 
 
-def _said(value: float, digits: int) -> str:
+def _fixed(value: float, digits: int) -> str:
     """A number, if it is one."""
     return "none" if np.isnan(value) else f"{value:.{digits}f}"
 

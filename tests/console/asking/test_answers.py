@@ -8,9 +8,9 @@ from dva_sim.kernel.errors import ConfigError, DvaSimError
 def test_an_action_is_done_once_and_answered_as_often_as_it_is_said():
     answers, done, reports = Answers(), [], []
 
-    def do(said):
+    def do(on_result):
         done.append(1)
-        said(True, "done", more=3)
+        on_result(True, "done", more=3)
 
     for _ in range(3):
         answers.once("1", do, reports.append)
@@ -30,7 +30,7 @@ def test_who_asks_again_before_there_is_an_answer_is_told_with_it():
 
 @pytest.mark.parametrize("error", [Refused("no"), ConfigError("no"), DvaSimError("no")])
 def test_what_is_refused_is_the_answer(error):
-    def do(said):
+    def do(on_result):
         raise error
 
     answers, reports = Answers(), []
@@ -41,5 +41,5 @@ def test_what_is_refused_is_the_answer(error):
 def test_answers_are_forgotten_in_time():
     answers = Answers()
     for number in range(Answers.MOST + 10):
-        answers.once(str(number), lambda said: said(True, ""), lambda _: None)
+        answers.once(str(number), lambda on_result: on_result(True, ""), lambda _: None)
     assert len(answers.given) == Answers.MOST

@@ -28,7 +28,7 @@ def number(page: AttachedPage, label: str) -> int:
     return next(t["i"] for t in page.told("scene")[-1]["things"] if t["label"] == label)
 
 
-def said_by(page: AttachedPage) -> list[bytes]:
+def sent_by(page: AttachedPage) -> list[bytes]:
     """Messages sent by the console's own control room."""
     return [data for source, _, data in page.world.heard if source == OWN]
 
@@ -45,7 +45,7 @@ def test_a_robot_goes_and_looks_by_itself_and_is_given_back(page):
 
     story = [line["what"] for line in page.told("story")]
     assert any(unnamed(what, "mission", "robot-1", "done") == [] for what in story)
-    sent = [data for data in said_by(page) if isinstance(data, bytes)]
+    sent = [data for data in sent_by(page) if isinstance(data, bytes)]
     kinds = {type(decode(data).body) for data in sent}
     assert {m.PermissionRequest, m.Inspect, m.GetMissionStatus, m.PermissionRevocation} <= kinds
     assert [found for data in sent for found in check_message(data)] == []
@@ -71,7 +71,7 @@ def test_a_robot_that_falls_silent_on_its_way_is_given_back(page):
     page.until(lambda: "how its mission stands is unknown" in str(page.told("story")))
     page.let(1.0)
 
-    given_back = [decode(data).body for data in said_by(page) if isinstance(data, bytes)][-9:]
+    given_back = [decode(data).body for data in sent_by(page) if isinstance(data, bytes)][-9:]
     assert any(isinstance(body, m.PermissionRevocation) for body in given_back)
 
 

@@ -138,7 +138,7 @@ class Visit:
         """An empty page, whose errors are noted."""
         tab = self.context.new_page()
         tab.on("pageerror", lambda error: self.errors.append(str(error)))
-        tab.on("console", lambda said: self._note(said.type, said.text))
+        tab.on("console", lambda message: self._note(message.type, message.text))
         tab.on("dialog", self._refuse)
         return tab
 

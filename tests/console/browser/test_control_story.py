@@ -43,11 +43,11 @@ def fire_in_hand(page: Page) -> None:
     )
 
 
-def in_order(wanted: tuple[str, ...] | tuple[bytes, ...], said: list[str] | list[bytes]) -> None:
+def in_order(wanted: tuple[str, ...] | tuple[bytes, ...], lines: list[str] | list[bytes]) -> None:
     """Assert that the wanted texts occur in this order."""
     at = -1
     for one in wanted:
-        found = (n for n, text in enumerate(said) if n > at and one in text)
+        found = (n for n, text in enumerate(lines) if n > at and one in text)
         at = next(found, -1)
         assert at >= 0, one
 
@@ -92,7 +92,7 @@ def test_a_fire_is_acknowledged_sent_to_taken_over_reached_over_250_ms_and_confi
     assert console.ends() == 0
     for file in (record, audit):
         checked = programs.start("check", file)
-        assert checked.ends() == 0, checked.said + checked.complained
+        assert checked.ends() == 0, checked.output + checked.complained
     in_order(ROWS, [row.action for row in read_rows(audit)])
     sent = list(read_recording(record).playback.recorder.traffic or ())
     reports = [one.payload for one in sent if isinstance(one.payload, bytes)]
@@ -117,4 +117,4 @@ def test_people_decide_over_real_links_too(tmp_path, visit, programs):
     console.send(signal.SIGINT)
     assert console.ends() == 0
     checked = programs.start("check", audit)
-    assert checked.ends() == 0, checked.said + checked.complained
+    assert checked.ends() == 0, checked.output + checked.complained

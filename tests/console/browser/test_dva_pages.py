@@ -41,7 +41,7 @@ class Peer:
 
     def __init__(self, console: Program) -> None:
         console.wait_to_say("DVA:")
-        (address,) = re.findall(r"^DVA: +(\S+)", console.said, re.MULTILINE)
+        (address,) = re.findall(r"^DVA: +(\S+)", console.output, re.MULTILINE)
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.DEALER)
         self._socket.linger = 0

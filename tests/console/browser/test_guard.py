@@ -35,7 +35,7 @@ def tap(page: Page, name: str) -> None:
     page.get_by_role("button", name=name, exact=True).tap()
 
 
-def said(page: Page, what: str) -> list[dict]:
+def sent(page: Page, what: str) -> list[dict]:
     return [line for line in page.evaluate("window.sent") if line.get("do") == what]
 
 
@@ -48,15 +48,15 @@ def test_an_order_is_accepted_and_followed_to_its_end(page):
     expect(page.get_by_text("42 m away from the event. Have you arrived?")).to_be_visible()
     tap(page, "Not yet")
     expect(page.get_by_text("Have you arrived?")).to_have_count(0)
-    assert "arrived" not in [line["what"] for line in said(page, "guard_say")]
+    assert "arrived" not in [line["what"] for line in sent(page, "guard_say")]
     for name in ("Arrived", "Yes, arrived", "Confirm"):
         tap(page, name)
     expect(order).to_contain_text("You: confirmed.")
     tap(page, "Contained")
     expect(order).to_contain_text("No order")
     steps = ["departed", "arrived", "confirmed", "contained"]
-    assert [line["what"] for line in said(page, "guard_say")] == steps
-    assert said(page, "guard_answer")[0]["accept"] is True
+    assert [line["what"] for line in sent(page, "guard_say")] == steps
+    assert sent(page, "guard_answer")[0]["accept"] is True
 
 
 def test_an_order_is_declined_with_a_reason(page):
@@ -64,19 +64,19 @@ def test_an_order_is_declined_with_a_reason(page):
     page.get_by_label("Reason").fill("I am hurt")
     tap(page, "Decline")
     expect(page.get_by_role("region", name="Order")).to_contain_text("declined: I am hurt")
-    asked = said(page, "guard_answer")
+    asked = sent(page, "guard_answer")
     assert [(line["accept"], line["reason"]) for line in asked] == [(False, "I am hurt")]
 
 
 def test_help_is_asked_for_and_an_event_reported_where_one_is(page):
     tap(page, "Help")
-    assert becomes(lambda: said(page, "guard_say"))
+    assert becomes(lambda: sent(page, "guard_say"))
     page.get_by_text("Report an event").tap()
     page.get_by_label("Kind").select_option("flood")
     page.get_by_label("Severity").select_option("critical")
     tap(page, "Report at my position")
     expect(page.get_by_role("status", name="Report")).to_have_text("Told: flood reported")
-    asked = said(page, "guard_report")[0]
+    asked = sent(page, "guard_report")[0]
     assert (asked["kind"], asked["severity"]) == ("flood", "critical")
     assert asked["x_m"] != 0
 
@@ -87,11 +87,11 @@ def test_a_tap_on_the_map_tells_where_one_is(page):
     box = ground.bounding_box()
     assert box
     page.touchscreen.tap(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    assert becomes(lambda: said(page, "guard_place"))
+    assert becomes(lambda: sent(page, "guard_place"))
     expect(page.get_by_role("button", name="I am here …")).to_be_visible()
     page.touchscreen.tap(box["x"] + box["width"] / 3, box["y"] + box["height"] / 2)
     page.wait_for_timeout(200)
-    assert len(said(page, "guard_place")) == 1  # without being asked a tap tells nothing
+    assert len(sent(page, "guard_place")) == 1  # without being asked a tap tells nothing
 
 
 def test_who_is_taken_is_not_given_twice(page, world, visits):
@@ -121,11 +121,11 @@ def test_the_place_by_satellite_counts_where_the_site_lies_there(world, visits, 
     tap(page, "guard-2")
     tap(page, "By satellite")
     if there:
-        assert becomes(lambda: said(page, "guard_place"))
-        asked = said(page, "guard_place")[0]
+        assert becomes(lambda: sent(page, "guard_place"))
+        asked = sent(page, "guard_place")[0]
         assert asked["y_m"] == pytest.approx(ymin + 5, abs=0.1)
         assert asked["x_m"] == pytest.approx(0, abs=0.1)
     else:
         expect(page.get_by_role("alert")).to_contain_text("not at this scenario’s site")
-        assert said(page, "guard_place") == []
+        assert sent(page, "guard_place") == []
     tap(page, "Leave")

@@ -51,7 +51,7 @@ def test_a_phone_registers_drives_by_tilt_and_is_a_row(visits, programs, tmp_pat
     words = ("--record", record, "-o", out, "--keep-motion", motion, "--links", links)
     console = programs.start("console", "--no-open", *WORDS, *words)
     console.wait_to_say("Each phone must trust this computer once")
-    phone = re.findall(r"^Phone: (\S+)", console.said, re.MULTILINE)[0]
+    phone = re.findall(r"^Phone: (\S+)", console.output, re.MULTILINE)[0]
 
     hand = Hand(visits(**SCREEN, **UNTRUSTED), phone)
     hand.register("Jane's phone")
@@ -73,7 +73,7 @@ def test_a_phone_registers_drives_by_tilt_and_is_a_row(visits, programs, tmp_pat
     assert console.ends() == 0, console.complained
 
     check = programs.start("check", record)
-    assert check.ends() == 0, check.said
+    assert check.ends() == 0, check.output
     drives = Results.load(out).table("drives")
     assert set(drives["person_label"]) == {"person-1"}
     assert set(drives["pipeline"]) == {"default"}

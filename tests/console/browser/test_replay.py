@@ -55,7 +55,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., 
         def start(*words: str | Path, programs: Programs = programs) -> str:
             console = programs.start(*words, "--no-open", "--port", "0")
             console.wait_to_say("Console:")
-            return re.findall(r"^Console: +(\S+)", console.said, re.MULTILINE)[0]
+            return re.findall(r"^Console: +(\S+)", console.output, re.MULTILINE)[0]
 
         yield start
 

@@ -33,9 +33,9 @@ def a_robot(programs: Programs, visit, *words: str) -> tuple[Program, Page, str]
     robot = programs.start("robot", *words, "--no-open", "--port", "0")
     robot.wait_to_say("Console:", "Robot:")
     page = visit.tab()
-    page.goto(re.findall(r"^Console: +(\S+)", robot.said, re.MULTILINE)[0])
+    page.goto(re.findall(r"^Console: +(\S+)", robot.output, re.MULTILINE)[0])
     expect(page.get_by_role("list", name="State")).to_be_visible()
-    return robot, page, re.findall(r"^Robot: +(\S+)", robot.said, re.MULTILINE)[0]
+    return robot, page, re.findall(r"^Robot: +(\S+)", robot.output, re.MULTILINE)[0]
 
 
 def state(page: Page) -> str:

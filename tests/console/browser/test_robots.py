@@ -22,7 +22,7 @@ def addresses(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[str]]:
     for programs in all_gone_after(tmp_path_factory.mktemp("consoles")):
         console, drive = started(programs, *QUIET)
         console.wait_to_say("Look only:")
-        yield [drive, *re.findall(r"^Look only: +(\S+)$", console.said, re.MULTILINE)]
+        yield [drive, *re.findall(r"^Look only: +(\S+)$", console.output, re.MULTILINE)]
 
 
 @pytest.fixture

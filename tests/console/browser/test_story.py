@@ -59,7 +59,7 @@ def test_who_drives_over_an_emulated_link_sees_what_it_takes(visit, programs):
     page.close()
     console.send(signal.SIGINT)
     assert console.ends() == 0
-    assert unnamed(console.said, "S1 held", "to the robots: ") == []
+    assert unnamed(console.output, "S1 held", "to the robots: ") == []
     assert programs.processes() == {}
 
 
@@ -93,7 +93,7 @@ def test_a_fire_is_reached_by_keys_over_500_ms_and_confirmed(tmp_path, visit, pr
 def test_an_image_element_shows_what_a_robot_of_a_live_run_sees(programs, browser):
     run = programs.start("live", "drive-to-event", "--camera-port", "0")
     run.wait_to_say("shows pictures of the robots at http://")
-    url = re.search(r"at (http://127\.0\.0\.1:\d+/camera/)LABEL", run.said)
+    url = re.search(r"at (http://127\.0\.0\.1:\d+/camera/)LABEL", run.output)
     assert url is not None
     page = browser.new_page()
     page.set_content(f'<img src="{url[1]}robot-1.mjpg">', wait_until="commit")

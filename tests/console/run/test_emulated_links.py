@@ -108,7 +108,7 @@ def test_ctrl_c_ends_the_link_and_everything_at_its_ends(programs):
     run.wait_to_say("DVA: 127.0.0.1:")
     run.send(signal.SIGINT)
     assert run.ends() == 0, run.complained
-    assert unnamed(run.said, "S1 held", "to the robots: ", "from the robots: ") == []
+    assert unnamed(run.output, "S1 held", "to the robots: ", "from the robots: ") == []
     assert programs.processes() == {}
 
 

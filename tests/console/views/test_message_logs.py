@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from helpers.console.message_log_lines import DVA, PHONE, ROBOT, asks, batch, line, said
+from helpers.console.message_log_lines import DVA, PHONE, ROBOT, asks, batch, encoded, line
 from helpers.console.served_console import HOSTILE, scene
 from helpers.paths import ROOT
 from lxml import etree
@@ -139,7 +139,7 @@ def test_a_row_says_who_asked_what_and_what_came_of_it():
     register = m.Registration("BQ Curie 2", "TeleOp", "192.168.0.9:5600")
     wish = m.PermissionRequest(ROBOT, "teleoperation")
     looks = looking(logs)
-    logs.take(batch(line(1, said(1, register)), line(2, said(2, wish, 7), m.BUSY)))
+    logs.take(batch(line(1, encoded(1, register)), line(2, encoded(2, wish, 7), m.BUSY)))
     registered, asked = looks.next()["lines"]
     assert (registered["kind"], registered["from_label"]) == ("RegMsg", "BQ Curie 2")
     assert asked == {
@@ -163,7 +163,7 @@ def test_a_row_says_who_asked_what_and_what_came_of_it():
 def test_an_answer_that_comes_later_changes_the_row_and_not_its_place():
     logs = KeptLogs()
     looks = looking(logs)
-    logs.take(batch(line(1, said(1, m.GetDeviceList()), None), *asks(2, 3)))
+    logs.take(batch(line(1, encoded(1, m.GetDeviceList()), None), *asks(2, 3)))
     assert [row["code"] for row in looks.next()["lines"]] == [None, m.OK, m.OK]
     logs.take(batch(*asks(1, 1)))
     assert [(row["n"], row["code"]) for row in looks.next()["lines"]] == [(1, m.OK)]
@@ -191,10 +191,10 @@ def test_a_page_sees_what_its_filter_takes(wanted, numbers):
     register = m.Registration("BQ Curie 2", "TeleOp", "192.168.0.9")
     logs.take(
         batch(
-            line(1, said(1, register)),
-            line(2, said(2, m.PermissionRequest(PHONE, "missions")), m.BUSY),
-            line(3, said(3, m.GetDeviceList(), source=ROBOT), None),
-            line(4, said(4, m.Heartbeat(), None), None, published=True),
+            line(1, encoded(1, register)),
+            line(2, encoded(2, m.PermissionRequest(PHONE, "missions")), m.BUSY),
+            line(3, encoded(3, m.GetDeviceList(), source=ROBOT), None),
+            line(4, encoded(4, m.Heartbeat(), None), None, published=True),
         )
     )
     looks = Looks(logs, True)
@@ -218,7 +218,7 @@ def test_who_may_not_act_learns_of_no_session():
     logs = KeptLogs()
     looks = looking(logs, acts=False, text="4711")
     grant = m.PermissionRevocation(ROBOT, PHONE, 4711)
-    logs.take(batch(line(1, said(1, grant, 4711))))
+    logs.take(batch(line(1, encoded(1, grant, 4711))))
     (row,) = looks.next()["lines"]
     assert "4711" not in json.dumps(row)
 
@@ -228,7 +228,7 @@ def test_what_is_no_message_has_a_row_as_well():
         entry = Entry.of(line(1, data, m.BAD_MESSAGE))
         assert (entry.code, entry.header) == (m.BAD_MESSAGE, {})
         assert entry.payload
-    broken = said(5, m.GetDeviceList()).replace(b"<MessageID>5", b"<MessageID>five")
+    broken = encoded(5, m.GetDeviceList()).replace(b"<MessageID>5", b"<MessageID>five")
     entry = Entry.of(line(1, broken))
     assert (entry.kind, entry.header["MessageID"]) == ("GetDeviceList", "five")
 

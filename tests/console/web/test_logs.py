@@ -6,7 +6,7 @@ import zipfile
 from urllib.parse import quote
 
 import pytest
-from helpers.console.message_log_lines import DVA, PHONE, ROBOT, asks, batch, line, said
+from helpers.console.message_log_lines import DVA, PHONE, ROBOT, asks, batch, encoded, line
 from helpers.console.served_console import serving
 from helpers.processes.command_line import call
 from helpers.processes.patience import becomes
@@ -16,7 +16,7 @@ from websockets.exceptions import ConnectionClosed
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.mistakes import check_message
 
-BROKEN = said(3, m.GetDeviceList()).replace(b"<MessageID>3<", b"<MessageID>three<")
+BROKEN = encoded(3, m.GetDeviceList()).replace(b"<MessageID>3<", b"<MessageID>three<")
 
 
 @pytest.fixture(scope="module")
@@ -24,11 +24,11 @@ def console():
     with serving("--phones-port", "0", "--phones-host", "127.0.0.1") as served:
         served.say(
             batch(
-                line(1, said(1, m.Registration("BQ <Curie> 2", "TeleOp", "10.0.0.1"))),
-                line(2, said(2, m.PermissionRequest(ROBOT, "missions"), 77), m.BUSY),
+                line(1, encoded(1, m.Registration("BQ <Curie> 2", "TeleOp", "10.0.0.1"))),
+                line(2, encoded(2, m.PermissionRequest(ROBOT, "missions"), 77), m.BUSY),
                 line(3, BROKEN, m.BAD_MESSAGE),
                 line(4, b"\xff\x00 no message", m.BAD_MESSAGE),
-                line(5, said(5, m.GetDeviceList()), None),
+                line(5, encoded(5, m.GetDeviceList()), None),
             )
         )
         assert becomes(lambda: get(served, "/api/logs/dva/2").status == 200)

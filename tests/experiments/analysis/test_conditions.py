@@ -16,46 +16,48 @@ SCENARIO = {
 }
 
 
-def said(factors: dict[str, list[Any]], treatments: dict[str, Any] | None = None) -> str:
+def text_of(factors: dict[str, list[Any]], treatments: dict[str, Any] | None = None) -> str:
     study = {"factors": factors, "treatments": treatments or {}}
     return timeout_remark({"drive": SCENARIO}, study).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_nine_seconds_are_enough_for_a_second_each_way():
-    text = said({"link.delay_s": [0.0, 1.0]})
+    text = text_of({"link.delay_s": [0.0, 1.0]})
     assert unnamed(text, "above four round trips", "every condition (8.05 s") == []
 
 
 def test_conditions_with_too_short_a_time_out_are_named():
     """Needed are 0.45, 0.85 and 1.65 s."""
-    text = said({"command.timeout_s": [0.6, 1.2, 2.4], "link.delay_s": [0.05, 0.1, 0.2]})
+    text = text_of({"command.timeout_s": [0.6, 1.2, 2.4], "link.delay_s": [0.05, 0.1, 0.2]})
     assert re.findall(r"[\d.]+ m?s", text) == ["600 ms", "200 ms", "400 ms", "1.2 s", "400 ms"]
     assert "In all others" in text
 
 
 def test_where_all_are_too_short_there_are_no_others():
-    text = said({"command.timeout_s": [0.3], "link.delay_s": [0.1]})
+    text = text_of({"command.timeout_s": [0.3], "link.delay_s": [0.1]})
     assert unnamed(text, "300 ms", "200 ms", "others") == ["others"]
 
 
 def test_what_a_treatment_changes_counts_only_together():
     """0.6 s stands with 10 ms each way alone, so that it is enough."""
     near = {"command.timeout_s": 0.6, "link.delay_s": 0.01}
-    text = said({"place": ["near", "far"]}, {"place": {"near": near, "far": {"link.delay_s": 1.0}}})
+    text = text_of(
+        {"place": ["near", "far"]}, {"place": {"near": near, "far": {"link.delay_s": 1.0}}}
+    )
     assert "is above" in text
 
 
 def test_each_direction_counts_with_its_own_delay():
     """0.3 s up and 0.1 s down: 1.65 s, and not 0.85 s."""
     factors: dict[str, list[Any]] = {"command.timeout_s": [1.0], "link.delay_s": [0.1]}
-    assert "trips of 400 ms" in said(factors | {"link.up.delay_s": [0.3]})
-    assert "is above" in said(factors)
+    assert "trips of 400 ms" in text_of(factors | {"link.up.delay_s": [0.3]})
+    assert "is above" in text_of(factors)
 
 
 def test_the_mean_of_a_law_of_processing_counts():
     law = {"law": "lognormal", "mean_s": 1.0}
     factors: dict[str, list[Any]] = {"place": ["slow"]}
-    assert "trips of 0" in said(
+    assert "trips of 0" in text_of(
         factors, {"place": {"slow": {"robot.processing_s": law, "command.timeout_s": 0.9}}}
     )
 

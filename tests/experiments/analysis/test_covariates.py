@@ -83,7 +83,7 @@ def test_a_product_of_columns_is_one_covariate():
 
 
 @pytest.mark.parametrize(
-    ("more", "said"),
+    ("more", "expected"),
     [
         (KNOWN, "'caution_off' is measured where the key 'measures' names it"),
         (MEASURED + "covariates: [caution_of]\n", "did you mean 'caution_off'"),
@@ -93,8 +93,8 @@ def test_a_product_of_columns_is_one_covariate():
         ),
     ],
 )
-def test_a_covariate_that_the_runs_do_not_have_is_refused(tmp_path, more, said):
-    with pytest.raises(ConfigError, match=said.replace("*", r"\*")):
+def test_a_covariate_that_the_runs_do_not_have_is_refused(tmp_path, more, expected):
+    with pytest.raises(ConfigError, match=expected.replace("*", r"\*")):
         cell_grid.cells(study_in(tmp_path, text=STUDY + more))
 
 

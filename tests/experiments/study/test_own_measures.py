@@ -75,7 +75,7 @@ def test_a_study_without_own_measures_is_the_same_study_as_ever(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("measures", "code", "said"),
+    ("measures", "code", "expected"),
     [
         ("[none.py:Mine]", MEASURE, "'none.py:Mine': .*'none.py'"),
         ("[mine.py:Yours]", MEASURE, "no class 'Yours'"),
@@ -84,12 +84,12 @@ def test_a_study_without_own_measures_is_the_same_study_as_ever(tmp_path):
         ("[mine.py:Mine]", MEASURE.replace("standing_s", "seed"), "cannot be called 'seed'"),
     ],
 )
-def test_a_measure_that_cannot_be_is_refused_before_any_run(tmp_path, measures, code, said):
+def test_a_measure_that_cannot_be_is_refused_before_any_run(tmp_path, measures, code, expected):
     study = study_with(tmp_path, measures, code)
-    if said is None:  # twice the same is once
+    if expected is None:  # twice the same is once
         assert cell_grid.cells(study)
         return
-    with pytest.raises(ConfigError, match=said) as refused:
+    with pytest.raises(ConfigError, match=expected) as refused:
         cell_grid.cells(study)
     assert refused.value.line == study._document.places[("measures", 0)][0]
 

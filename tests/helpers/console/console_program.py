@@ -10,4 +10,4 @@ def started(programs: Programs, *words: str | Path) -> tuple[Program, str]:
     """A console that opens no browser, and its address."""
     console = programs.start("console", "--no-open", "--port", "0", *words)
     console.wait_to_say("Console:")
-    return console, re.findall(r"^Console: +(\S+)$", console.said, re.MULTILINE)[0]
+    return console, re.findall(r"^Console: +(\S+)$", console.output, re.MULTILINE)[0]

@@ -6,7 +6,7 @@ from dva_sim.protocol.codec import encode
 DVA, PHONE, ROBOT = "02:00:00:00:00:01", "02:00:00:06:00:01", "02:00:00:01:00:01"
 
 
-def said(number: int, body: m.Body, session: int | None = 0, source: str = PHONE) -> bytes:
+def encoded(number: int, body: m.Body, session: int | None = 0, source: str = PHONE) -> bytes:
     return encode(m.Message(DVA, number, source, "12:00:00", session, body))
 
 
@@ -23,4 +23,4 @@ def batch(*lines: list, log: str = "dva") -> dict:
 
 
 def asks(first: int, last: int) -> list[list]:
-    return [line(n, said(n, m.GetDeviceList())) for n in range(first, last + 1)]
+    return [line(n, encoded(n, m.GetDeviceList())) for n in range(first, last + 1)]

@@ -120,8 +120,8 @@ class SocketWorld(World):
     """Sockets on this machine, in real time; with keys if there is a ring."""
 
     def __init__(self, ring: KeyRing | None = None) -> None:
-        self.ring, self.said = ring, list[str]()
-        self.network: SocketNetwork = SocketNetwork(LiveClock(), ring, self.said.append)
+        self.ring, self.reports = ring, list[str]()
+        self.network: SocketNetwork = SocketNetwork(LiveClock(), ring, self.reports.append)
         self._ports = {n: int(self.network.join(n).partition(":")[2]) for n in NODES}
         self._elsewhere: list[SocketNetwork] = []
         self._outside: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
@@ -150,7 +150,7 @@ class SocketWorld(World):
 
     def elsewhere(self) -> SocketNetwork:
         """The network as another process sees it: it knows nobody."""
-        network = SocketNetwork(self.network.clock, self.ring, self.said.append)
+        network = SocketNetwork(self.network.clock, self.ring, self.reports.append)
         self._elsewhere.append(network)
         return network
 
@@ -196,10 +196,10 @@ class MqttWorld(World):
     """Clients of a broker on this machine, in real time."""
 
     def __init__(self, nodes: Sequence[str] = NODES) -> None:
-        self.said, self.port = list[str](), free_port(LOCALHOST)
+        self.reports, self.port = list[str](), free_port(LOCALHOST)
         self.broker = open_broker(LOCALHOST, self.port)
         address = f"{LOCALHOST}:{self.port}"
-        self.network: MqttNetwork = MqttNetwork(LiveClock(), address, self.said.append)
+        self.network: MqttNetwork = MqttNetwork(LiveClock(), address, self.reports.append)
         for node in nodes:
             self.network.join(node)
         self.leave, self.come_back = self.network.leave, self.network.join  # type: ignore[assignment, method-assign]

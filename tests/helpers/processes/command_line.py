@@ -17,10 +17,10 @@ from dva_sim import cli
 WIDE = "200"  # columns, so that no line is broken
 
 
-def call(*words: str | Path, cwd: Path | None = None, said: str = "") -> CompletedProcess[str]:
-    """Run `dva-sim WORDS` in a folder, with `said` on its standard input."""
+def call(*words: str | Path, cwd: Path | None = None, stdin: str = "") -> CompletedProcess[str]:
+    """Run `dva-sim WORDS` in a folder, with `stdin` on its standard input."""
     out, errors = _written(), _written()
-    with _terminal(out, errors, said), contextlib.chdir(cwd or Path.cwd()):
+    with _terminal(out, errors, stdin), contextlib.chdir(cwd or Path.cwd()):
         code = cli.call([str(word) for word in words])
     return CompletedProcess(words, code, *(_text(stream) for stream in (out, errors)))
 
@@ -32,8 +32,8 @@ def ended(*words: str | Path, cwd: Path | None = None) -> tuple[int, str, str]:
 
 
 @contextlib.contextmanager
-def _terminal(out: io.TextIOWrapper, errors: io.TextIOWrapper, said: str) -> Iterator[None]:
-    typed = io.TextIOWrapper(io.BytesIO(said.encode()), "utf-8")
+def _terminal(out: io.TextIOWrapper, errors: io.TextIOWrapper, stdin: str) -> Iterator[None]:
+    typed = io.TextIOWrapper(io.BytesIO(stdin.encode()), "utf-8")
     with (
         mock.patch.object(sys, "stdin", typed),
         mock.patch.dict("os.environ", {"COLUMNS": WIDE}),

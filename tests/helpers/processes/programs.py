@@ -43,7 +43,7 @@ class Program:
             )
 
     @property
-    def said(self) -> str:
+    def output(self) -> str:
         """Output so far."""
         return self._out.read_text()
 
@@ -55,8 +55,8 @@ class Program:
     def wait_to_say(self, *texts: str) -> None:
         """Wait until it has printed each of the texts."""
         for text in texts:
-            wait_until(lambda t=text: t in self.said or self._has_ended, f"says {text!r}")
-            assert text in self.said, f"ended without {text!r}: {self.said} {self.complained}"
+            wait_until(lambda t=text: t in self.output or self._has_ended, f"says {text!r}")
+            assert text in self.output, f"ended without {text!r}: {self.output} {self.complained}"
 
     @property
     def _has_ended(self) -> bool:

@@ -117,7 +117,7 @@ class Stranger:
         return [each["msg"] for each in self.came if each.get("topic") == topic]
 
     @property
-    def said(self) -> list[str]:
+    def statuses(self) -> list[str]:
         return [each["msg"] for each in self.came if each["op"] == "status"]
 
     def call(self, world: ServedWorld, service: str, **args) -> dict:

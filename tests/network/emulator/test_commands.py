@@ -66,7 +66,7 @@ def numbers(arrived: Arrived) -> list[int]:
 def test_commands_have_their_own_network_their_streams_and_the_exit_code(programs):
     program = programs.start("link", "--near", ABOUT, "--far", "sleep 600")
     assert program.ends() == 7
-    assert program.said == f"10.77.0.1 10.77.0.2 {os.getuid()}\nlink lo\n"
+    assert program.output == f"10.77.0.1 10.77.0.2 {os.getuid()}\nlink lo\n"
     assert program.complained[0] == "complaint"
     assert [line.split(":")[0] for line in program.complained[1:]] == [
         *("near to far", "far to near", "emulator late by")

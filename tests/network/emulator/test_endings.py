@@ -49,7 +49,7 @@ def test_ctrl_c_lets_the_near_command_tidy_up(programs):
     program = begun(programs, "trap 'echo tidy; exit 5' INT; while :; do sleep 0.05; done")
     program.send(signal.SIGINT)
     assert program.ends() == 5
-    assert program.said == "tidy\n"
+    assert program.output == "tidy\n"
     assert commands(programs) == []
 
 
@@ -65,7 +65,7 @@ def test_the_end_of_the_near_command_ends_the_far_one(programs):
     far = "trap 'echo ended; exit' TERM; while :; do sleep 0.05; done"
     program = begun(programs, "sleep 0.5; exit 3", far)
     assert program.ends() == 3
-    assert program.said == "ended\n"
+    assert program.output == "ended\n"
     assert commands(programs) == []
 
 

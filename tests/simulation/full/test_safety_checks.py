@@ -68,12 +68,12 @@ def ask(run: Run, time: float, body: m.Body, session: int = 5, source: str = DVA
     """Somebody sends the robot a request at a time [s]; the DVA if nobody else is named."""
     device = run.dva.device if source == DVA else stranger(run)
 
-    def said() -> None:
+    def send() -> None:
         if source == DVA:
             enter(run.dva.core, ROBOT, body)
         device.ask(ROBOT, body, session=session)
 
-    run.clock.call_at(time, said)
+    run.clock.call_at(time, send)
 
 
 def stranger(run: Run) -> Any:

@@ -16,7 +16,7 @@ from typing import ClassVar, NamedTuple
 from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity, slowed, through, towards
 from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import Intent, Reach, Route, View
-from dva_sim.kernel.plugins import FAILURES, Guard, said
+from dva_sim.kernel.plugins import FAILURES, Guard, error_text
 
 
 class PointView(NamedTuple):
@@ -147,5 +147,5 @@ class GuardedStrategy(Guard, Strategy):
         try:
             return {str(name): float(value) for name, value in self.strategy.workload().items()}
         except FAILURES as error:
-            self._count(said(error))
+            self._count(error_text(error))
             return {}

@@ -30,7 +30,7 @@ from dva_sim.experiments.report.figures import (
 )
 from dva_sim.experiments.report.figures.style import Drawn, ReportFigure, styled
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.plugins import FAILURES, Plugins, said
+from dva_sim.kernel.plugins import FAILURES, Plugins, error_text
 from dva_sim.kernel.wording import listing
 from dva_sim.simulation.labels import factor_name
 
@@ -167,7 +167,7 @@ def draw_all(reading: Reading, own: Sequence[ReportFigure] = ()) -> tuple[list[D
         try:
             drawn += _drawn(figure, view, reading)
         except FAILURES as error:
-            problems.append(f"figure {figure.name!r} cannot be drawn: {said(error)}")
+            problems.append(f"figure {figure.name!r} cannot be drawn: {error_text(error)}")
     return drawn, problems
 
 
