@@ -210,8 +210,8 @@ def _conditions(manifest: dict[str, Any]) -> Iterator[list[str]]:
         yield [f"part {code(part)}", prose(str(scenario.get("description") or ""))]
         yield from _models(scenario, varied)
     if robustness := study.get("robustness"):
-        told = (f"{key}: {code(value)}" for key, value in robustness.items() if value)
-        yield ["answer repeated over", "; ".join(told)]
+        parts = (f"{key}: {code(value)}" for key, value in robustness.items() if value)
+        yield ["answer repeated over", "; ".join(parts)]
     for level, note in ((study.get("map") or {}).get("notes") or {}).items():
         yield [f"extrapolated at {code(level)}", prose(note)]
 

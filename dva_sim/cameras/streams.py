@@ -60,7 +60,7 @@ class CameraStreams:
         self._drawn = asyncio.Condition()
         self._viewers: dict[Viewer, None] = {}  # in the order in which they came
         self._lingering: Counter[int] = Counter()
-        self._told: frozenset[int] = frozenset()
+        self._last_sent: frozenset[int] = frozenset()
         self._deadline = 0.0
         self._notified: set[asyncio.Task[None]] = set()
         self._is_over = False
@@ -103,8 +103,8 @@ class CameraStreams:
         robots = frozenset(looked_at | self._lingering.keys()) | frozenset(
             self._watched_elsewhere()
         )
-        new = robots != self._told
-        self._told = robots
+        new = robots != self._last_sent
+        self._last_sent = robots
         if new or (again and robots):
             self._watch(sorted(robots), new)
 

@@ -67,7 +67,7 @@ def _compare(folder: Path, studies: list[str], mark: bool, jobs: int | None) -> 
     now = _sampled([answer.study for answer in kept if answer.sampled], jobs)
     code = ExitCode.OK
     for answer in kept:
-        lines, is_stale = _told(answer, now.get(answer.study, {}))
+        lines, is_stale = _described(answer, now.get(answer.study, {}))
         print(f"{answer.study}: {lines}")
         if is_stale and not answer.stale_since:
             if mark:
@@ -77,7 +77,7 @@ def _compare(folder: Path, studies: list[str], mark: bool, jobs: int | None) -> 
     return code
 
 
-def _told(answer: KeptAnswer, now: dict[str, str]) -> tuple[str, bool]:
+def _described(answer: KeptAnswer, now: dict[str, str]) -> tuple[str, bool]:
     """Describe whether an answer is still given; and whether it is stale."""
     dated = f"{answer.status}, {answer.version}, {answer.date}"
     if not answer.sampled:

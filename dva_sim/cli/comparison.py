@@ -156,7 +156,7 @@ def _differences(name: str, found: Sequence[Difference], console: Console) -> No
     heads = ["part", *map(factor_name, factors), "runs A", "runs B", "median A", "median B"]
     rows = [[row.part, *_names(row.levels, factors), *_numbers(row)] for row in found]
     print_table([*heads, "B - A, mean (95 % interval)"], rows, console, 1 + len(factors))
-    clear = sum(row.is_told_from_zero for row in found)
+    clear = sum(row.differs_from_zero for row in found)
     if clear:
         console.print(
             f"{_MARK} leaves out zero, each interval for itself: {clear} of {len(found)}; of "
@@ -178,7 +178,7 @@ def _numbers(row: Difference) -> list[str]:
 def _interval(row: Difference) -> str:
     if row.is_identical:
         return "identical"
-    mark = f" {_MARK}" if row.is_told_from_zero else ""
+    mark = f" {_MARK}" if row.differs_from_zero else ""
     of = row.interval
     return f"{number(of.mean)} ({number(of.low)} to {number(of.high)}){mark}"
 

@@ -29,7 +29,7 @@ from dva_sim.simulation.full.verdicts import Verdict, refuse_broken
 from dva_sim.simulation.scenario import contradictions
 
 STORY_LINES = 12
-ALWAYS_TOLD = "refused", "not sent", "form", "not recorded"  # in the names of counters
+ALWAYS_SHOWN = "refused", "not sent", "form", "not recorded"  # in the names of counters
 HELD = 2.0  # lines of several parts are told in order: so long does one wait for earlier ones [s]
 DEFAULT_DVA = f"127.0.0.1:{DEFAULT_PORT}"  # of a part that is run alone and told no other
 WIDTH = 80  # where there is no terminal to ask [characters]
@@ -244,7 +244,7 @@ def _conclude(console: Console, board: Board, summary: Summary, options: LiveOpt
     for part, report in summary.latest.items():
         detail(f"  {part}: at most {1000 * report.lateness:.1f} ms late")
         for name, count in report.counters.items():
-            if is_verbose() or any(word in name for word in ALWAYS_TOLD):
+            if is_verbose() or any(word in name for word in ALWAYS_SHOWN):
                 counters[name] = counters.get(name, 0) + count
     for name, count in sorted(counters.items()):
         _print(console, f"  {name}: {count}")

@@ -160,10 +160,10 @@ def lines(kind: str | None = None) -> Iterator[str]:
             yield f"  {entry.name:<{width}}  {entry.description}".rstrip()
 
 
-def tell(told: Iterable[str]) -> None:
+def tell(texts: Iterable[str]) -> None:
     """Print lines that never wrap: on a terminal what has no room is cut, elsewhere nothing is."""
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-    for line in told:
+    for line in texts:
         print(line if width is None or len(line) <= width else f"{line[: width - 3].rstrip()}...")
 
 

@@ -170,22 +170,22 @@ def call(words: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ExitCode.READER_GONE
     except DvaSimError as error:
-        return _told(error, error.exit_code)
+        return _report(error, error.exit_code)
     except typer.TyperException as error:
-        return _told_of_words(error)
+        return _report_usage_error(error)
     except OSError as error:
         where = f"{error.filename}: " if error.filename is not None else ""
-        return _told(f"{where}{error.strerror or error}", ExitCode.MISTAKE)
+        return _report(f"{where}{error.strerror or error}", ExitCode.MISTAKE)
 
 
-def _told_of_words(error: Exception) -> int:
+def _report_usage_error(error: Exception) -> int:
     if type(error).__name__ != "NoArgsIsHelpError":
-        return _told(in_a_line(error), ExitCode.MISTAKE)
+        return _report(in_a_line(error), ExitCode.MISTAKE)
     typer.echo(error)
     return ExitCode.OK
 
 
-def _told(problem: object, code: int) -> int:
+def _report(problem: object, code: int) -> int:
     print(error_line(problem), file=sys.stderr)
     return code
 

@@ -68,7 +68,7 @@ def new(name: str) -> None:
     Examples:
         dva-sim new mine  # writes mine.yaml here
     """
-    typer.echo(told(api.new(name)))
+    typer.echo(next_steps(api.new(name)))
 
 
 @takes(api.register)
@@ -135,7 +135,7 @@ def screen(
     raise typer.Exit(code)
 
 
-def told(path: Path) -> str:
+def next_steps(path: Path) -> str:
     """Return the next steps for a new study."""
     steps = (
         ("check", "finds mistakes"),

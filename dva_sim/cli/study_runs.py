@@ -48,7 +48,7 @@ def run(request: RunRequest) -> ExitCode:
         with _shown("running", before.runs) as show:
             request.run(plan, show)
         results = Results.load(folder)
-        failures = _told_failures(results) + _recorded(request, plan)
+        failures = _report_failures(results) + _recorded(request, plan)
         with console.status("Writing the report ..."):
             report = write_report(folder, figures=figures)
             distrusted = results.distrusted
@@ -180,7 +180,7 @@ def _counted(number: int, one: str, many: str | None = None) -> str:
     return f"{number} {one if number == 1 else many or f'{one}s'}"
 
 
-def _told_failures(results: Results) -> int:
+def _report_failures(results: Results) -> int:
     failures = results.failures
     for f in failures if is_verbose() else failures[:_FEW]:
         where = f"{f['part']}, cell {f['cell']}, person {f['person']}, trial {f['trial']}"

@@ -128,7 +128,7 @@ def conclude(play: Callable[[], ValidationResult], out: Path | None) -> ExitCode
     """Play, tell what was found, and write it if asked to; how it ended."""
     started = time.perf_counter()
     found = play()
-    for sheet in found.told:
+    for sheet in found.printed:
         _tell(sheet)
     say(f"\n[bold]{escape(found.headline)}[/bold]")
     for note in found.notes:

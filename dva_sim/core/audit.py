@@ -97,9 +97,9 @@ class Fact:
             author=self.author,
             label=self.label[:64],
             action=self.action,
-            reason=_told(self.cause),
+            reason=_shortened(self.cause),
             code=self.code,
-            text=_told(self.outcome),
+            text=_shortened(self.outcome),
             role=self.role,
             event_id=self.event,
             device=self.device,
@@ -113,7 +113,7 @@ class Fact:
 LONGEST = 1e6  # no longer time is told [s]
 
 
-def _told(text: str) -> str:
+def _shortened(text: str) -> str:
     """So much of a text as a message can hold."""
     return text[:256]
 

@@ -173,7 +173,7 @@ class ControlRooms:
         label = self._orders.label_of(about) if about else ""
         if action not in _ON_HANDS or handling.is_already(sender.id_tag, action, label):
             return
-        last = "nobody" if handling.last is None else handling.last.told(now)
+        last = "nobody" if handling.last is None else handling.last.described(now)
         if not event.open:
             raise _Refused(m.OUT_OF_ORDER, f"event {event.number} is {event.state}; last: {last}")
         if seen is not None and seen != handling.decisions:

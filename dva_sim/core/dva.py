@@ -137,7 +137,7 @@ class Dva:
         self.sessions.heard(send)
         body, sends = send.body, self._patrols.held(send, self.registry, self.sessions)
         if isinstance(body, m.GetSensorInfo):
-            self.sensing.told(send.to, content, now)
+            self.sensing.on_reply(send.to, content, now)
             sends = self.sensing.renew(self.registry, self.sessions, now)
         elif isinstance(body, m.HandoverRequest):
             sends = self.handovers.answered(send, True, now) + self.dispatcher.decide(now)
@@ -166,7 +166,7 @@ class Dva:
         elif isinstance(body, m.Relocation):
             self.dispatcher.situations.forget_move(send.to)
         elif isinstance(body, m.GetSensorInfo):
-            self.sensing.told(send.to, None, now)
+            self.sensing.on_reply(send.to, None, now)
         elif isinstance(body, m.DevSub):
             self.sessions.permissions.end(send.session)  # it may have restarted
         elif isinstance(body, m.HandoverRequest):
@@ -492,7 +492,7 @@ class Dva:
         event = self.events.near(body.kind, body.position)
         sends: list[Send] = []
         if event is None:
-            event, sends = self._told_better(message.source, body, now)
+            event, sends = self._corrected(message.source, body, now)
         if event is None and self.events.full:
             return self._refuse(message, m.BUSY, "so many events are open that no more fit")
         if event is None:
@@ -526,7 +526,7 @@ class Dva:
         self.counters["event confirmed by a sensor"] += 1
         return self.orders.confirmed_by_another(event, now) + self.dispatcher.decide(now)
 
-    def _told_better(
+    def _corrected(
         self, source: str, body: m.EventReport, now: float
     ) -> tuple[Event | None, list[Send]]:
         """Correct the position of an event that only sensors felt, by a report of somebody on site.

@@ -25,7 +25,7 @@ class Choice(NamedTuple):
     reason: str = ""
     device: str = ""
 
-    def told(self, now: float) -> str:
+    def described(self, now: float) -> str:
         """Describe the choice in words, as of now."""
         about = self.device and f" of {self.device}"
         why = self.reason and f": {self.reason}"

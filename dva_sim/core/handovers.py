@@ -150,7 +150,11 @@ class Handovers:
     def seen(self, robot: str, status: m.RobotStatus, now: float) -> None:
         """A robot says how it is: it may stand by now, and know that its session is over."""
         known = self.under_way.get(robot)
-        if known is None or known.step is not Step.STOPPING or self.sessions.is_untold(robot):
+        if (
+            known is None
+            or known.step is not Step.STOPPING
+            or self.sessions.has_unacknowledged(robot)
+        ):
             return
         still = max(abs(status.speed), abs(status.turn_rate)) <= STANDING
         if still and status.mode == "Idle":

@@ -78,7 +78,7 @@ class Sensing:
         for key in [key for key in self._above if key[0] == robot]:
             del self._above[key]
 
-    def told(self, robot: str, content: object, now: float) -> None:
+    def on_reply(self, robot: str, content: object, now: float) -> None:
         """A robot has answered, or not; of one that is gone meanwhile nothing is kept."""
         if robot not in self._asked:
             return

@@ -22,7 +22,7 @@ class Send:
     session: int = 0
 
 
-MOST_UNTOLD = 1000
+MOST_UNACKNOWLEDGED = 1000
 
 
 @dataclass
@@ -30,14 +30,14 @@ class Sessions:
     """Permissions, and the word about their end.
 
     Attributes:
-        untold: Notices that a robot has not acknowledged, by session. Until then it may obey the
-            wrong device.
-        changes: Number of changes of `untold`.
+        unacknowledged: Notices that a robot has not acknowledged, by session. Until then it may
+            obey the wrong device.
+        changes: Number of changes of `unacknowledged`.
         reserved: Robots that are being handed over: held, as far as others are concerned.
     """
 
     permissions: Permissions
-    untold: dict[int, Send] = field(default_factory=dict)
+    unacknowledged: dict[int, Send] = field(default_factory=dict)
     changes: int = 0
     reserved: set[str] = field(default_factory=set)
     _over: list[Send] = field(default_factory=list)
@@ -100,9 +100,9 @@ class Sessions:
         grant = self.permissions.observers.get((robot, self.permissions.own))
         return grant.session if grant is not None else 0
 
-    def is_untold(self, robot: str) -> bool:
+    def has_unacknowledged(self, robot: str) -> bool:
         """Return True if a robot has not confirmed the end of a session yet."""
-        return any(send.to == robot for send in self.untold.values())
+        return any(send.to == robot for send in self.unacknowledged.values())
 
     def give_back(self, body: m.PermissionRevocation) -> bool:
         """A holder needs its session no longer; False if it has no such session."""
@@ -172,18 +172,18 @@ class Sessions:
         """A robot knows that a session is over."""
         body = send.body
         if isinstance(body, m.PermissionRevocation) and send.to == body.device:
-            self.changes += self.untold.pop(body.session, None) is not None
+            self.changes += self.unacknowledged.pop(body.session, None) is not None
 
     def remind(self, is_there: Callable[[str], bool]) -> None:
         """Tell the robots again that have not heard, as soon as they are there."""
-        self._unheard = {s: send for s, send in self._unheard.items() if s in self.untold}
+        self._unheard = {s: send for s, send in self._unheard.items() if s in self.unacknowledged}
         there = [s for s, send in self._unheard.items() if is_there(send.to)]
         self._over += [self._unheard.pop(session) for session in there]
 
     def with_something_open(self) -> set[str]:
         """The robots that somebody holds, or that still have to hear that a session is over."""
         held = {g.robot for g in self.permissions.all() if g.holder != self.permissions.own}
-        return held.union(send.to for send in self.untold.values())
+        return held.union(send.to for send in self.unacknowledged.values())
 
     def forget(self, robot: str) -> None:
         """A robot is not known any longer: its holders hear that, and it, if it comes back."""
@@ -193,10 +193,10 @@ class Sessions:
     def tell_robot(self, body: m.PermissionRevocation) -> None:
         """Notify a robot that a session is over, and retry until it acknowledges."""
         self.changes += 1
-        self.untold[body.session] = Send(body.device, body)
-        self._over.append(self.untold[body.session])
-        if len(self.untold) > MOST_UNTOLD:
-            del self.untold[next(iter(self.untold))]
+        self.unacknowledged[body.session] = Send(body.device, body)
+        self._over.append(self.unacknowledged[body.session])
+        if len(self.unacknowledged) > MOST_UNACKNOWLEDGED:
+            del self.unacknowledged[next(iter(self.unacknowledged))]
 
     def to_tell(self) -> list[Send]:
         """Return the ends of sessions to send now; each is returned once."""

@@ -181,7 +181,7 @@ class Store:
         for grant in unkept:
             sessions.permissions.end(grant.session)
         for session, before in self._held.items():
-            replaced = session not in held and session not in sessions.untold
+            replaced = session not in held and session not in sessions.unacknowledged
             if replaced and any(_is_same_right(grant, before) for grant in unkept):
                 sessions.permissions.restore(before)
         self._held = _held(dva)
@@ -402,12 +402,12 @@ def _is_same_right(one: Grant, other: Grant) -> bool:
 def _of_sessions(dva: Dva) -> dict[str, dict[str, str]]:
     """Return valid sessions, and robots that have not heard of ended ones, by session."""
     grants = dva.sessions.permissions.all()
-    untold = [(s, send.body) for s, send in dva.sessions.untold.items()]
+    unacknowledged = [(s, send.body) for s, send in dva.sessions.unacknowledged.items()]
     return {
         "grants": {str(g.session): json.dumps(_plain(g)) for g in grants},
         "untold": {
             str(session): json.dumps(_plain(body))
-            for session, body in untold
+            for session, body in unacknowledged
             if isinstance(body, PermissionRevocation)
         },
     }

@@ -77,7 +77,7 @@ def _trace_of(label: str, stage: Stage, options: LiveOptions) -> Callable[[str],
     if options.record is None:
         return None
     path = options.record / trace_of(label)
-    return TraceFile(path, lambda told: recorder.tell(stage.clock.now, label, told, "link"))
+    return TraceFile(path, lambda text: recorder.tell(stage.clock.now, label, text, "link"))
 
 
 class Rate:

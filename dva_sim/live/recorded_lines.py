@@ -73,15 +73,15 @@ def lines_of_part(part: Path) -> RunLines:
         raise ConfigError(f"cannot be read: {error.strerror}", part) from error
 
 
-def make_recording(told: RunLines, target: Path) -> float:
+def make_recording(lines: RunLines, target: Path) -> float:
     """Write a recording; return its duration [s].
 
     Raises:
         DvaSimError: it cannot be written.
     """
-    playback = told.playback()
+    playback = lines.playback()
     about = {"time": "real, from the start of the run", "live": "over sockets"}
-    write_recording(playback, target, about=about, traces=told.traces, audit=told.audit)
+    write_recording(playback, target, about=about, traces=lines.traces, audit=lines.audit)
     return playback.duration
 
 
@@ -282,10 +282,10 @@ class RunLines:
         self.traces[who].append((when, line))
 
 
-def _facts_in(told: Sequence[Line]) -> list[Any]:
+def _facts_in(lines: Sequence[Line]) -> list[Any]:
     """Return the facts in order of time, those of one part in the order of their lines."""
     reads = Facts(most=None)
-    for line in told:
+    for line in lines:
         reads.note(line)
-    facts = [fact for line in told if (fact := reads.fact(line)) is not None]
+    facts = [fact for line in lines if (fact := reads.fact(line)) is not None]
     return sorted(facts, key=lambda fact: fact.time)

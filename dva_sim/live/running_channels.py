@@ -151,11 +151,11 @@ class RunningChannels:
             self._labels.setdefault(end, end)
         return channels.sent_message(sent, channels.names_of(self._labels))
 
-    def _seen(self, when: float, word: str, told: dict[str, Any]) -> Iterator[ChannelMessage]:
+    def _seen(self, when: float, word: str, content: dict[str, Any]) -> Iterator[ChannelMessage]:
         """A robot has accepted a command: how long that was on its way."""
         if word == "accepted":
-            issued = self._sent.pop((told["source"], told["message_id"]), None)
-            robot = self._labels.get(told["robot"], told["robot"])
+            issued = self._sent.pop((content["source"], content["message_id"]), None)
+            robot = self._labels.get(content["robot"], content["robot"])
             if issued is not None:
                 yield channels.latency(when, robot, "command", delay=when - issued)
 

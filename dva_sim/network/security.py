@@ -216,7 +216,7 @@ class _Handshake:
 
     hang_ups: int = 0
     latest: Refusal | None = None
-    told: set[Reason] = field(default_factory=set)
+    reported: set[Reason] = field(default_factory=set)
     greeted: bool = False
 
 
@@ -256,7 +256,7 @@ class Security:
         self._monitors: dict[Socket, Socket] = {}
         self._handshakes: dict[str, dict[_Way, _Handshake]] = {}  # by peer
         self._greetings: dict[Socket, tuple[_Way, Greeting]] = {}
-        self._told: set[Refusal] = set()
+        self._reported: set[Refusal] = set()
         self._unknown_keys: set[tuple[str, bytes]] = set()
         self.refused: Counter[tuple[str, Reason]] = Counter()
         self._zap = None if ring is None else self._open_zap()
@@ -449,8 +449,8 @@ class Security:
             reason, why = at_server(self._has_keys, device, value)
             refusal = Refusal(device, None, endpoint, reason, why)
             self.refused[device, reason] += 1
-            if refusal not in self._told:  # few: there are few endpoints and few reasons
-                self._told.add(refusal)
+            if refusal not in self._reported:  # few: there are few endpoints and few reasons
+                self._reported.add(refusal)
                 self._tell(refusal)
 
     def _note_client(self, device: str, peer: str, endpoint: str, event: int, value: int) -> None:
@@ -473,13 +473,14 @@ class Security:
         handshake.hang_ups += 1
         if handshake.hang_ups == PATIENCE:
             self._greet(way, handshake)
-        elif handshake.hang_ups == 2 * PATIENCE and not handshake.told:  # greeting has not helped
+        elif handshake.hang_ups == 2 * PATIENCE and not handshake.reported:
+            # A greeting has not helped.
             self._tell_once(handshake)
 
     def _tell_once(self, handshake: _Handshake) -> None:
         refusal = handshake.latest
-        if refusal is not None and refusal.reason not in handshake.told:
-            handshake.told.add(refusal.reason)
+        if refusal is not None and refusal.reason not in handshake.reported:
+            handshake.reported.add(refusal.reason)
             self._tell(refusal)
 
     def _greet(self, way: _Way, handshake: _Handshake) -> None:
@@ -498,7 +499,7 @@ class Security:
         handshake = self._handshakes.get(way[1], {}).get(way)
         # The news of the end may fail to come: what the other end speaks is enough to conclude.
         is_open = greeting.theirs is None and not greeting.done
-        if is_open or handshake is None or handshake.told:
+        if is_open or handshake is None or handshake.reported:
             return
         device, peer, endpoint = way
         if greeting.theirs not in (None, greeting.mechanism):

@@ -52,7 +52,7 @@ class Pipe(Generic[T]):
     def __init__(self, mark: int = HIGH_WATER_MARK, conflate: bool = False) -> None:
         self._mark, self._low, self._conflate = mark, (mark + 1) // 2, conflate
         self._items: deque[T] = deque(maxlen=1 if conflate else None)
-        self._written = self._read = self._told = self.superseded = 0
+        self._written = self._read = self._acknowledged = self.superseded = 0
         self._refused = False
         self.on_room: Callable[[], object] = _nothing
 
@@ -65,7 +65,7 @@ class Pipe(Generic[T]):
     @property
     def full(self) -> bool:
         """True if the next message would be refused."""
-        return not self._conflate and self._written - self._told >= self._mark
+        return not self._conflate and self._written - self._acknowledged >= self._mark
 
     def put(self, item: T) -> bool:
         """Add a message; False if the mark is reached."""
@@ -84,7 +84,7 @@ class Pipe(Generic[T]):
         item = self._items.popleft()
         self._read += 1
         if self._read % self._low == 0:
-            self._told = self._read
+            self._acknowledged = self._read
             if self._refused:
                 self._refused = False
                 self.on_room()

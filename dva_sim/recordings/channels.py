@@ -353,7 +353,7 @@ SCREEN, COMMANDS, CAMERA, APPLIED = "screen", "commands", "camera", "applied"
 LEVELS = {"safety": 3, "mode": 1, "link": 1}  # of Foxglove's log; all else is for information
 
 
-def told(playback: Playback) -> Iterator[ChannelMessage]:
+def story_messages(playback: Playback) -> Iterator[ChannelMessage]:
     """The timeline."""
     for moment in playback.recorder.timeline:
         yield log(moment)

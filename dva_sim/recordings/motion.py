@@ -40,14 +40,14 @@ class MotionSample(NamedTuple):
     """One sample.
 
     Attributes:
-        told: By the phone's clock, from the first one on [s].
+        stamp: By the phone's clock, from the first one on [s].
         came: By the run's clock [s].
         at: Time of the sample, by the same clock [s].
         xyz: Measured acceleration in the phone's axes [m/s^2].
         orientation: Orientation of its screen [deg].
     """
 
-    told: float
+    stamp: float
     came: float
     at: float
     xyz: Triple
@@ -120,9 +120,9 @@ class MotionWriter:
     def sample(self, sample: MotionSample) -> None:
         """One more."""
         if not self._begun:
-            self._begun, self._first = True, sample.told
-        stamp = sample.told - self._first
-        numbers = stamp, sample.came, sample.at, *sample.xyz
+            self._begun, self._first = True, sample.stamp
+        since_first = sample.stamp - self._first
+        numbers = since_first, sample.came, sample.at, *sample.xyz
         self._write(",".join(map(repr, numbers)) + f",{sample.orientation}")
 
     def close(self) -> None:
@@ -174,11 +174,11 @@ def _sample(line: str) -> MotionSample:
     return MotionSample(float(stamp), float(came), float(at), (float(x), float(y), float(z)), angle)
 
 
-def _app(told: dict[str, Any]) -> MotionApp:
-    x, y, z = (float(part) for part in told["reference_mps2"])
-    profile = validate(PhoneProfile, told["profile"], lambda problem, _: ConfigError(problem))
-    at, period = float(told["at_s"]), float(told["period_s"])
-    return MotionApp(at, period, (x, y, z), told["ios"] is True, profile)
+def _app(content: dict[str, Any]) -> MotionApp:
+    x, y, z = (float(part) for part in content["reference_mps2"])
+    profile = validate(PhoneProfile, content["profile"], lambda problem, _: ConfigError(problem))
+    at, period = float(content["at_s"]), float(content["period_s"])
+    return MotionApp(at, period, (x, y, z), content["ios"] is True, profile)
 
 
 def replayed(

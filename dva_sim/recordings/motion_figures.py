@@ -55,12 +55,12 @@ def figures_of(motion: PhoneMotion, path: Path) -> MotionFigures:
     samples = motion.samples
     if len(samples) < LEAST:
         raise ConfigError(f"contains {len(samples)} samples; at least {LEAST} are needed", path)
-    steps = [b.told - a.told for a, b in pairwise(samples) if b.told > a.told]
+    steps = [b.stamp - a.stamp for a, b in pairwise(samples) if b.stamp > a.stamp]
     usual = median(steps)
     even = [step for step in steps if step <= GAP * usual]
     return MotionFigures(
         samples=len(samples),
-        duration_s=samples[-1].told - samples[0].told,
+        duration_s=samples[-1].stamp - samples[0].stamp,
         rate_hz=1.0 / usual,
         jitter=pstdev(even) / usual,
         gaps=len(steps) - len(even),
@@ -102,14 +102,14 @@ def _resolution(samples: list[MotionSample]) -> float:
     return smallest if smallest < math.inf else 0.0
 
 
-def part_of(told: MotionFigures) -> dict[str, Any]:
+def part_of(figures: MotionFigures) -> dict[str, Any]:
     """An accelerometer part that measures as this one did; for `phone.accelerometer`."""
     return {
-        "description": f"Measured: a phone's own part, by {told.samples} samples of its motion.",
+        "description": f"Measured: a phone's own part, by {figures.samples} samples of its motion.",
         "data_sheet": "none: by the differences of neighbouring samples at rest",
         "assumed": ["offset_mg", "drift_mg_per_sqrt_min", "range_g"],
-        "rate_hz": round(min(1000.0, told.rate_hz), 2),
-        "noise_mg": round(told.noise_mg, 3),
-        "resolution_mg": round(told.resolution_mg, 4),
-        "range_g": float(max(2, math.ceil(told.largest_g))),
+        "rate_hz": round(min(1000.0, figures.rate_hz), 2),
+        "noise_mg": round(figures.noise_mg, 3),
+        "resolution_mg": round(figures.resolution_mg, 4),
+        "range_g": float(max(2, math.ceil(figures.largest_g))),
     }

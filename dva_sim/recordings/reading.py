@@ -396,12 +396,12 @@ def _drives(raw: RawRecords, run: Mapping[str, Any]) -> list[DriveLog]:
     return drives
 
 
-def _applied(time: float, told: Mapping[str, Any]) -> Applied:
-    until, captured = told["until_s"], told["captured_s"]
+def _applied(time: float, content: Mapping[str, Any]) -> Applied:
+    until, captured = content["until_s"], content["captured_s"]
     return Applied(
-        issued=told["made_s"],
-        sent=told["sent_s"],
-        arrived=told["arrived_s"],
+        issued=content["made_s"],
+        sent=content["sent_s"],
+        arrived=content["arrived_s"],
         time=time,
         until=inf if until is None else until,
         sample_age=nan,

@@ -70,7 +70,7 @@ def read_sensor_log(path: Path, unit: Unit | None = None) -> list[MotionSample]:
     samples = list[MotionSample]()
     for number, (time, x, y, z) in found:
         times_s = (time - times[0]) * second
-        if samples and times_s < samples[-1].told:
+        if samples and times_s < samples[-1].stamp:
             raise ConfigError("time goes backwards here", path, number, 1)
         xyz = (x * metre, y * metre, z * metre)
         samples.append(MotionSample(times_s, math.nan, math.nan, xyz, 0))

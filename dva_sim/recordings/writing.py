@@ -227,7 +227,7 @@ def every_message(playback: Playback) -> Iterator[ChannelMessage]:
     yield from channels.poses(playback)
     yield from channels.beliefs(playback)
     yield from channels.fixes(playback)
-    yield from channels.told(playback)
+    yield from channels.story_messages(playback)
     yield from channels.facts(playback)
     yield from channels.commanded(playback)
     yield from channels.network_messages(playback)

@@ -15,7 +15,7 @@ from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import World
 
-STILL_TOLD: Final = 1.0  # design: a robot is told to stand for so long after each drive [s]
+STOP_REPEATED: Final = 1.0  # design: a robot is told to stand for so long after each drive [s]
 STILL: Final = 0.02  # below this it counts as standing [m/s, rad/s]
 
 
@@ -23,7 +23,7 @@ class RosBody(RobotBody):
     """A body that no physics moves: `place` says where it is, and `send` takes its commands.
 
     A command is repeated while it is in force. After its end the robot gets stop commands until it
-    stands, and for `STILL_TOLD` in any case; then nothing is published, so that others may drive
+    stands, and for `STOP_REPEATED` in any case; then nothing is published, so that others may drive
     it.
 
     Args:
@@ -52,7 +52,7 @@ class RosBody(RobotBody):
         super().__init__(world, name, spec, Pose(0.0, 0.0, 0.0))
         self._clock, self._send = clock, send
         self._set_point = 0.0, 0.0, 0.0
-        self.stopped_at = self._told_until = -math.inf
+        self.stopped_at = self._stop_until = -math.inf
         self.has_stood = True
         self._is_asked_to_move = False
         clock.every(period, self._repeat)
@@ -100,9 +100,9 @@ class RosBody(RobotBody):
     def stand(self) -> None:
         """Tell the robot to stand."""
         now = self._clock.now
-        if self._is_asked_to_move or now >= self._told_until:
+        if self._is_asked_to_move or now >= self._stop_until:
             self.stopped_at, self.has_stood = now, self.has_stood and not self._is_asked_to_move
-        self._is_asked_to_move, self._told_until = False, now + STILL_TOLD
+        self._is_asked_to_move, self._stop_until = False, now + STOP_REPEATED
         self._set_point = 0.0, 0.0, now
         self._send(0.0, 0.0)
 
@@ -114,5 +114,5 @@ class RosBody(RobotBody):
         self._expire()
         if self._is_asked_to_move:
             self._send(*self._set_point[:2])
-        elif not self.has_stood or self._clock.now < self._told_until:
+        elif not self.has_stood or self._clock.now < self._stop_until:
             self._send(0.0, 0.0)

@@ -59,7 +59,7 @@ class RosRobot:
         self._namespace, self._command = namespace, profile.topic(namespace, profile.topics.command)
         self._motion: RosMotion | None = None
         self._charge, self._ranges, self._pictured = 1.0, tuple[float, ...](), -math.inf
-        self._told: dict[str, float] = {}
+        self._reported_at: dict[str, float] = {}
         self._is_registered = False
         self.on_picture: Callable[[bytes], object] = lambda _: None
         self.bridge = RosbridgeClient(
@@ -204,8 +204,8 @@ class RosRobot:
         """Count what was refused; tell it in one line, but not each time."""
         device, now = self.agent.device, self._clock.now
         device.recorder.counters[f"refused from the robot: {topic or 'a message'}"] += 1
-        if now - self._told.get(topic, -math.inf) > TELL_AGAIN:
-            self._told[topic] = now
+        if now - self._reported_at.get(topic, -math.inf) > TELL_AGAIN:
+            self._reported_at[topic] = now
             device.tell(f"{topic or 'a message'} refused: {why}", "link")
 
     # --- what it is told ----------------------------------------------------------------

@@ -77,7 +77,7 @@ def stated_conditions(models: Iterable[str]) -> dict[str, str]:
     return {path: key.condition for entry in there for path, key in entry.items() if key.condition}
 
 
-_TOLD: dict[str, Measure] = {}
+_OWN_COLUMNS: dict[str, Measure] = {}
 
 
 def take_up(columns: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> None:
@@ -87,7 +87,7 @@ def take_up(columns: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> None:
         columns: User-defined columns from the manifest, by table and name.
     """
     for table in columns.values():
-        _TOLD.update(
+        _OWN_COLUMNS.update(
             {
                 name: Measure(name, entry.get("meaning", ""), entry.get("title", ""))
                 for name, entry in table.items()
@@ -99,7 +99,7 @@ def measure_called(name: str, model: str = "") -> Measure:
     """Return the description of a measure, in a certain model if it has it; else its name."""
     columns = MODELS[model].columns["runs"] if model in MODELS else ()
     own = next((column for column in columns if column.name == name), None)
-    return own or _measures().get(name) or _TOLD.get(name) or Measure(name, "")
+    return own or _measures().get(name) or _OWN_COLUMNS.get(name) or Measure(name, "")
 
 
 def factor_name(factor: str) -> str:

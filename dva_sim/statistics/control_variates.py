@@ -20,7 +20,7 @@ from dva_sim.statistics.persons import Floats
 
 FEWEST_EACH = 6
 """Persons for each number that is learned; with fewer the slopes cost more than they are worth."""
-_TOLD_APART = 1e-9  # share of its own size by which a covariate differs from the others
+_DISTINCT = 1e-9  # share of its own size by which a covariate differs from the others
 
 
 def adjusted(means: ArrayLike, covariates: ArrayLike) -> Floats:
@@ -53,10 +53,10 @@ def _pseudo_values(values: Floats, covariates: Floats) -> Floats:
     """
     n = len(values)
     design = np.column_stack([np.ones(n), covariates])
-    inverse = np.linalg.pinv(design, rcond=_TOLD_APART)
+    inverse = np.linalg.pinv(design, rcond=_DISTINCT)
     residual = values - design @ (inverse @ values)
     own = np.einsum("ij,ji->i", design, inverse)  # how much of each fitted value is its own
-    if (own > 1 - _TOLD_APART).any():
+    if (own > 1 - _DISTINCT).any():
         return values
     constant = float((inverse @ values)[0])
     return np.asarray(constant + (n - 1) * inverse[0] * residual / (1 - own))

@@ -27,7 +27,7 @@ BOUNDS: Final[dict[str, int]] = {
     "RobotController.observers": MOST_OBSERVERS,
     "SensorSubscriptions._subscribed": MOST_SUBSCRIBED,
     "Requester.round_trips": 100_000,
-    "DvaAgent._told": 20_000,
+    "DvaAgent._last_reported": 20_000,
     "ReplyCache._replies": 64 * 1024,
     "_Kept.keys": 64,
     "FairQueue._lines[]": 1_000,

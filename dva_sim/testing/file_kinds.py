@@ -122,9 +122,9 @@ def _collect(
     found = []
     try:
         for error in check():
-            found.append(_told(path, blame(error)))
+            found.append(_problem(path, blame(error)))
     except ConfigError as error:
-        found.append(_told(path, blame(error)))
+        found.append(_problem(path, blame(error)))
     except RecursionError:
         found.append(Problem(1, 1, "is nested too deeply"))
     except _HOSTILE as error:
@@ -132,7 +132,7 @@ def _collect(
     return list(dict.fromkeys(found))
 
 
-def _told(path: Path, error: ConfigError) -> Problem:
+def _problem(path: Path, error: ConfigError) -> Problem:
     same = error.file is None or Path(error.file).resolve() == path.resolve()
     return Problem(
         error.line or 1, error.column or 1, error.problem, None if same else str(error.file)

@@ -86,7 +86,7 @@ class _Trial:
     def __init__(self, make: Make, site: Site, rng: np.random.Generator) -> None:
         self._make, self._site, self._rng = make, site, rng
         self.asked, self.mean, self._picture = 0, 0.0, 0.0
-        self.parts = (self._told, self._sizes, self._air, self._repeats, self._stops, self._sight,
+        self.parts = (self._texts, self._sizes, self._air, self._repeats, self._stops, self._sight,
                       self._pictures, self._detectors, self._doses)  # fmt: skip
 
     def _hazard(self, later: float = 0.0) -> Hazard:
@@ -97,7 +97,7 @@ class _Trial:
 
     # --- by itself ---------------------------------------------------------------------
 
-    def _told(self) -> Iterator[Case]:
+    def _texts(self) -> Iterator[Case]:
         """Check the texts that people and files get."""
         hazard = self._hazard()
         if not hazard.title:

@@ -95,7 +95,7 @@ class TriedDrive:
         applied: Numbers of commands that the robot obeyed, and when [s].
         ages: Ages of the applied commands [s].
         superseded: Numbers of commands that a newer one took the place of.
-        told: Times and reasons at which the pattern reported that nobody obeys.
+        rejections: Times and reasons at which the pattern reported that nobody obeys.
         wrong: Broken promises.
         spent: Time that its decisions took [s].
     """
@@ -114,7 +114,7 @@ class TriedDrive:
     applied: list[tuple[int, float]] = field(default_factory=list)
     ages: list[float] = field(default_factory=list)
     superseded: list[int] = field(default_factory=list)
-    told: list[tuple[float, str]] = field(default_factory=list)
+    rejections: list[tuple[float, str]] = field(default_factory=list)
     wrong: list[Case] = field(default_factory=list)
     offered: int = 0
     spent: float = 0.0
@@ -244,7 +244,7 @@ class TriedDrive:
 
     def lost(self, why: str = "") -> None:
         """Implement `Line`."""
-        self.told.append((self.clock.now, why))
+        self.rejections.append((self.clock.now, why))
 
     # --- the robot -------------------------------------------------------------------------
 
@@ -335,8 +335,8 @@ class _Trial:
                 yield "leaves the robot without commands", f"for {max(gaps):.1f} s {where}"
             if drive.ages and max(drive.ages[10:], default=0.0) > most:
                 yield "brings old commands", f"of {max(drive.ages[10:]):.1f} s {where}"
-            if drive.told:
-                yield "gives up a robot that obeys", f"after {drive.told[0][0]:.1f} s {where}"
+            if drive.rejections:
+                yield "gives up a robot that obeys", f"after {drive.rejections[0][0]:.1f} s {where}"
 
     def _copies(self) -> Iterator[Case]:
         """Check that a new copy repeats the drive: no shared memory, no random numbers."""
@@ -376,7 +376,7 @@ class _Trial:
         self._leave(drive)
         limit = 5.0 + TIMEOUT * ATTEMPTS + NOTICED
         yield from self._run(drive, limit)
-        if self._make().answered and not drive.told:
+        if self._make().answered and not drive.rejections:
             case = f"{limit - 5.0:g} s after the robot went"
             yield "does not find out that nobody is there, and says it would", case
 
@@ -401,7 +401,7 @@ class _Trial:
         for code in (m.BAD_SESSION, m.OUT_OF_ORDER, m.BUSY, 999, None):
             drive = self._drive(DELAYS[1], refuses=code)
             yield from self._run(drive, NOTICED)
-            if drive.pattern.answered and code == m.BAD_SESSION and not drive.told:
+            if drive.pattern.answered and code == m.BAD_SESSION and not drive.rejections:
                 yield "does not find out that it is refused", f"within {NOTICED:g} s"
 
     def _after_the_end(self) -> Iterator[Case]:

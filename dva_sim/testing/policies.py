@@ -368,7 +368,10 @@ def _forbidden(policy: Policy, situation: Situation, advice: Sequence[Any]) -> I
         task = situation.tasks[piece.task]
         if isinstance(piece, Announcement):
             if task.stage == "contain" or not task.due or task.auction or task.engaged is not None:
-                yield "announces a task that is not to be announced", f"{_told(piece.task, task)} "
+                yield (
+                    "announces a task that is not to be announced",
+                    f"{_task_text(piece.task, task)} ",
+                )
             continue
         who = situation.responders[piece.responder]
         robots += who.kind == "robot" and who.engaged is None
@@ -393,7 +396,7 @@ def _bad_move(situation: Situation, move: Relocation) -> Iterator[Case]:
         yield "relocates somebody who would never arrive", case
 
 
-def _told(place: int, task: Any) -> str:
+def _task_text(place: int, task: Any) -> str:
     due = "" if task.due else ", not due"
     return f"task {place} ({task.stage}{due}, auction {task.auction or 'none'})"
 

@@ -120,7 +120,7 @@ class CheckedKind:
         kind: The word for one: `dva-sim check KIND NAME`.
         room: The module whose `PLUGINS` tells what there is of it, below `dva_sim`.
         module: The one here whose `check_KIND` tries one.
-        told: Description of the check, with `{tries}`, and `{ms}` or `{us}` of the slowest.
+        summary: Description of the check, with `{tries}`, and `{ms}` or `{us}` of the slowest.
         folder: Folder of the named files, for kinds that are not classes.
         class_word: The word for a class of it, where that is another.
         worded: The module whose `WORDS` describe the shipped ones, where loading these takes long.
@@ -129,7 +129,7 @@ class CheckedKind:
     kind: str
     room: str
     module: str
-    told: str
+    summary: str
     folder: str = ""
     class_word: str = ""
     worded: str = ""
@@ -177,7 +177,7 @@ class CheckedKind:
     def ways(self, outcome: Outcome) -> str:
         """Describe how it was checked."""
         slowest = outcome.slowest
-        return self.told.format(tries=outcome.tries, ms=1e3 * slowest, us=1e6 * slowest)
+        return self.summary.format(tries=outcome.tries, ms=1e3 * slowest, us=1e6 * slowest)
 
 
 def plural(kind: str) -> str:

@@ -115,7 +115,7 @@ class _Trial:
         for _ in range(500):
             asked = self._command()
             speed, turn_rate = drive.set_point(*asked)
-            case = f"({speed!r}, {turn_rate!r}) for {_told(*asked)}"
+            case = f"({speed!r}, {turn_rate!r}) for {_velocity_text(*asked)}"
             if not (math.isfinite(speed) and math.isfinite(turn_rate)):
                 yield "aims at what is no number", case
             elif not -SLACK <= speed <= spec.max_speed + SLACK:
@@ -132,7 +132,7 @@ class _Trial:
             now = (0.0, 0.0) if number % 10 == 0 else now
             dt = TICKS[number % len(TICKS)]
             answer = used.accelerations(speed, turn_rate, *now, dt)
-            case = f"{_told(speed, turn_rate)} at {_told(*now)}"
+            case = f"{_velocity_text(speed, turn_rate)} at {_velocity_text(*now)}"
             if not all(map(math.isfinite, answer)):
                 yield "answers what is no number", case
             elif answer != self._new().accelerations(speed, turn_rate, *now, dt):
@@ -157,7 +157,7 @@ class _Trial:
 
     def _within(self, state: _State, where: str) -> Iterator[Case]:
         speed, turn_rate, spec = state.speed, state.turn_rate, self.spec
-        case = f"{_told(speed, turn_rate)} {where}, tick {state.dt:g} s"
+        case = f"{_velocity_text(speed, turn_rate)} {where}, tick {state.dt:g} s"
         if not speed <= spec.max_speed * (1 + SLACK):
             yield "drives faster than its limit", case
         if not speed >= -CREEP:
@@ -177,7 +177,10 @@ class _Trial:
                 for _ in range(round(60.0 / dt)):
                     state.step(*rest)
                 if abs(state.speed) > CREEP or abs(state.turn_rate) > CREEP:
-                    yield "does not stop within a minute", _told(state.speed, state.turn_rate)
+                    yield (
+                        "does not stop within a minute",
+                        _velocity_text(state.speed, state.turn_rate),
+                    )
                 elif state.way > stated + spec.max_speed * dt:
                     yield "stops too late", f"{state.way:.3f} m; its profile says {stated:.3f} m"
 
@@ -216,5 +219,5 @@ class _Trial:
                 yield "passes through a wall", f"at {math.degrees(heading):.0f} degrees"
 
 
-def _told(speed: float, turn_rate: float) -> str:
+def _velocity_text(speed: float, turn_rate: float) -> str:
     return f"{speed:.3g} m/s, {turn_rate:.3g} rad/s"

@@ -113,7 +113,7 @@ class _FilterTrial:
     def _begins(self) -> Iterator[Case]:
         value = self.make().value()
         if value != (0.0, 0.0):
-            yield "is not zero before the first sample", _told(value)
+            yield "is not zero before the first sample", _pair_text(value)
 
     def _bounds(self) -> Iterator[Case]:
         """Finite, and never beyond what came in; zero is what a filter begins with."""
@@ -129,9 +129,15 @@ class _FilterTrial:
                 slack = 1e-9 * max(-low, high)
                 for value in values:
                     if not math.isfinite(value[axis]):
-                        yield "answers what is no number", f"{_told(value)} in run {number + 1}"
+                        yield (
+                            "answers what is no number",
+                            f"{_pair_text(value)} in run {number + 1}",
+                        )
                     elif not low - slack <= value[axis] <= high + slack:
-                        yield "leaves the range of its input", f"{_told(value)} in run {number + 1}"
+                        yield (
+                            "leaves the range of its input",
+                            f"{_pair_text(value)} in run {number + 1}",
+                        )
 
     def _copies(self) -> Iterator[Case]:
         """Check that copies give the same values independently, and that reading has no effect."""
@@ -160,7 +166,7 @@ class _FilterTrial:
             if not _near(value, (level, turn)):
                 yield (
                     "does not come to what stands for ten minutes",
-                    (f"{_told(value)} for {_told((level, turn))}"),
+                    (f"{_pair_text(value)} for {_pair_text((level, turn))}"),
                 )
 
     def _ages(self) -> Iterator[Case]:
@@ -219,7 +225,7 @@ class _MappingTrial:
             commands = [mapping.command(*reading, PERIOD) for reading in readings]
             self.took.append((time.perf_counter() - started) / len(readings))
             for (level, turn), reading in zip(commands, readings, strict=True):
-                case = f"{_told((level, turn))} for {_told(reading)}"
+                case = f"{_pair_text((level, turn))} for {_pair_text(reading)}"
                 if not (math.isfinite(level) and math.isfinite(turn)):
                     yield "answers what is no number", case
                 elif not (0.0 <= level <= LEVELS and abs(turn) <= MAX_TURN_DEG):
@@ -258,8 +264,11 @@ class _MappingTrial:
                 halves.command(*reading, PERIOD / 2)
                 two = halves.command(*reading, PERIOD / 2)
             if not all(math.isclose(a, b, rel_tol=NEAR) for a, b in zip(one, two, strict=True)):
-                case = f"{_told(two)} after {2 * count} half steps, "
-                yield "integrates by steps, not by time", f"{case}{_told(one)} after {count} whole"
+                case = f"{_pair_text(two)} after {2 * count} half steps, "
+                yield (
+                    "integrates by steps, not by time",
+                    f"{case}{_pair_text(one)} after {count} whole",
+                )
 
     def _rest(self) -> Iterator[Case]:
         """A phone held at rest stands, and turns no faster than when it came to rest."""
@@ -271,10 +280,10 @@ class _MappingTrial:
             for _ in range(200):
                 last, (speed, rate) = rate, mapping.command(0.0, 0.0, PERIOD)
                 if abs(rate) > abs(last) + 1e-9:
-                    yield "turns faster and faster at rest", f"after {_told((level, turn))}"
+                    yield "turns faster and faster at rest", f"after {_pair_text((level, turn))}"
                     break
             if speed != 0.0:
-                yield "drives at rest", f"level {speed:g} after {_told((level, turn))}"
+                yield "drives at rest", f"level {speed:g} after {_pair_text((level, turn))}"
 
     def _way(self) -> Iterator[Case]:
         """Tilting to the left turns to the left, and more tilt no less; and so with speed."""
@@ -286,9 +295,9 @@ class _MappingTrial:
                 now = mapping.command(*reading, PERIOD)
                 _, turned = mirror.command(reading[0], -reading[1], PERIOD)
             if now[0] < before[0] - 1e-9 or now[1] < before[1] - 1e-9:
-                yield "answers less to more tilt", f"{_told(now)} for {_told(reading)}"
+                yield "answers less to more tilt", f"{_pair_text(now)} for {_pair_text(reading)}"
             if abs(now[1] + turned) > 1e-9 * MAX_TURN_DEG:
-                yield "turns left and right differently", f"for {_told(reading)}"
+                yield "turns left and right differently", f"for {_pair_text(reading)}"
             before = now
 
     def _tilts(self) -> Iterator[Case]:
@@ -297,7 +306,7 @@ class _MappingTrial:
             for shown in ((0.0, 0.0), (10.0, 30.0), (4.0, -30.0)):
                 reading = mapping.tilt_for(wanted, shown, WITHIN)
                 if not all(map(math.isfinite, reading)):
-                    yield "would tilt to what is no number", f"for {_told(wanted)}"
+                    yield "would tilt to what is no number", f"for {_pair_text(wanted)}"
 
     def _steered(self) -> Iterator[Case]:
         """A hand that tilts as `tilt_for` says gets what is wanted, and keeps it."""
@@ -310,7 +319,7 @@ class _MappingTrial:
             if not _near(shown, (max(wanted[0], 0.0), wanted[1])):
                 yield (
                     "does not get where tilt_for tilts to",
-                    (f"{_told(shown)} when {_told(wanted)} is wanted"),
+                    (f"{_pair_text(shown)} when {_pair_text(wanted)} is wanted"),
                 )
 
 
@@ -323,5 +332,5 @@ def _cut(value: float, most: float) -> float:
     return min(max(value, -most), most)
 
 
-def _told(pair: Pair) -> str:
+def _pair_text(pair: Pair) -> str:
     return f"level {pair[0]:.3g}, {pair[1]:.3g} deg/s"

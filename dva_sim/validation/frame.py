@@ -131,7 +131,7 @@ class ValidationResult:
         notes: Notes on the headline, one sentence each.
         conditions: Conditions of the validation, by name.
         sheets: Content of the page, in order.
-        told: Content on a terminal, in order.
+        printed: Content on a terminal, in order.
         draw: Draws the figures, which takes a while.
         tables: Rows by name, each with the same keys.
         rule: Numbers that the page's method names.
@@ -143,7 +143,7 @@ class ValidationResult:
     notes: Sequence[str]
     conditions: Mapping[str, str]
     sheets: Sequence[ResultSheet]
-    told: Sequence[ResultSheet]
+    printed: Sequence[ResultSheet]
     draw: Callable[[], Sequence[Drawn]]
     tables: Mapping[str, Sequence[Row]]
     rule: tuple[float, ...] = ()

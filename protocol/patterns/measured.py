@@ -92,6 +92,6 @@ def _applied(file, where):
             newest = made
             kept.append((made, arrived))
     if len(kept) < 2:
-        told = ", ".join(f"{key} {value}" for key, value in where.items()) or "the file"
-        raise ConfigError(f"of {told}, fewer than two commands arrived", path)
+        place = ", ".join(f"{key} {value}" for key, value in where.items()) or "the file"
+        raise ConfigError(f"of {place}, fewer than two commands arrived", path)
     return kept

@@ -27,7 +27,7 @@ def test_commands_come_in_their_order_and_each_is_accounted_for(world, name):
     drive.end()
     numbers = [number for number, _ in drive.applied]
     assert numbers == sorted(set(numbers))
-    assert (drive.wrong, drive.told) == ([], [])
+    assert (drive.wrong, drive.rejections) == ([], [])
     assert 0 <= drive.held <= 1
 
 
@@ -40,7 +40,7 @@ def test_who_asks_now_and_then_finds_out_that_the_robot_is_gone(world):
     drive.listen(on=False)
     world.leave(ROBOT)
     gone = world.clock.now
-    world.run_until(lambda: drive.told)
+    world.run_until(lambda: drive.rejections)
     drive.end()
     if isinstance(world, VirtualWorld):
         assert world.clock.now - gone < 2 * brief + 1.0
@@ -51,6 +51,6 @@ def test_who_asks_finds_out_that_it_is_refused(world, name):
     pattern = load_pattern(name, {"every": 3} if name == EXAMPLE else {})()
     drive = small_drive(world, pattern, refuses=4, timeout=PATIENCE_S)
     drive.begin()
-    world.run_until(lambda: drive.told)
+    world.run_until(lambda: drive.rejections)
     drive.end()
-    assert drive.told[0][1].endswith(": bad session")
+    assert drive.rejections[0][1].endswith(": bad session")

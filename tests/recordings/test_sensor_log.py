@@ -56,9 +56,9 @@ def test_a_log_is_read_in_seconds_and_metres(tmp_path, kind):
     head, lines, delimiter = LOGS[kind]
     samples = read_sensor_log(log_of(tmp_path, head, lines, delimiter))
     assert len(samples) == LASTS
-    assert samples[0].told == 0.0
+    assert samples[0].stamp == 0.0
     if kind != "epoch in milliseconds":  # of which nine digits are seconds
-        steps = np.diff([sample.told for sample in samples])
+        steps = np.diff([sample.stamp for sample in samples])
         assert steps == pytest.approx(1 / RATE, rel=1e-6)
     assert samples[-1].xyz == pytest.approx(XYZ, rel=1e-6)
 

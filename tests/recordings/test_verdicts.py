@@ -40,25 +40,25 @@ NEVER = run(("open", inf), duration=600.0)
 )
 def test_a_run_tells_how_it_ended(ended, text, good):
     (verdict,) = verdicts([ended])
-    assert (verdict.told, verdict.good) == (text, good)
+    assert (verdict.full_text, verdict.good) == (text, good)
     assert verdict.time <= ended.duration
 
 
 def test_of_two_runs_the_one_that_was_ahead_says_by_how_much():
     late, early = verdicts([LATE, EARLY])
-    assert late.told == "confirmed at 234.4 s"
-    assert early.told.split(", ") == ["confirmed at 127.3 s", "107 s ahead"]
+    assert late.full_text == "confirmed at 234.4 s"
+    assert early.full_text.split(", ") == ["confirmed at 127.3 s", "107 s ahead"]
     assert late.ahead == -early.ahead == pytest.approx(-107.1)
     assert verdicts([EARLY, LATE])[0] == early
 
 
 def test_a_lead_of_a_moment_is_told_in_tenths_and_one_too_short_to_tell_not_at_all():
-    reports = [verdicts([LATE, run(("confirmed", t))])[1].told for t in (233.0, 234.38)]
+    reports = [verdicts([LATE, run(("confirmed", t))])[1].full_text for t in (233.0, 234.38)]
     assert [line.split(", ")[1:] for line in reports] == [["1.4 s ahead"], []]
 
 
 def test_who_is_alone_in_coming_to_an_end_says_so():
-    alone, never = (v.told for v in verdicts([EARLY, NEVER]))
+    alone, never = (v.full_text for v in verdicts([EARLY, NEVER]))
     assert unnamed(alone, "confirmed at 127.3 s", "other") == []
     assert unnamed(never, "not confirmed", "600 s") == []
     assert [v.ahead for v in verdicts([NEVER, NEVER])] == [0, 0]
@@ -72,7 +72,7 @@ def test_two_runs_differ_most_when_the_first_is_done():
 
 def test_two_runs_are_told_beside_each_other_by_the_names_that_reports_use():
     names = ["REQ/REP".ljust(21), "latest-wins PUB/SUB  "]
-    reports = [verdict.told for verdict in verdicts([LATE, EARLY])]
+    reports = [verdict.full_text for verdict in verdicts([LATE, EARLY])]
     assert story([LATE, EARLY]) == [
         f"{name}{line}" for name, line in zip(names, reports, strict=True)
     ]

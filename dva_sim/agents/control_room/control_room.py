@@ -23,7 +23,7 @@ class ControlRoomAgent:
 
     Attributes:
         events: Latest published state of each event, by number.
-        told_at: Time of that publication [s].
+        received_at: Time of that publication [s].
         devices: Registered devices by id, from the latest list.
         dispatch: Dispatch mode and own role; None until the first publication.
         orders: Orders for robots that it drives at its own wish, by event.
@@ -38,7 +38,7 @@ class ControlRoomAgent:
     def __init__(self, device: AgentDevice) -> None:
         self.device = device
         self.events: dict[int, m.EventStatus] = {}
-        self.told_at: dict[int, float] = {}
+        self.received_at: dict[int, float] = {}
         self.devices: dict[str, m.Device] = {}
         self.dispatch: m.DispatchStatus | None = None
         self.orders: dict[int, m.Order] = {}
@@ -117,7 +117,7 @@ class ControlRoomAgent:
         number, known = status.event_id, self.events.get(status.event_id)
         if known is not None and (status.age, status.decisions) < (known.age, known.decisions):
             return
-        self.events[number], self.told_at[number] = status, self.device.clock.now
+        self.events[number], self.received_at[number] = status, self.device.clock.now
         self._forget_the_oldest()
         self.on_event(status)
 
@@ -126,7 +126,7 @@ class ControlRoomAgent:
             return
         closed = [n for n, status in self.events.items() if status.closed_for is not None]
         for number in sorted(closed)[:-MOST_CLOSED]:
-            del self.events[number], self.told_at[number]
+            del self.events[number], self.received_at[number]
 
     def _switched(self, status: m.DispatchStatus) -> None:
         before = self.dispatch

@@ -114,13 +114,13 @@ class ScriptedDispatcher:
             self._done()
             return
 
-        def told(reply: m.Reply) -> None:
+        def take_reply(reply: m.Reply) -> None:
             if isinstance(reply.content, m.Proposal):
                 self._decide(number, reply.content)
             else:
                 self._done()
 
-        self.room.ask(m.GetProposal(number), told, self._done)
+        self.room.ask(m.GetProposal(number), take_reply, self._done)
 
     def _decide(self, number: int, proposal: m.Proposal) -> None:
         status = self.room.events[number]

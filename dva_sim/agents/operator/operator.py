@@ -21,7 +21,7 @@ from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
 ASK_BEFORE, ASK_AFTER = 3, 1  # design: asked so often for one order: before and in a drive
-TOLD = {
+AS_SEEN = {
     "lost link": "takes the link for lost",
     REFUSED: "is refused",
 }  # what a drive's end looks like to the operator
@@ -231,7 +231,7 @@ class OperatorAgent:
     def _finish(self, drive: Work, outcome: str, why: str) -> None:
         """A drive is over: stop the robot, tell the DVA, be free again."""
         device, order = self.device, drive.order
-        device.tell(f"{TOLD.get(outcome, outcome)}{': ' + why if why else ''}", "drive")
+        device.tell(f"{AS_SEEN.get(outcome, outcome)}{': ' + why if why else ''}", "drive")
         found, by_dva = outcome in ("confirmed", "refuted"), outcome in BY_DVA
         if found:
             body = m.EventReport(order.event_id, order.kind, order.position, 0.5, 0.95, outcome)

@@ -181,7 +181,7 @@ class RobotController:
             case m.GetSensorInfo(device=device) if device in (None, self.id_tag):
                 return Decision(m.OK, content=m.SensorInfo(self.camera_url, self.sensors))
             case m.Reply():
-                return self._told_by_dva(body)
+                return self._dva_answered(body)
             case m.GetSensorInfo():
                 return Decision(m.UNKNOWN_DEVICE, "ask the DVA for the sensors of others")
             case _:
@@ -330,7 +330,7 @@ class RobotController:
         self.inquiry.about_holder(self.grant.holder)
         return self._is_held(None)
 
-    def _told_by_dva(self, body: m.Reply) -> Decision:
+    def _dva_answered(self, body: m.Reply) -> Decision:
         """Apply an answer of the DVA: nothing else gives anybody the robot.
 
         "Nobody holds it" does not end a drive: a DVA that has lost its memory may say so.

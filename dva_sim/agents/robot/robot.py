@@ -138,7 +138,7 @@ class RobotAgent:
         self.blind = self.drained = False
         self._fared, self._held_since = m.OK, 0.0
         # Who holds it, and how that fares, as was published last.
-        self._told: tuple[str | None, int] = (None, m.WRONG_MODE)
+        self._last_published: tuple[str | None, int] = (None, m.WRONG_MODE)
         self.inbox = CommandQueue(
             clock=device.clock,
             service=setup.service,
@@ -153,7 +153,7 @@ class RobotAgent:
         self._confirmations = Confirmations(
             device,
             controller,
-            self._told_by_dva,
+            self._dva_answered,
             partial(self._conclude, waited=True),
             self._happened,
         )
@@ -416,7 +416,7 @@ class RobotAgent:
             return stop._replace(code=m.BUSY, text=f"told to stop, but {self.unfit}")
         return None
 
-    def _told_by_dva(self, reply: m.Reply) -> Decision:
+    def _dva_answered(self, reply: m.Reply) -> Decision:
         """The DVA has answered what it was asked, over a connection of the robot's own."""
         me, dva = self.device.id_tag, self.device.dva
         answer = m.Message(me, 1, dva, "00:00:00", 0, reply)
@@ -431,10 +431,10 @@ class RobotAgent:
         holder = self._holder
         if isinstance(message.body, DRIVING) and message.source == holder:
             self._fared = code
-        if holder != self._told[0]:
+        if holder != self._last_published[0]:
             self._held_since = self.device.clock.now
         fares = self._fares
-        if (holder, fares if fares in m.OBEYS_NO_MORE else m.OK) != self._told:
+        if (holder, fares if fares in m.OBEYS_NO_MORE else m.OK) != self._last_published:
             self._publish_holder()
 
     @property
@@ -448,7 +448,7 @@ class RobotAgent:
     def _publish_holder(self) -> None:
         """Say who holds the robot, to those who listen: who publishes commands gets no answer."""
         network, me, fares = self.device.network, self.device.id_tag, self._fares
-        self._told = self._holder, fares if fares in m.OBEYS_NO_MORE else m.OK
+        self._last_published = self._holder, fares if fares in m.OBEYS_NO_MORE else m.OK
         held = min(self.device.clock.now - self._held_since, LONGEST_HELD)
         if network.ready(me, HOLDER, WHATEVER_WAITS):
             self.device.publish(HOLDER, m.RobotHolder(self._holder, None, held, fares or None))

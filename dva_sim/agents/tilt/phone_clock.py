@@ -25,26 +25,26 @@ class PhoneClock:
 
     def __init__(self) -> None:
         self.offset = math.inf
-        self._told, self._came, self._last = -math.inf, -math.inf, -math.inf
+        self._last_stamp, self._came, self._last = -math.inf, -math.inf, -math.inf
 
-    def is_old(self, told: float) -> bool:
+    def is_old(self, stamp: float) -> bool:
         """Return True if what was told for a time [s] is obsolete."""
-        return self._told - ANEW < told <= self._told
+        return self._last_stamp - ANEW < stamp <= self._last_stamp
 
-    def times_of(self, told: Sequence[float], came: float) -> list[float]:
+    def times_of(self, stamps: Sequence[float], came: float) -> list[float]:
         """Return when samples were taken by our clock [s]: not in the future, and in order.
 
         Args:
-            told: Times by the phone, rising [s]; at least one.
+            stamps: Times by the phone, rising [s]; at least one.
             came: Common arrival time by our clock [s]; not before earlier ones.
         """
-        if told[-1] <= self._told - ANEW:
+        if stamps[-1] <= self._last_stamp - ANEW:
             self.offset = math.inf
         grown = self.offset + DRIFT * (came - self._came)
-        self.offset = min(came - told[-1], grown)
-        self._told, self._came = told[-1], came
-        return [self._set(one, came) for one in told]
+        self.offset = min(came - stamps[-1], grown)
+        self._last_stamp, self._came = stamps[-1], came
+        return [self._set(one, came) for one in stamps]
 
-    def _set(self, told: float, came: float) -> float:
-        self._last = max(self._last, min(came, told + self.offset))
+    def _set(self, stamp: float, came: float) -> float:
+        self._last = max(self._last, min(came, stamp + self.offset))
         return self._last

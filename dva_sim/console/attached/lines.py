@@ -175,7 +175,7 @@ def device_row(device_state: DeviceState, now: float, is_fake: bool, may_revoke:
 
 def event_row(
     status: m.EventStatus,
-    told_at: float,
+    received_at: float,
     labels: Mapping[str, str],
     site: Site | None,
     frame: GeoFrame,
@@ -196,7 +196,7 @@ def event_row(
         "severity_value": round(status.severity, 2),
         "state": status.event_state.replace("_", " "),
         "over": over,
-        "since_ms": round(1000 * (told_at - status.state_for)),
-        "reported_ms": round(1000 * (told_at - status.age)),
+        "since_ms": round(1000 * (received_at - status.state_for)),
+        "reported_ms": round(1000 * (received_at - status.age)),
         "assigned": [] if over else [labels.get(i, i) for i in sent if i is not None],
     }

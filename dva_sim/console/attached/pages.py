@@ -176,9 +176,9 @@ class AttachedPages:
         return [
             {
                 **lines.event_row(
-                    *(status, agent.told_at[number], labels, system.site, system.frame)
+                    *(status, agent.received_at[number], labels, system.site, system.frame)
                 ),
-                **about_event(agent.events, agent.told_at, number),
+                **about_event(agent.events, agent.received_at, number),
             }
             for number, status in sorted(agent.events.items())
         ]

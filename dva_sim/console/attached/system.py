@@ -105,7 +105,7 @@ class AttachedSystem:
         """Nothing of what was told of events counts until the DVA has told all there are."""
         self.is_told = False
         self.agent.events.clear()
-        self.agent.told_at.clear()
+        self.agent.received_at.clear()
         self.clock.call_after(0.0, self.agent.refresh)  # after the device has registered again
 
     def _all_told(self) -> None:
@@ -179,7 +179,7 @@ class AttachedSystem:
         """Return how long ago an event was first reported [s]."""
         if event is None or (status := self.agent.events.get(event)) is None:
             return None
-        return status.age + self.clock.now - self.agent.told_at[event]
+        return status.age + self.clock.now - self.agent.received_at[event]
 
     # --- devices ---------------------------------------------------------------------------
 

@@ -71,7 +71,7 @@ class DvaPages:
         grant = self._run.dva.core.sessions.permissions.grants.get(robot)
         if grant is None:
             raise Refused(f"nobody has a permission for {robot}")
-        self._run.dva.revoke(grant.robot, None, holder_told=True)
+        self._run.dva.revoke(grant.robot, None, notify_holder=True)
         labels = self._run.stage.labels
         holder = labels.get(grant.holder, grant.holder)
         on_result(

@@ -176,7 +176,7 @@ class PublishingWorld:
         """Events with what was decided on them, and who decides."""
         listener, now_ms = self.rooms.listener, self.feed.now_ms
         self._events = [
-            {**event, **about_event(listener.events, listener.told_at, event["number"])}
+            {**event, **about_event(listener.events, listener.received_at, event["number"])}
             for event in self.feed.events()
         ]
         self._news.tell({"k": "events", "t": now_ms, "events": self._events})

@@ -91,7 +91,7 @@ class Difference:
         return self.is_paired and self.same == self.runs[0] == self.runs[1]
 
     @property
-    def is_told_from_zero(self) -> bool:
+    def differs_from_zero(self) -> bool:
         """True if the unadjusted interval excludes zero."""
         return self.interval.low > 0 or self.interval.high < 0
 

@@ -114,7 +114,7 @@ def typical_and_worst(
                 trial=int(runs["trial"][row]),
                 value=value,
                 moments=moments,
-                incidents=incidents or _told(events),
+                incidents=incidents or _listed_incidents(events),
                 kept=len(rows),
                 rank=float((every < value).mean()),
                 span=_span(events, measure, value),
@@ -173,7 +173,7 @@ def _of_run(table: Table | None, part: str, runs: Table, row: int) -> Table:
     return {name: np.asarray(values)[mine] for name, values in table.items()}
 
 
-def _told(events: Table) -> tuple[SeenIncident, ...]:
+def _listed_incidents(events: Table) -> tuple[SeenIncident, ...]:
     """Incidents listed in the table of events, with their rooms."""
     if "t_occurred_s" not in events:
         return ()

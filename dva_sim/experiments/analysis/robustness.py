@@ -231,7 +231,10 @@ def _repeat(read: _Reading, where: dict[str, Level]) -> Repeat | None:
 
 def sentences(robustness: RepeatedAnswer) -> list[str]:
     """In how many repeats the conclusion holds, and how far effects reach."""
-    return [_what_was_repeated(robustness), *(_told(robustness, s) for s in robustness.stops)]
+    return [
+        _what_was_repeated(robustness),
+        *(_stop_sentence(robustness, s) for s in robustness.stops),
+    ]
 
 
 def _what_was_repeated(r: RepeatedAnswer) -> str:
@@ -246,7 +249,7 @@ def _what_was_repeated(r: RepeatedAnswer) -> str:
     )
 
 
-def _told(r: RepeatedAnswer, stop: RepeatedStop) -> str:
+def _stop_sentence(r: RepeatedAnswer, stop: RepeatedStop) -> str:
     count = len(stop.others)
     where = f"At {factor_name(r.over)} {level_name(r.over, stop.level)}"
     if not count:

@@ -324,7 +324,7 @@ def _fewest(chance: Callable[[int], float], wanted: float) -> float:
 
 def _sides(contrast: Contrast, at: Setting) -> str:
     measure = measure_of(contrast.measure, contrast.part)
-    return _told(contrast.factor, contrast.contrast, measure, at)
+    return _difference_text(contrast.factor, contrast.contrast, measure, at)
 
 
 def _sides_of(view: StudyView, stop: int) -> str:
@@ -332,10 +332,10 @@ def _sides_of(view: StudyView, stop: int) -> str:
     assert view.contrast is not None
     at = dict(view.panels[0]) | view.at_stop(stop)
     measure = measure_of(view.measure, view.part.name)
-    return _told(view.line.name, view.contrast, measure, at)
+    return _difference_text(view.line.name, view.contrast, measure, at)
 
 
-def _told(factor: str, levels: tuple[Any, Any], measure: str, at: Setting) -> str:
+def _difference_text(factor: str, levels: tuple[Any, Any], measure: str, at: Setting) -> str:
     """`A minus B in driving time, at delay 1 s`."""
     first, second = (level_name(factor, level) for level in levels)
     where = f", {setting(at)}" if at else ""

@@ -81,7 +81,7 @@ class Checkpoint:
 
     def __init__(self, folder: Path, identity: str | None, must_exist: bool = False) -> None:
         self.path = folder / JOURNAL
-        with self._told():
+        with self._readable_errors():
             self._db = self._connected(must_exist)
             try:
                 if not must_exist:
@@ -129,7 +129,7 @@ class Checkpoint:
             DvaSimError: the disk is full, or another program holds the checkpoint.
         """
         rows = [(*o.key, o.tables, o.cost_s, o.error) for o in batch]
-        with self._told(), self._transaction():
+        with self._readable_errors(), self._transaction():
             self._db.executemany(_ADD, rows)
             self._db.execute("UPDATE study SET wall_s = wall_s + ?", [wall_s])
 
@@ -140,7 +140,7 @@ class Checkpoint:
         Raises:
             DvaSimError: another program holds the checkpoint.
         """
-        with self._told():
+        with self._readable_errors():
             self._patiently("BEGIN IMMEDIATE")
         try:
             yield
@@ -175,7 +175,7 @@ class Checkpoint:
         Raises:
             DvaSimError: the disk is full, or another program holds the checkpoint.
         """
-        with self._told(), self._transaction():
+        with self._readable_errors(), self._transaction():
             self._db.execute("UPDATE study SET manifest = ?", [json.dumps(manifest)])
 
     def manifest(self) -> dict[str, Any] | None:
@@ -210,11 +210,11 @@ class Checkpoint:
         return float(self._ask("SELECT wall_s FROM study")[0][0])
 
     def _ask(self, query: str, values: Sequence[Any] = ()) -> list[Any]:
-        with self._told():
+        with self._readable_errors():
             return self._db.execute(query, values).fetchall()
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _readable_errors(self) -> Iterator[None]:
         """Turn what a user can mend into one line."""
         try:
             yield

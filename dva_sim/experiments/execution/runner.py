@@ -82,7 +82,7 @@ def run_study(
         own = tuple(plan.measures)
         simulate = episode or (partial(run_job, measures=own) if own else run_job)
         session = _Session(plan, checkpoint, workers, simulate, progress, limit_s)
-        with session.told():
+        with session.explained_ends():
             carried_out, stopped = _run_rounds(plan.study, plan.jobs, session)
             with checkpoint.alone():
                 _tidy(out)
@@ -159,7 +159,7 @@ class _Session:
         self._tell(self._count, self._count)
 
     @contextmanager
-    def told(self) -> Iterator[None]:
+    def explained_ends(self) -> Iterator[None]:
         """Say with a Ctrl-C, or when all workers are lost, how far it had come."""
         go_on = "run the same command again to resume"
         try:

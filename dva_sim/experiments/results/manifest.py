@@ -23,7 +23,7 @@ from dva_sim.experiments.study.hashing import (
     program_state,
     stable_hash,
 )
-from dva_sim.experiments.study.own_measures import columns_told
+from dva_sim.experiments.study.own_measures import own_columns
 from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.experiments.study.study import Status
 from dva_sim.kernel.errors import DvaSimError, RunTooLong
@@ -64,7 +64,7 @@ def manifest_of(plan: StudyPlan) -> dict[str, Any]:
         },
         "versions": _simulating(),
     }
-    if columns := columns_told(plan.measures.values(), (cell.scenario for cell in cells)):
+    if columns := own_columns(plan.measures.values(), (cell.scenario for cell in cells)):
         content["columns"] = columns
     identity = stable_hash(content)
     content["versions"] = versions()

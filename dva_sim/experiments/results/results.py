@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from duckdb import DuckDBPyConnection, DuckDBPyRelation
 
 
-Told = Mapping[str, Mapping[str, Mapping[str, Any]]]
+OwnColumns = Mapping[str, Mapping[str, Mapping[str, Any]]]
 """Meanings of users' own columns, kept in the results folder, by table and name."""
 
 
@@ -57,7 +57,7 @@ def describe(
     columns: Sequence[str],
     models: Sequence[str],
     factors: Sequence[str],
-    told: Told | None = None,
+    own_columns: OwnColumns | None = None,
 ) -> list[Column]:
     """Describe some columns of a table of results.
 
@@ -66,10 +66,10 @@ def describe(
         columns: Their names.
         models: Those of the study's parts; where meanings differ, all are given.
         factors: Names of the study's factors.
-        told: Descriptions of user-defined columns, from the results.
+        own_columns: Descriptions of user-defined columns, from the results.
     """
     table_of = "runs" if table == REPEATS else table
-    added = (told or {}).get(table_of, {})
+    added = (own_columns or {}).get(table_of, {})
     return [
         Column(table, name, unit_of(name), _meaning(table_of, name, models, factors, added))
         for name in columns

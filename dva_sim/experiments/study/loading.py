@@ -257,7 +257,7 @@ def _version_of(
         made._usual = study.usual
         return made, data
     except ConfigError as error:
-        raise _told_in(study, version, error) from None
+        raise _located(study, version, error) from None
 
 
 def _size_of(study: Study) -> dict[str, Any]:
@@ -267,7 +267,7 @@ def _size_of(study: Study) -> dict[str, Any]:
     return {"name": study.file.stem} | size
 
 
-def _told_in(study: Study, version: Version, error: ConfigError) -> ConfigError:
+def _located(study: Study, version: Version, error: ConfigError) -> ConfigError:
     """A mistake of a version, at the key that it names."""
     named = [
         key

@@ -32,9 +32,7 @@ def own_measures(study: Study) -> dict[str, RunMeasure]:
     return found
 
 
-def columns_told(
-    measures: Iterable[RunMeasure], scenarios: Iterable[AnyScenario]
-) -> dict[str, Any]:
+def own_columns(measures: Iterable[RunMeasure], scenarios: Iterable[AnyScenario]) -> dict[str, Any]:
     """Descriptions of user-defined columns, by table and name, kept with the results.
 
     It is read without the files that the columns come from.

@@ -29,7 +29,7 @@ class RunVerdict(NamedTuple):
     ahead: float = 0.0
 
     @property
-    def told(self) -> str:
+    def full_text(self) -> str:
         """The words, with the lead if there is one."""
         if self.ahead == math.inf:
             return f"{self.text}, the other not at all"
@@ -55,7 +55,9 @@ def story(runs: Sequence[Playback]) -> list[str]:
     """Describe the outcomes of runs under several patterns, one line each."""
     names = [pattern_name(run) for run in runs]
     width = max(map(len, names))
-    return [f"{name:<{width}}  {v.told}" for name, v in zip(names, verdicts(runs), strict=True)]
+    return [
+        f"{name:<{width}}  {v.full_text}" for name, v in zip(names, verdicts(runs), strict=True)
+    ]
 
 
 def pattern_name(run: Playback) -> str:

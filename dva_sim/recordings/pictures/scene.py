@@ -54,9 +54,9 @@ class Scene:
         self._clock = ax.set_title("", loc="right", fontsize=style.TITLE, pad=2)
         self._clock.set_animated(True)
         ax.set_title(title, fontsize=style.TITLE, fontweight="bold", loc="left", pad=2)
-        self._told, self._ended = self._line(), self._line(_colour_of(verdict))
-        self._ended.set(text=verdict.told, fontsize=style.FONT + 0.5)
-        if len(verdict.told) * BOLD * style.TITLE < self._across():
+        self._story_line, self._ended = self._line(), self._line(_colour_of(verdict))
+        self._ended.set(text=verdict.full_text, fontsize=style.FONT + 0.5)
+        if len(verdict.full_text) * BOLD * style.TITLE < self._across():
             self._ended.set_fontsize(style.TITLE)
 
     def _draw_ground(self) -> tuple[Any, Any]:
@@ -99,9 +99,9 @@ class Scene:
         if self._verdict.text and time >= self._verdict.time:
             return ended
         timeline = self._moments.recording.recorder.timeline
-        text = _told(timeline, time) if self._outlook is None else self._outlook
-        self._told.set_text(_shortened(text, int(self._across() / (PLAIN * style.FONT))))
-        line: Artist = self._told
+        text = _newest_line(timeline, time) if self._outlook is None else self._outlook
+        self._story_line.set_text(_shortened(text, int(self._across() / (PLAIN * style.FONT))))
+        line: Artist = self._story_line
         return line
 
     def _across(self) -> float:
@@ -152,7 +152,7 @@ def _colour_of(verdict: RunVerdict) -> str:
     return style.BEHIND if verdict.ahead < 0 else style.AHEAD
 
 
-def _told(timeline: Sequence[Moment], time: float) -> str:
+def _newest_line(timeline: Sequence[Moment], time: float) -> str:
     """The newest line of the story."""
     reports = [m for m in timeline if m.time <= time and m.kind != "link"]
     return f"{reports[-1].who} {reports[-1].what}".replace("_", " ") if reports else ""

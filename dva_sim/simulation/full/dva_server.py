@@ -25,7 +25,7 @@ from dva_sim.core.store import Store
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
-MOST_TOLD = 20_000  # events whose last word is remembered, so that none is said twice
+MOST_REPORTED = 20_000  # events whose last word is remembered, so that none is said twice
 FIRST_BEAT = 1.27  # after the start, when hardly anything else happens at the same moment [s]
 MOST_TURNED_AWAY = 1000  # devices that were not registered, of which that was told
 TICK = 1.0  # how often the core looks at deadlines [s]
@@ -62,7 +62,7 @@ class DvaAgent:
         self.on_fact: Callable[[Fact], object] = self.facts.append
         self._asks = core.dispatcher.questions.asks
         self._memory, self._keep_events = memory, keep_events
-        self._told: dict[int, State] = {}
+        self._last_reported: dict[int, State] = {}
         self._policy_failures = 0
         self.leave_after, self.is_gone = device.timeout, False
         self._problem: str | None = None
@@ -110,20 +110,20 @@ class DvaAgent:
         self._carry_out(self.core.dismiss(device, self.device.clock.now))
         self._attend()
 
-    def revoke(self, robot: str, takes: str | None, holder_told: bool) -> None:
+    def revoke(self, robot: str, takes: str | None, notify_holder: bool) -> None:
         """End the permission for a robot while it is in use, as a scenario wants.
 
         Args:
             robot: Its id.
             takes: Device that gets it next, if any.
-            holder_told: True if the notice reaches the previous holder.
+            notify_holder: True if the notice reaches the previous holder.
         """
         sessions, entries = self.core.sessions, self.core.registry.entries
         grant = sessions.permissions.grants.get(robot)
         if grant is None:
             return
         sessions.revoke(grant)
-        sends = [s for s in sessions.to_tell() if holder_told or s.to != grant.holder]
+        sends = [s for s in sessions.to_tell() if notify_holder or s.to != grant.holder]
         if takes in entries:
             wish = m.PermissionRequest(robot, grant.level)
             granted = sessions.grant(entries[robot].device, entries[takes].device, wish)
@@ -307,11 +307,11 @@ class DvaAgent:
         self._problem = problem
 
     def _tell(self, event: Event) -> None:
-        if self._told.get(event.number) is event.state:
+        if self._last_reported.get(event.number) is event.state:
             return
-        self._told[event.number] = event.state
-        if len(self._told) > MOST_TOLD:
-            del self._told[next(iter(self._told))]
+        self._last_reported[event.number] = event.state
+        if len(self._last_reported) > MOST_REPORTED:
+            del self._last_reported[next(iter(self._last_reported))]
         text = f"event {event.number} ({event.kind}) is {event.state}"
         if event.state is State.ASSIGNED and event.holder:
             text += f" to {self.device.label_of(event.holder)}"

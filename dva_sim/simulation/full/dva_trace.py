@@ -130,9 +130,9 @@ class TracedDva:
             self._sink = _nowhere
         return {"do": "answer", "to": number, "reply": data, "now": now}
 
-    def _decided(self, told: dict[str, Any], decide: Callable[[], T]) -> T:
+    def _decided(self, entry: dict[str, Any], decide: Callable[[], T]) -> T:
         self._bits = []
-        told |= self._new_roles()
+        entry |= self._new_roles()
         decision = decide()
         _, sends = _parts(decision)
         for send in sends:
@@ -142,7 +142,7 @@ class TracedDva:
         while len(self._numbers) > REMEMBERED:
             self._numbers.popitem(last=False)
         drawn = {"bits": self._bits} if self._bits else {}
-        self._sink(json.dumps(told | drawn | {"decided": _in_words(decision)}))
+        self._sink(json.dumps(entry | drawn | {"decided": _in_words(decision)}))
         return decision
 
     def _new_roles(self) -> dict[str, Any]:

@@ -24,7 +24,7 @@ STEP_SLACK = 0.5  # of the time of a step of an event [s]
 PENDING_SLACK = 2.0  # the core looks at deadlines once a second, the audit twice [s]
 SILENT_AFTER = 10.0  # a device of which nothing was heard for so long holds nothing any longer [s]
 LOST_BY_RESTART = 1.0  # a DVA that was killed goes on from the time that it wrote last [s]
-TOLD_WITHIN = (
+INFORMED_WITHIN = (
     90.0  # a robot that is heard is told of the end of a session, whatever waits before [s]
 )
 HEARD_LATE = 25.0  # of a place that a device has told, over a bad link [s]
@@ -132,8 +132,8 @@ class EventLedger:
         self.knows_places, self._is_new = True, True
         self._heard: dict[str, float] = {}
         self._held_since: dict[Right, float] = {}
-        self._told: dict[int, None] = {}
-        self._untold: dict[Right, float] = {}
+        self._informed: dict[int, None] = {}
+        self._uninformed: dict[Right, float] = {}
         self._asked: dict[tuple[str, int], m.EventReport] = {}
         self._taken: list[m.EventReport] = []
         self._orders: dict[tuple[str, int], int] = {}
@@ -207,18 +207,18 @@ class EventLedger:
                 self._word(number).ended.add(message.destination)
             case m.PermissionRevocation(device=robot, session=session):
                 if message.destination == robot:
-                    self._told[session] = None
-                    _keep_newest(self._told)
+                    self._informed[session] = None
+                    _keep_newest(self._informed)
             case m.Reply() as reply:
                 self._answers(message.destination, reply)
                 if isinstance(reply.content, m.Permission):
                     self._tells_holder(message.destination, reply.content)
 
-    def _tells_holder(self, robot: str, told: m.Permission) -> None:
+    def _tells_holder(self, robot: str, permission: m.Permission) -> None:
         """Note that a robot informed of its new holder also knows that the old session is over."""
-        for right in [right for right in self._untold if right.robot == robot]:
-            if right.session != told.session and told.level != "sensors":
-                del self._untold[right]
+        for right in [right for right in self._uninformed if right.robot == robot]:
+            if right.session != permission.session and permission.level != "sensors":
+                del self._uninformed[right]
 
     def _word(self, number: int) -> Word:
         word = self._words.setdefault(number, Word())
@@ -381,7 +381,7 @@ class EventLedger:
     def _unheard(self, rights: Sequence[Right], now: float, works: bool) -> Iterator[Broken]:
         """Yield permissions whose holders have been silent for longer than the DVA may wait."""
         before, self._held_since = self._held_since, {}
-        yield from self._not_told(before, rights, now, works)
+        yield from self._check_informed(before, rights, now, works)
         for right in rights:
             since = now if not works else before.get(right, now)
             self._held_since[right] = since
@@ -393,7 +393,7 @@ class EventLedger:
                     f"lets {held}, of whom nothing is heard for {silent:.0f} s",
                 )
 
-    def _not_told(
+    def _check_informed(
         self, before: Iterable[Right], rights: Sequence[Right], now: float, works: bool
     ) -> Iterator[Broken]:
         """Yield sessions that are over in the book, and whose end the robot has not learnt.
@@ -404,15 +404,15 @@ class EventLedger:
         held = {(right.robot, right.holder) for right in rights}
         for right in before:
             if right.holder != self._dva and (right.robot, right.holder) not in held:
-                self._untold.setdefault(right, now)
-        for right, since in list(self._untold.items()):
+                self._uninformed.setdefault(right, now)
+        for right, since in list(self._uninformed.items()):
             is_there = now - self._heard.get(right.robot, now) < SILENT_AFTER / 2
-            if right.session in self._told or (right.robot, right.holder) in held:
-                del self._untold[right]
+            if right.session in self._informed or (right.robot, right.holder) in held:
+                del self._uninformed[right]
             elif not works or not is_there:
-                self._untold[right] = now
-            elif now - since > TOLD_WITHIN:
-                del self._untold[right]
+                self._uninformed[right] = now
+            elif now - since > INFORMED_WITHIN:
+                del self._uninformed[right]
                 robot, holder = self._name(right.robot), self._name(right.holder)
                 yield "S2", f"has not told {robot} that it is {holder}'s no longer"
 

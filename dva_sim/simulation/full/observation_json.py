@@ -37,8 +37,8 @@ def _as_named(kind: type, **renamed: str) -> _Form:
     def write(fact: Any) -> Plain:
         return {written: getattr(fact, name) for name, written in names.items()}
 
-    def read(time: float, told: Mapping[str, Any]) -> Any:
-        return kind(time=time, **{name: told[written] for name, written in names.items()})
+    def read(time: float, content: Mapping[str, Any]) -> Any:
+        return kind(time=time, **{name: content[written] for name, written in names.items()})
 
     return _Form(kind, write, read)
 
@@ -47,16 +47,16 @@ def _write_arrived(fact: o.Arrived) -> Plain:
     return {"source": fact.source, "to": fact.to, "message": fact.payload.decode()}
 
 
-def _read_arrived(time: float, told: Mapping[str, Any]) -> o.Arrived:
-    return o.Arrived(time, told["source"], told["to"], told["message"].encode())
+def _read_arrived(time: float, content: Mapping[str, Any]) -> o.Arrived:
+    return o.Arrived(time, content["source"], content["to"], content["message"].encode())
 
 
 def _write_moves(fact: o.MotionNews) -> Plain:
     return {"motions": [_write_motion(robot, one) for robot, one in fact.motions.items()]}
 
 
-def _read_moves(time: float, told: Mapping[str, Any]) -> o.MotionNews:
-    return o.MotionNews(time, {one["robot"]: _read_motion(one) for one in told["motions"]})
+def _read_moves(time: float, content: Mapping[str, Any]) -> o.MotionNews:
+    return o.MotionNews(time, {one["robot"]: _read_motion(one) for one in content["motions"]})
 
 
 def _write_motion(robot: str, motion: o.RobotMotion) -> Plain:
@@ -74,17 +74,17 @@ def _write_motion(robot: str, motion: o.RobotMotion) -> Plain:
     }
 
 
-def _read_motion(told: Mapping[str, Any]) -> o.RobotMotion:
+def _read_motion(content: Mapping[str, Any]) -> o.RobotMotion:
     return o.RobotMotion(
-        mode=told["mode"],
-        speed=_number(told["speed_m_s"], math.nan),
-        turn_rate=_number(told["turn_rate_rad_s"], math.nan),
-        asked_speed=_number(told["asked_speed_m_s"], math.nan),
-        asked_turn_rate=_number(told["asked_turn_rate_rad_s"], math.nan),
-        asked_until=_number(told["asked_until_s"], math.inf),
-        touched=_number(told["touched_s"], -math.inf),
-        grip=_number(told["grip"], math.nan),
-        powered=bool(told["powered"]),
+        mode=content["mode"],
+        speed=_number(content["speed_m_s"], math.nan),
+        turn_rate=_number(content["turn_rate_rad_s"], math.nan),
+        asked_speed=_number(content["asked_speed_m_s"], math.nan),
+        asked_turn_rate=_number(content["asked_turn_rate_rad_s"], math.nan),
+        asked_until=_number(content["asked_until_s"], math.inf),
+        touched=_number(content["touched_s"], -math.inf),
+        grip=_number(content["grip"], math.nan),
+        powered=bool(content["powered"]),
     )
 
 
@@ -105,10 +105,13 @@ def _write_place(device: str, at: Position) -> Plain:
     return {"device": device, "latitude_deg": latitude, "longitude_deg": longitude}
 
 
-def _read_places(time: float, told: Mapping[str, Any]) -> o.PlaceNews:
+def _read_places(time: float, content: Mapping[str, Any]) -> o.PlaceNews:
     return o.PlaceNews(
         time,
-        {at["device"]: Position(at["latitude_deg"], at["longitude_deg"]) for at in told["places"]},
+        {
+            at["device"]: Position(at["latitude_deg"], at["longitude_deg"])
+            for at in content["places"]
+        },
     )
 
 
@@ -117,9 +120,9 @@ def _write_book(fact: o.BookNews) -> Plain:
     return _BOOK.write(fact) | {"rights": rights}
 
 
-def _read_book(time: float, told: Mapping[str, Any]) -> o.BookNews:
-    rights = told["rights"] and [o.Right(**right) for right in told["rights"]]
-    news: o.BookNews = _BOOK.read(time, told)
+def _read_book(time: float, content: Mapping[str, Any]) -> o.BookNews:
+    rights = content["rights"] and [o.Right(**right) for right in content["rights"]]
+    news: o.BookNews = _BOOK.read(time, content)
     return news._replace(rights=rights)
 
 
@@ -147,10 +150,10 @@ def as_plain(fact: Any) -> tuple[str, float, Plain]:
     return word, fact.time, FORMS[word].write(fact)
 
 
-def of_plain(word: str, time: float, told: Mapping[str, Any]) -> Any:
+def of_plain(word: str, time: float, content: Mapping[str, Any]) -> Any:
     """Return the fact that `as_plain` has written.
 
     Raises:
         KeyError, TypeError, ValueError, AttributeError: it was written otherwise.
     """
-    return FORMS[word].read(time, told)
+    return FORMS[word].read(time, content)

@@ -72,7 +72,7 @@ class RunJournal:
         self._newest: dict[str, str] = {}
         self._drives: dict[int, tuple[int, DriveLog]] = {}  # by identity: number, and the drive
         self._count = 0
-        self._told: dict[tuple[str, str], int] = {}  # how much of each list
+        self._written: dict[tuple[str, str], int] = {}  # how much of each list
         self._facts = 0
 
     def lines(self) -> list[JournalLine]:
@@ -92,7 +92,7 @@ class RunJournal:
         for points in recorder.tracks.values():
             points.clear()
         self._drives = {id(drive): self._drives[id(drive)] for drive in recorder.drives}
-        self._told = {
+        self._written = {
             (str(number), name): len(getattr(drive, name))
             for number, drive in self._drives.values()
             for name in _GROWS
@@ -125,8 +125,8 @@ class RunJournal:
 
     def _new(self, about: str, name: str, values: Any) -> list[Any]:
         """Return the entries of a list that are not written yet."""
-        written = self._told.get((about, name), 0)
-        self._told[about, name] = len(values)
+        written = self._written.get((about, name), 0)
+        self._written[about, name] = len(values)
         return list(islice(values, written, None))
 
     # --- what changes ----------------------------------------------------------------------

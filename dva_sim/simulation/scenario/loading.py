@@ -71,15 +71,15 @@ def check_names(scenario: Scenario, error: Fail) -> None:
                 key, known = ".".join(str(p) for p in path), resources.available(folder)
                 raise error(unknown(key, name, sorted(known)), path)
     if scenario.operator.traits:
-        with _told(error, lambda _: ("operator", "traits")):
+        with _located(error, lambda _: ("operator", "traits")):
             population(scenario.operator)
     if scenario.guard.traits:
-        with _told(error, lambda _: ("guard", "traits")):
+        with _located(error, lambda _: ("guard", "traits")):
             guard_profile(scenario)
     if scenario.bystander.traits:
-        with _told(error, lambda _: ("bystander", "traits")):
+        with _located(error, lambda _: ("bystander", "traits")):
             bystander_profile(scenario)
-    with _told(error, _pattern_key):
+    with _located(error, _pattern_key):
         pattern_of(scenario)
     check_strategy(scenario.operator.strategy, scenario.operator.options, error)
     check_policy(scenario.dispatch.policy, scenario.dispatch.options, error)
@@ -90,9 +90,9 @@ def check_names(scenario: Scenario, error: Fail) -> None:
 
 def _check_hazard(event: EventConfig, path: KeyPath, error: Fail) -> None:
     """Refuse a user's hazard that cannot be loaded, or does not know its settings."""
-    with _told(error, lambda _: (*path, "kind")):
+    with _located(error, lambda _: (*path, "kind")):
         find_hazard(event.kind)
-    with _told(error, lambda _: (*path, "hazard")):
+    with _located(error, lambda _: (*path, "hazard")):
         make_hazard(event.kind, (0.0, 0.0), event.at_s, **event.hazard)
 
 
@@ -100,7 +100,7 @@ def check_strategy(strategy: str, options: Mapping[str, Any], error: Fail) -> No
     """Refuse a way of steering that cannot be loaded, or does not know its options."""
     from dva_sim.agents.operator.strategies import try_strategy  # late: start-up
 
-    with _told(error, lambda problem: _place(problem, "operator", "strategy", "options")):
+    with _located(error, lambda problem: _place(problem, "operator", "strategy", "options")):
         try_strategy(strategy, options)
 
 
@@ -108,7 +108,7 @@ def check_policy(policy: str, options: Mapping[str, Any], error: Fail) -> None:
     """Refuse a policy that cannot be loaded, or does not know its options."""
     from dva_sim.core.dispatch import load_policy  # late: start-up
 
-    with _told(error, lambda problem: _place(problem, "dispatch", "policy", "options")):
+    with _located(error, lambda problem: _place(problem, "dispatch", "policy", "options")):
         load_policy(policy, options)
 
 
@@ -120,12 +120,12 @@ def check_phone(profile: PhoneProfile, error: Fail) -> None:
         key = next((s for s in stages if problem.problem.startswith(s)), "filter")
         return _place(problem, "phone", key, f"{key}_options")
 
-    with _told(error, place):
+    with _located(error, place):
         try_phone(profile)
 
 
 @contextmanager
-def _told(error: Fail, place: Callable[[ConfigError], KeyPath]) -> Iterator[None]:
+def _located(error: Fail, place: Callable[[ConfigError], KeyPath]) -> Iterator[None]:
     """Tell a mistake at its key of the scenario, unless it is in another file."""
     try:
         yield

@@ -48,7 +48,7 @@ class HandDevice(ABC):
 
     def __init__(self, config: DeviceConfig, rate_hz: float) -> None:
         self._gain, self.period = config.gain, 1.0 / rate_hz
-        self._aim = self._told = (0.0, 0.0)
+        self._aim = self._last = (0.0, 0.0)
 
     def aim(self, vx: float, vy: float) -> None:
         """From now on the person wants this velocity of the cursor [m/s]."""
@@ -56,15 +56,15 @@ class HandDevice(ABC):
 
     def command(self, reading: Pair | None, dt: float) -> Pair:
         """At the machine: the velocity [m/s] for a step, given what has arrived, if anything."""
-        gain, (x, y) = self._gain, self._told
+        gain, (x, y) = self._gain, self._last
         if self.is_place:
             if reading is None:
                 return 0.0, 0.0
-            self._told = reading
+            self._last = reading
             return gain * (reading[0] - x) / dt, gain * (reading[1] - y) / dt
         if reading is not None:
-            self._told = gain * reading[0], gain * reading[1]
-        return self._told
+            self._last = gain * reading[0], gain * reading[1]
+        return self._last
 
     def move(self, dt: float) -> None:  # noqa: B027
         """Let `dt` [s] pass for the hand."""

@@ -182,7 +182,7 @@ class TrackGoal(ToTarget):
         self._waves = list(zip(task.amplitudes_m, task.frequencies, phases, strict=True))
         self._targets: list[float] = []
         self._cursors: list[float] = []
-        self._steps, self._dt, self._told = 0, 0.0, 0.0
+        self._steps, self._dt, self._last_command = 0, 0.0, 0.0
 
     @override
     def target(self, now: float) -> Pair:
@@ -191,7 +191,7 @@ class TrackGoal(ToTarget):
     @override
     def pushed(self, now: float, wanted: Velocity) -> Velocity:
         # The command is kept, as the answer to the push.
-        self._told = wanted[0]
+        self._last_command = wanted[0]
         return (wanted[0] + self._sum(now), wanted[1]) if self.is_stationary else wanted
 
     def _sum(self, now: float) -> float:
@@ -205,7 +205,7 @@ class TrackGoal(ToTarget):
         self._steps, self._dt = self._steps + 1, SAMPLE_STEPS * dt
         if self._steps % SAMPLE_STEPS == 1:
             self._targets.append(self._sum(now - dt if self.is_stationary else now))
-            self._cursors.append(-self._told if self.is_stationary else x)
+            self._cursors.append(-self._last_command if self.is_stationary else x)
         return self._steps * dt >= task.record_s - 0.5 * dt
 
     @override

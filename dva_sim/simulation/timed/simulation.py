@@ -125,7 +125,7 @@ class Shift:
         self.driven = {
             control_room.id_of("operator", n): 0.0 for n in range(scenario.operators.count)
         }
-        self.told: list[m.Position | None] = [None] * len(self.units)
+        self.published_places: list[m.Position | None] = [None] * len(self.units)
         self.half_way: dict[Unit, Place] = {}
         self._served: set[int] = set()
         self._newest = 0
@@ -338,7 +338,7 @@ class Shift:
     def says_arrived(self, unit: Unit, job: Job) -> None:
         """Tell the DVA that a unit is where it was sent; so it knows where the unit is."""
         event = job.incident.event
-        self.told[unit.number] = None if event is None else event.position
+        self.published_places[unit.number] = None if event is None else event.position
         self.mail.say(job.voice, m.OrderProgress(job.order.event_id, "arrived"))
 
     def publish_place(self, unit: Unit, activity: str) -> None:
@@ -346,9 +346,12 @@ class Shift:
         self._publish(unit, unit.here(), activity)
 
     def _publish(self, unit: Unit, place: Place, activity: str) -> None:
-        if unit.group.from_s > self.clock.now or self.told[unit.number] is place.position:
+        if (
+            unit.group.from_s > self.clock.now
+            or self.published_places[unit.number] is place.position
+        ):
             return
-        self.told[unit.number] = place.position
+        self.published_places[unit.number] = place.position
         self.terrain.forget(self.half_way.pop(unit, place))
         if place.fixed is None and place.about is None:
             self.half_way[unit] = self.terrain.remember(place)

@@ -174,7 +174,7 @@ def evidence(
         notes=[*_agreeing(checks), *notes(checks, quick)],
         conditions={**conditions, "events played": f"{_events(checks):,}"},
         sheets=[_sheet("Every check", [[c.title, *words(c)] for c in checks])],
-        told=[_sheet("", [[c.case, *words(c)] for c in notable])],
+        printed=[_sheet("", [[c.case, *words(c)] for c in notable])],
         draw=partial(draw_all, checks),
         tables={NAME: [_row(check) for check in checks]},
         rule=(ERRORS, 100 * TOLERANCE, 100 * PRECISION, LOOK_AGAIN),

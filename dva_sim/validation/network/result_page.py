@@ -146,7 +146,7 @@ TITLES: dict[ConditionKind, str] = {
     "single": "Single runs under loss",
     "pooled": "Pooled runs under loss, at least six seeds each",
 }
-TOLD: dict[ConditionKind, str] = {
+CONDITION_TEXTS: dict[ConditionKind, str] = {
     "lossless": "without loss, within the bands",
     "overload": "overload, within the bands",
     "single": "single runs under loss, within the model's 95 % intervals",
@@ -201,7 +201,7 @@ def evidence(
         notes=notes(comparison),
         conditions=conditions,
         sheets=[sheet for sheet in shown if sheet.rows],
-        told=[sheet for sheet in sheets if sheet.rows],
+        printed=[sheet for sheet in sheets if sheet.rows],
         draw=partial(draw_all, comparison),
         tables=kept,
     )
@@ -264,7 +264,9 @@ def summary(comparison: NetworkComparison) -> list[tuple[str, str, str, str]]:
         if judged:
             least = f"{100 * MIN_INSIDE:.0f} %" if kind == "single" else "all"
             share = f"{inside} of {judged} ({100 * inside / judged:.1f} %)"
-            rows.append((TOLD[kind], share, least, _passes(comparison.passes_bands(kind))))
+            rows.append(
+                (CONDITION_TEXTS[kind], share, least, _passes(comparison.passes_bands(kind)))
+            )
     if comparison.pooled.scored:
         rows += _pooled_rows(comparison.pooled)
     for name, pooled in comparison.controls.items():

@@ -68,7 +68,10 @@ def evidence(
         notes=notes(verdicts),
         conditions=conditions,
         sheets=[*(_sheet(title, _with_sources(own)) for title, own in groups), _steered(played)],
-        told=[*(_sheet(title, list(map(words, own))) for title, own in groups), _steered(played)],
+        printed=[
+            *(_sheet(title, list(map(words, own))) for title, own in groups),
+            _steered(played),
+        ],
         draw=partial(draw_all, verdicts, played),
         tables={NAME: [_row(v) for v in verdicts], "steered": _shares(played)},
         rule=(100 * outcome.rule.exact, 100 * outcome.rule.held_out),

@@ -70,7 +70,7 @@ def test_nobody_is_named_in_a_file_and_its_times_begin_at_zero(drive, tmp_path):
     drive(tmp_path)
     text = (tmp_path / "motion-1.csv").read_text()
     assert "BQ Curie" not in text
-    assert read_motion(tmp_path / "motion-1.csv").samples[0].told == 0.0
+    assert read_motion(tmp_path / "motion-1.csv").samples[0].stamp == 0.0
 
 
 def test_who_agrees_no_longer_is_not_written_down_any_more(drive, tmp_path):

@@ -159,7 +159,7 @@ def test_a_difference_of_one_person_has_no_interval(made):
     row = Comparison(one, made("persons=1", episode=later)).differences()[0]
     assert row.interval.mean == pytest.approx(5.0)
     assert math.isnan(row.interval.low)
-    assert not row.is_told_from_zero
+    assert not row.differs_from_zero
 
 
 def test_where_random_numbers_are_shared_in_part_only_those_runs_are_looked_at(made, results):

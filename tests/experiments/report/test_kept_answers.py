@@ -74,7 +74,7 @@ def test_an_answer_that_is_replaced_becomes_history(kept):
     ],
 )
 def test_whether_an_answer_is_still_given_is_told_by_its_runs(kept, sampled, now, words, is_stale):
-    text, found = command._told(replace(kept[0], sampled=sampled), now)
+    text, found = command._described(replace(kept[0], sampled=sampled), now)
     assert words in text
     assert found is is_stale
 

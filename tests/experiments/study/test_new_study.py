@@ -2,7 +2,7 @@
 
 import pytest
 
-from dva_sim.cli.studies import told
+from dva_sim.cli.studies import next_steps
 from dva_sim.experiments.analysis.predictions import judge_all
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.report.summary import Reading
@@ -49,7 +49,7 @@ def test_every_key_it_shows_in_a_comment_is_valid_too(fresh):
 
 def test_what_can_be_done_next_is_told_in_the_order_of_doing_it(tmp_path):
     path = tmp_path / "my study.yaml"
-    commands = [line.split("#")[0].strip() for line in told(path).splitlines()[1:]]
+    commands = [line.split("#")[0].strip() for line in next_steps(path).splitlines()[1:]]
     quoted = f"'{path}'"
     assert commands == [
         f"dva-sim check {quoted}",

@@ -31,10 +31,10 @@ def test_each_miss_has_its_cause_or_is_said_to_have_none():
         (Condition("pub", 20.0).label, "applied_hz", "a full queue"),
         (Condition("pub", 30.0).label, "applied_hz", "not known"),
     ]
-    titles = [sheet.title for sheet in evidence(found, {}, known).told]
+    titles = [sheet.title for sheet in evidence(found, {}, known).printed]
     assert "Why conditions miss" in titles
     assert "Why conditions miss" not in [
-        sheet.title for sheet in evidence(compared(10.0), {}, known).told
+        sheet.title for sheet in evidence(compared(10.0), {}, known).printed
     ]
 
 

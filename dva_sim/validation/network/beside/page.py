@@ -56,7 +56,7 @@ def evidence(beside: Beside, conditions: Mapping[str, str]) -> ValidationResult:
         notes=notes(beside),
         conditions=conditions,
         sheets=[sheet for sheet in (summary, reasons, misses, *by_measure) if sheet.rows],
-        told=[sheet for sheet in (*shown, reasons) if sheet.rows],
+        printed=[sheet for sheet in (*shown, reasons) if sheet.rows],
         draw=partial(draw_all, beside),
         tables=tables,
     )

@@ -133,7 +133,7 @@ def _live(parent: int, program: Program, channel: socket.socket, notes: Notes) -
 
 PORT = 5555
 _STDIN = 0
-Told = dict[str, float | int]
+LinkColumns = dict[str, float | int]
 PACKETS, PROXY = "packets", "proxy"
 """Kinds of link: whole packets between namespaces, or a relay of TCP over the loopback."""
 
@@ -192,7 +192,7 @@ class EmulatedOutcome:
 
     operator: list[Note] = field(default_factory=list)
     robot: list[Note] = field(default_factory=list)
-    link: Told = field(default_factory=dict)
+    link: LinkColumns = field(default_factory=dict)
     way: str = ""
     realtime: bool = False
     problem: str = ""
@@ -226,7 +226,7 @@ class EmulatedCell:
     def play(self) -> EmulatedOutcome:
         """Set up, run, and end everything; problems become part of the outcome."""
         problem, realtime = "", False
-        columns: Told = {}
+        columns: LinkColumns = {}
         try:
             realtime = linux_calls.be_punctual(FORWARDER_PRIORITY)
             link, word = self._set_up()
@@ -273,9 +273,9 @@ class EmulatedCell:
         return "the robot failed" if end == robot.ended else ""
 
 
-def columns_of(report: LinkReport) -> Told:
+def columns_of(report: LinkReport) -> LinkColumns:
     """The columns of the emulator, by the letters of both ends: a is the operator."""
-    columns: Told = {}
+    columns: LinkColumns = {}
     for way, flow in (("ab", report.up), ("ba", report.down)):
         columns[f"emu_pkts_{way}"] = flow.offered_packets
         columns[f"emu_lost_{way}"] = flow.lost_by_chance
