@@ -186,7 +186,7 @@ def test_a_port_that_is_taken_is_told_in_a_line(programs):
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "expected"),
     [
         (("no-such-place",), "no-such-place"),
         (("small-shift",), "a console shows the model"),
@@ -197,11 +197,11 @@ def test_a_port_that_is_taken_is_told_in_a_line(programs):
         (("--links", "imagined"), "--links 'imagined' should be modelled or real"),
     ],
 )
-def test_a_mistake_is_told_before_anything_starts(words, told):
+def test_a_mistake_is_told_before_anything_starts(words, expected):
     ended = call("console", "--no-open", *words)
     assert (ended.returncode, ended.stdout) == (2, "")
     (line,) = ended.stderr.splitlines()
-    assert told in line
+    assert expected in line
 
 
 @pytest.mark.parametrize("links", ["modelled", "real"])

@@ -24,7 +24,7 @@ class RemoteAlarmFacts:
 
     def lost(self, robots: Sequence[RobotRow]) -> Iterator[tuple[str, str]]:
         """Robots of which nothing is heard since they were driven."""
-        for entry in self._system.told.devices.values():
+        for entry in self._system.state.devices.values():
             status = entry.status
             driven = isinstance(status, m.RobotStatus) and status.mode == Mode.TELEOPERATION.value
             if driven and entry.heard is not None and self._is_long_ago(entry.heard):
@@ -42,7 +42,7 @@ class RemoteAlarmFacts:
             entry.device.device_type in (ROBOT, GUARD)
             and not self._is_long_ago(entry.listed)
             and id_tag not in engaged
-            for id_tag, entry in self._system.told.devices.items()
+            for id_tag, entry in self._system.state.devices.items()
         )
 
     def _is_long_ago(self, when: float) -> bool:

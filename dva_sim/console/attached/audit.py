@@ -42,7 +42,7 @@ class AskedDecision:
     record: m.AuditRecord | None = None
     finish: Callable[[], object] | None = None
 
-    def is_told_by(self, record: m.AuditRecord) -> bool:
+    def matches(self, record: m.AuditRecord) -> bool:
         """Return True if a record can be that of this decision."""
         fits = record.action == self.action and self.event in (None, record.event_id)
         return fits and self.record is None
@@ -95,7 +95,7 @@ class AttachedAudit(Audited):
         """The DVA tells of a decision."""
         if record.author == self._system.device.id_tag:
             for number, asked in self._asked.items():
-                if asked.is_told_by(record):
+                if asked.matches(record):
                     asked.record = record
                     self._finish(number)
                     return

@@ -121,7 +121,7 @@ class AttachedDecisions:
         Raises:
             Refused: the DVA has listed none of that label.
         """
-        known = self._system.told.devices.items()
+        known = self._system.state.devices.items()
         found = next((i for i, entry in known if entry.device.label == label), None)
         if found is None:
             raise Refused(f"there is no device {label!r}")

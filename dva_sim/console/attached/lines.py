@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from dva_sim.console.attached.told import DeviceState
+from dva_sim.console.attached.system_state import DeviceState
 from dva_sim.console.dva.device_rows import link_of
 from dva_sim.console.run.lag import LIMIT
 from dva_sim.console.views.feed import SEVERITIES
@@ -43,7 +43,7 @@ def things_of(devices: Iterable[DeviceState], numbers: dict[str, int]) -> list[T
     return things
 
 
-def scene_of_told(
+def attached_scene(
     things: list[ThingShown], address: str, site: Site | None, frame: GeoFrame
 ) -> SceneLine:
     """The first line that a page gets."""

@@ -53,7 +53,7 @@ class AttachedPages:
         self.show: Show = lambda *_: None
         self.dropped: Callable[[], int] = lambda: 0
         self.looked, self.people = False, AttachedPeople()
-        self.sensors = WatchedSensors(system.device, system.told, system.id_of)
+        self.sensors = WatchedSensors(system.device, system.state, system.id_of)
         self.alarms = ConsoleAlarms(RemoteAlarmFacts(system))
         self.audited = AttachedAudit(audit, system, self.people.author)
         system.on_record = self.audited.heard
@@ -92,16 +92,16 @@ class AttachedPages:
         system.find_place()
         if self.clock.now < FIRST_SCENE and not system.is_placed:
             return
-        things = lines.things_of(system.told.devices.values(), system.numbers)
+        things = lines.things_of(system.state.devices.values(), system.numbers)
         self._is_shown = True
-        self.tell(lines.scene_of_told(things, system.options.dva, system.site, system.frame))
+        self.tell(lines.attached_scene(things, system.options.dva, system.site, system.frame))
 
     def _tell_positions(self) -> None:
         system = self.system
         if system.find_place():
             self._tell_scene()
         if self._is_shown:
-            rows = lines.positions(system.told.devices, system.numbers, system.frame)
+            rows = lines.positions(system.state.devices, system.numbers, system.frame)
             self._news.tell({"k": "pos", "t": system.now_ms, "p": rows})
 
     def _tell_rows(self) -> None:
@@ -127,7 +127,7 @@ class AttachedPages:
     def _tell_alarms(self) -> None:
         """Tell alarms; while the state of events is unknown, alarms stay as they are."""
         system, now_ms = self.system, self.system.now_ms
-        is_known = system.is_told and system.answers
+        is_known = system.has_all_events and system.answers
         known = self.alarms.look(self._events(), [], now_ms) if is_known else None
         self._news.tell(known or self.alarms.hold(now_ms))
 
@@ -135,7 +135,7 @@ class AttachedPages:
         now, numbers = self.clock.now, self.system.numbers
         return [
             lines.robot_row(entry, numbers[id_tag], now)
-            for id_tag, entry in self.system.told.devices.items()
+            for id_tag, entry in self.system.state.devices.items()
             if entry.device.device_type == ROBOT and id_tag in numbers
         ]
 
@@ -143,7 +143,7 @@ class AttachedPages:
         numbers = self.system.numbers
         return [
             {"i": numbers[id_tag], "doing": entry.status.activity}
-            for id_tag, entry in self.system.told.devices.items()
+            for id_tag, entry in self.system.state.devices.items()
             if isinstance(entry.status, m.PersonStatus) and id_tag in numbers
         ]
 
@@ -161,7 +161,7 @@ class AttachedPages:
     def _tell_news(self) -> None:
         """Events, how orders are given, and the story, as soon as they change."""
         system, now_ms = self.system, self.system.now_ms
-        if system.is_told:
+        if system.has_all_events:
             self._news.tell({"k": "events", "t": now_ms, "events": self._events()})
         dispatch = dispatch_shown(system.agent.dispatch, 0.0)
         rooms = self.people.lines(system.role)
@@ -172,7 +172,7 @@ class AttachedPages:
 
     def _events(self) -> list[SiteEventShown]:
         system, agent = self.system, self.system.agent
-        labels = {i: entry.device.label for i, entry in system.told.devices.items()}
+        labels = {i: entry.device.label for i, entry in system.state.devices.items()}
         return [
             {
                 **lines.event_row(
@@ -188,6 +188,6 @@ class AttachedPages:
             now, may = self.clock.now, self.system.role == "supervise"
             rows = [
                 lines.device_row(entry, now, self.system.is_fake(id_tag), may)
-                for id_tag, entry in self.system.told.devices.items()
+                for id_tag, entry in self.system.state.devices.items()
             ]
             self.tell({"k": "devices", "t": self.system.now_ms, "devices": rows})

@@ -9,7 +9,7 @@ from typing import Final
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.operator.steps import give_back, start
 from dva_sim.agents.robot.sensors import sensor_topic
-from dva_sim.console.attached.told import DeviceState, SystemState
+from dva_sim.console.attached.system_state import DeviceState, SystemState
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
@@ -28,7 +28,7 @@ class SensorWatch:
     """
 
     def __init__(self, device: AgentDevice, device_state: DeviceState) -> None:
-        self._device, self._told, self._robot = device, device_state, device_state.device.id_tag
+        self._device, self._state, self._robot = device, device_state, device_state.device.id_tag
         self._session: int | None = None
         self._over = False
         self._subscriptions: dict[str, Subscription] = {}
@@ -42,7 +42,7 @@ class SensorWatch:
             if self._session is not None:
                 self._device.ask(self._robot, m.DevSub(name, 0.0), session=self._session)
         self._subscriptions.clear()
-        self._told.values.clear()
+        self._state.values.clear()
         if self._session is not None:
             give_back(self._device, self._robot, self._session)
 
@@ -50,7 +50,7 @@ class SensorWatch:
         """Ask for the permission; if there is none, again after a while."""
         if self._over:
             return
-        names = tuple(sensor.name for sensor in self._told.sensors[:MOST_SENSORS])
+        names = tuple(sensor.name for sensor in self._state.sensors[:MOST_SENSORS])
         wish = m.PermissionRequest(self._robot, "sensors", names)
         self._device.ask(self._device.dva, wish, partial(self._answered, names), self._ask_later)
 
@@ -92,7 +92,7 @@ class SensorWatch:
     def _heard(self, data: bytes) -> None:
         message = self._device.read(data, self._robot)
         if message is not None and isinstance(message.body, m.SensorValue):
-            self._told.values[message.body.sensor] = message.body, self._device.clock.now
+            self._state.values[message.body.sensor] = message.body, self._device.clock.now
 
 
 class WatchedSensors:
@@ -100,14 +100,14 @@ class WatchedSensors:
 
     Args:
         device: Device that subscribes.
-        told: State of the robots.
+        state: State of the robots.
         id_of: The id of a device that pages know by a number; None: there is none.
     """
 
     def __init__(
-        self, device: AgentDevice, told: SystemState, id_of: Callable[[int], str | None]
+        self, device: AgentDevice, state: SystemState, id_of: Callable[[int], str | None]
     ) -> None:
-        self._device, self._told, self._id_of = device, told, id_of
+        self._device, self._state, self._id_of = device, state, id_of
         self._watches: dict[str, SensorWatch] = {}
         self._looked: list[int] = []
 
@@ -118,7 +118,7 @@ class WatchedSensors:
 
     def go_on(self) -> None:
         """Begin where it has become known by now which sensors a robot has; end what is over."""
-        known = self._told.devices
+        known = self._state.devices
         wanted = [id_tag for id_tag in map(self._id_of, self._looked) if id_tag in known]
         for id_tag in [one for one in self._watches if one not in wanted]:
             self._watches.pop(id_tag).end()

@@ -12,7 +12,7 @@ from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice, do_nothing
 from dva_sim.console.attached.links import AttachedLinks
 from dva_sim.console.attached.options import AttachOptions
-from dva_sim.console.attached.told import SystemState
+from dva_sim.console.attached.system_state import SystemState
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.run.real_links import start_of_day
 from dva_sim.core.registry import CONTROL_ROOM, ROBOT
@@ -39,11 +39,11 @@ class AttachedSystem:
         recorder: Keeps the story.
         note: Function that notifies people of a failure.
         agent: The console's own control room.
-        told: State reported by the devices.
+        state: State reported by the devices.
         fakes: Devices that were added by hand.
         numbers: Stable numbers by which pages know devices.
         site: Site of the scenario, if one is named.
-        is_told: True once the DVA has sent all its events since its last restart.
+        has_all_events: True once the DVA has sent all its events since its last restart.
         on_devices: Callback when a device appears or disappears.
         on_record: Callback for each decision that the DVA publishes.
 
@@ -60,13 +60,13 @@ class AttachedSystem:
         self.agent = ControlRoomAgent(self.device)
         self.on_devices: Callable[[], object] = do_nothing
         self.on_record: Callable[[m.AuditRecord], object] = do_nothing
-        self.told = SystemState(self.device, lambda: self.on_devices())
+        self.state = SystemState(self.device, lambda: self.on_devices())
         self.fakes = FakeDevices(self._make, self._is_known, _identity, self._drop)
-        self.is_told, self._heard = False, -UNHEARD
+        self.has_all_events, self._heard = False, -UNHEARD
 
     def start(self) -> None:
         """Take part, and ask again and again."""
-        self.agent.on_list = self._all_told
+        self.agent.on_list = self._note_all_events
         self.agent.on_record = self._note_record
         self.agent.start()
         clock = self.clock
@@ -94,27 +94,27 @@ class AttachedSystem:
     def _ask_who(self) -> None:
         def answered(reply: m.Reply) -> None:
             was_gone, self._heard = not self.answers, self.clock.now
-            if reply.code == m.NOT_REGISTERED or (was_gone and self.is_told):
+            if reply.code == m.NOT_REGISTERED or (was_gone and self.has_all_events):
                 self._ask_again()  # it may know nothing of an earlier life
             if isinstance(reply.content, m.DeviceList):
-                self.told.list(reply.content.devices)
+                self.state.list(reply.content.devices)
 
         self.agent.ask(m.GetDeviceList(), answered)
 
     def _ask_again(self) -> None:
         """Nothing of what was told of events counts until the DVA has told all there are."""
-        self.is_told = False
+        self.has_all_events = False
         self.agent.events.clear()
         self.agent.received_at.clear()
         self.clock.call_after(0.0, self.agent.refresh)  # after the device has registered again
 
-    def _all_told(self) -> None:
-        self.is_told = True
+    def _note_all_events(self) -> None:
+        self.has_all_events = True
 
     def _ask_sensors(self) -> None:
         def answered(reply: m.Reply) -> None:
             if isinstance(reply.content, m.SensorList):
-                self.told.sensors(reply.content)
+                self.state.sensors(reply.content)
 
         self.agent.ask(m.GetSensorInfo(), answered)
 
@@ -144,7 +144,7 @@ class AttachedSystem:
 
     def find_place(self) -> bool:
         """An unknown place lies where somebody first is; whether it is found by that."""
-        status = next((t.status for t in self.told.devices.values() if t.status is not None), None)
+        status = next((t.status for t in self.state.devices.values() if t.status is not None), None)
         if self.is_placed or status is None:
             return False
         self.frame = GeoFrame(status.position.latitude, status.position.longitude)
@@ -152,7 +152,7 @@ class AttachedSystem:
 
     def robots(self) -> list[str]:
         """Ids of the robots that the DVA lists."""
-        known = self.told.devices.items()
+        known = self.state.devices.items()
         return [
             i for i, entry in known if entry.device.device_type == ROBOT and not self.is_fake(i)
         ]
@@ -167,7 +167,7 @@ class AttachedSystem:
 
     def label_of(self, id_tag: str) -> str:
         """Return the label of a device."""
-        state = self.told.devices.get(id_tag)
+        state = self.state.devices.get(id_tag)
         return id_tag if state is None else state.device.label
 
     def named(self, given: str) -> str:
@@ -199,7 +199,7 @@ class AttachedSystem:
         )
 
     def _is_known(self, id_tag: str) -> bool:
-        return id_tag in (DVA, self.device.id_tag) or id_tag in self.told.devices
+        return id_tag in (DVA, self.device.id_tag) or id_tag in self.state.devices
 
     def _drop(self, id_tag: str) -> None:
         """The DVA there finds out by itself that it is silent."""

@@ -51,7 +51,7 @@ class Audited:
         if self.keeper.problem and not action.stops:
             raise Refused(f"{self.keeper.problem}; nothing can be done until this is fixed")
 
-        def told(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
+        def log_and_answer(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
             if self.is_noted(action):
                 outcome = more.get("outcome", DONE if ok else REFUSED)
                 self._note(what, client, line, outcome, text)
@@ -67,7 +67,7 @@ class Audited:
 
             self.keeper.when_safe(safe)
 
-        return told
+        return log_and_answer
 
     def is_noted(self, action: Action) -> bool:
         """Return True if an action has a row of its own; of the others the DVA tells."""

@@ -52,12 +52,12 @@ class ConsoleRoom:
     def until_answered(self, on_result: OnResult) -> OnResult:
         """Keep an answer in mind: a room that is left stays until its person has it."""
 
-        def told(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
+        def answer(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
             self.unanswered.discard(on_result)
             on_result(ok, text, **more)
 
         self.unanswered.add(on_result)
-        return told
+        return answer
 
     def is_called(self, name: str) -> bool:
         """Return True if that is the name which its person gave."""

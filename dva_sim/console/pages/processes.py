@@ -195,7 +195,7 @@ class ConsoleProcesses:
 
     def _say_of_phones(self) -> None:
         """Their address, also for a camera; and what people should know of it."""
-        for entry in self.serving["told"]:
+        for entry in self.serving["notices"]:
             self._say(entry)
         if address := self.serving["phone"]:
             from dva_sim.console.pages.qr_code import half_blocks  # late: start-up

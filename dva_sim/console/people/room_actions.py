@@ -87,7 +87,7 @@ class RoomActions:
         done: str,
         then: Callable[[m.Reply], Answered] | None = None,
     ) -> None:
-        self._room(client, line, on_result, lambda room, told: room.ask(body, told, done, then))
+        self._room(client, line, on_result, lambda room, answer: room.ask(body, answer, done, then))
 
     # --- events -----------------------------------------------------------------------------
 

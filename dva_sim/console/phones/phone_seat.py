@@ -66,7 +66,7 @@ class PhoneSeat:
         self.samples = self.lost = 0
         self.motion: MotionWriter | None = None
         self._times = PhoneClock()
-        self._told: deque[float] = deque(maxlen=RATED_BY)
+        self._stamps: deque[float] = deque(maxlen=RATED_BY)
         self._next, self._at, self._came = 0, 0.0, -math.inf
         self._newest: Triple | None = None
         self.tilt = self.new_tilt()
@@ -157,7 +157,7 @@ class PhoneSeat:
         times = self._times.times_of(reports, came)
         for by_phone, taken, (_, xyz) in zip(reports, times, fresh, strict=True):
             self._take_one(by_phone, came - taken, xyz)
-        self._told.extend(reports)
+        self._stamps.extend(reports)
         self._came = came
         driven = self.driven
         if driven is not None and self.tilts:
@@ -166,17 +166,17 @@ class PhoneSeat:
             self.tilt.look(self._clock.now)  # the screen shows what would be sent
         return True
 
-    def _take_one(self, told: float, age: float, xyz: Triple) -> None:
+    def _take_one(self, stamp: float, age: float, xyz: Triple) -> None:
         """A sample of such an age in real time [s]: as old here, times the pace."""
         now = self._clock.now
         self._at = max(self._at, now - age * self._clock.factor)
         self._newest = to_tilt_axes(xyz, self.orientation, self.settings.ios)
         self.tilt.sample(self._at, self._newest)
         if self.motion is not None:
-            self.motion.sample(MotionSample(told, now, self._at, xyz, self.orientation))
+            self.motion.sample(MotionSample(stamp, now, self._at, xyz, self.orientation))
 
-    def _is_old(self, told: float) -> bool:
-        return self._times.is_old(told)
+    def _is_old(self, stamp: float) -> bool:
+        return self._times.is_old(stamp)
 
     def _count(self, samples: Samples, fresh: int) -> None:
         gap = samples.first - self._next
@@ -184,17 +184,17 @@ class PhoneSeat:
             self.lost += min(gap, MOST_GAP)
         self.samples += fresh
         self._next = samples.first + len(samples.at)
-        if self._told and samples.at[-1] < self._told[-1]:
-            self._told.clear()
+        if self._stamps and samples.at[-1] < self._stamps[-1]:
+            self._stamps.clear()
 
     # --- what it tells -----------------------------------------------------------------------
 
     @property
     def rate_hz(self) -> float | None:
         """Samples per second by the phone's own clock; None: too few are known."""
-        if len(self._told) < LEAST_RATED:
+        if len(self._stamps) < LEAST_RATED:
             return None
-        return (len(self._told) - 1) / (self._told[-1] - self._told[0])
+        return (len(self._stamps) - 1) / (self._stamps[-1] - self._stamps[0])
 
     def line(self, now: float) -> PhoneShown:
         """The phone's part of a seat's line.

@@ -62,9 +62,9 @@ class ExchangeLog:
         """Return how many there were up to a moment [s]."""
         return bisect_right(self._times, now)
 
-    def batches(self, name: str, told: int, end: int) -> list[ExchangesLine]:
-        """Lines for pages, of those after the first `told` up to the first `end`."""
-        starts = range(max(told, end - FIRST), end, LOG_BATCH)
+    def batches(self, name: str, sent: int, end: int) -> list[ExchangesLine]:
+        """Lines for pages, of those after the first `sent` up to the first `end`."""
+        starts = range(max(sent, end - FIRST), end, LOG_BATCH)
         return [
             {"k": "log", "log": name, "lines": self._lines[start : min(end, start + LOG_BATCH)]}
             for start in starts

@@ -64,7 +64,7 @@ class Player:
         self._watched: set[str] = set()
         self._logs: dict[str, ExchangeLog] = {}
         self._looks_at_devices = False
-        self._told: dict[str, int] = {}  # exchanges of each log that somebody looks at
+        self._sent: dict[str, int] = {}  # exchanges of each log that somebody looks at
         self._site: TemporaryDirectory[str] | None = None
         self.take = ActionDispatcher(ActionPlace.REPLAY, [self], self._tell, NOBODY).take
 
@@ -201,7 +201,7 @@ class Player:
     def _tell_logs(self) -> None:
         """Tell the messages since the last time; after a jump, all of them again."""
         run, now = self.run, self.now
-        for name, entry in self._told.items() if run is not None else ():
+        for name, entry in self._sent.items() if run is not None else ():
             log, is_again = self._log(name), entry < 0
             end = log.until(now)
             lines = log.batches(name, max(0, entry), end)
@@ -211,7 +211,7 @@ class Player:
                 lines[0]["replaces"] = True
             for line in lines:
                 self.tell(line)
-            self._told[name] = end
+            self._sent[name] = end
 
     def _tell_devices(self) -> None:
         if self._looks_at_devices and self.run is not None:
@@ -249,7 +249,7 @@ class Player:
     def _go_to(self, time: float) -> None:
         self._offset = min(max(0.0, time), self._duration) - self.clock.now
         self._jumps += 1
-        self._told = dict.fromkeys(self._told, -1)
+        self._sent = dict.fromkeys(self._sent, -1)
 
     @does("open_recording")
     def _open(self, _: str, line: RecordingAsked, on_result: OnResult) -> None:
@@ -275,7 +275,7 @@ class Player:
         """Select the logs that pages view; new ones are sent from the beginning."""
         self._looks_at_devices = "devices" in line["tables"]
         self._tell_devices()
-        self._told = {name: self._told.get(name, -1) for name in line["logs"]}
+        self._sent = {name: self._sent.get(name, -1) for name in line["logs"]}
         self._tell_logs()
 
 

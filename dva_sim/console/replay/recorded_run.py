@@ -26,7 +26,7 @@ from dva_sim.console.views.feed import event_facts, moment_shown
 from dva_sim.console.views.fields import HazardFeed
 from dva_sim.console.views.scene import scene_of
 from dva_sim.console.views.things import UNKNOWN_PERSON, Things, camera_shown
-from dva_sim.console.wire.events import EventsLine, HazardsLine, SiteEventShown, ToldLine
+from dva_sim.console.wire.events import EventsLine, HazardsLine, SiteEventShown, StorySoFarLine
 from dva_sim.console.wire.rows import DevicesLine, DoingShown, PlacesLine, RobotRow, RobotWindowLine
 from dva_sim.console.wire.scenes import Happened, LinkShown, SceneLine, ThingBody
 from dva_sim.kernel.errors import DvaSimError
@@ -258,11 +258,15 @@ class RecordedRun:
         ]
         return {"k": "events", "t": _ms(now), "events": lines}
 
-    def story(self, now: float) -> ToldLine:
+    def story(self, now: float) -> StorySoFarLine:
         """Return the story up to a moment."""
         end = bisect_right(self._moments, now + ROUNDED)
         moments = self.playback.recorder.timeline[max(0, end - STORY_KEPT) : end]
-        return {"k": "told", "t": _ms(now), "lines": [moment_shown(moment) for moment in moments]}
+        return {
+            "k": "story_so_far",
+            "t": _ms(now),
+            "lines": [moment_shown(moment) for moment in moments],
+        }
 
     # --- pictures --------------------------------------------------------------------------
 

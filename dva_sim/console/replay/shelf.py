@@ -84,10 +84,10 @@ class Shelf:
             "factors": [factor_name(factor) for factor in self._factors],
             "measures": [{"title": m.words, "unit": m.unit} for m in measures],
             "worst_by": measure_called(self._answer).words if self._answer else "",
-            "recordings": [self._told(one) for one in self._kept.values()],
+            "recordings": [self._entry(one) for one in self._kept.values()],
         }
 
-    def _told(self, one: _Kept) -> ShelfEntry:
+    def _entry(self, one: _Kept) -> ShelfEntry:
         row = one.row or {}
         return {
             "name": one.path.name,

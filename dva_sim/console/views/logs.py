@@ -49,7 +49,7 @@ class MessageLog:
         self.listeners: list[Take] = []
         self._tap = Tap(transport.clock, self._take, publications=False)
         self._waiting: deque[Exchange] = deque(maxlen=LOG_BATCH)
-        self._told = self._total = 0
+        self._sent = self._total = 0
 
     def look(self, looks: bool, publications: bool) -> None:
         """Set whether somebody looks, and wants publications as well."""
@@ -72,7 +72,7 @@ class MessageLog:
             room -= len(line[2]) + len(line[3] or "")
             lines.append(line)
         self._waiting.clear()
-        self._told = self._total
+        self._sent = self._total
         return {"k": "log", "log": self.name, "lines": lines[::-1]}
 
     def _take(self, exchange: Exchange) -> None:
@@ -80,7 +80,7 @@ class MessageLog:
             listener(exchange)
         again = exchange.number <= self._total
         self._total = max(self._total, exchange.number)
-        if not again or exchange.number <= self._told:
+        if not again or exchange.number <= self._sent:
             self._waiting.append(exchange)  # one that waits is told with what became of it
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from dva_sim.console.run.lag import LagRule
-from dva_sim.console.wire.lines import Tell, Told
+from dva_sim.console.wire.lines import Tell, WorldLine
 from dva_sim.console.wire.rows import ClockShown
 from dva_sim.network.realtime import PacedClock
 
@@ -22,7 +22,7 @@ class News:
         self._tell = tell
         self._newest: dict[tuple[str, object], dict[str, Any]] = {}
 
-    def tell(self, line: Told, key: object = "") -> None:
+    def tell(self, line: WorldLine, key: object = "") -> None:
         """Tell a line; `key` tells lines of one kind apart."""
         values = {name: value for name, value in line.items() if name != "t"}
         if self._newest.get((line["k"], key)) != values:

@@ -77,7 +77,7 @@ async def run(options: argparse.Namespace) -> None:
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
     simulation.open(options.fd)
     door = phones.door if phones else None
-    about = {"phone": door.address if door else None, "told": notices}
+    about = {"phone": door.address if door else None, "notices": notices}
     simulation.send(serving(access, options.host, port) | about)
     if options.pictures_fd is not None:
         cameras.open(options.pictures_fd)
@@ -112,7 +112,7 @@ def _phones(options: argparse.Namespace, tokens: Tokens) -> tuple[PhoneListener 
         listener = listen_for_phones(*where, options.name, tokens, options.certificates)
     except NoCertificate as error:
         return None, [f"no address for phones: {error}"]
-    return listener, list(listener.told)
+    return listener, list(listener.notices)
 
 
 async def _close_when(ended: asyncio.Event, hub: Hub, cameras: ConsoleCameras) -> None:

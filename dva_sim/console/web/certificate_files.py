@@ -29,12 +29,12 @@ class KeptCertificates(NamedTuple):
     Attributes:
         authority: Authority that a phone is asked to trust.
         leaf: File with key and certificate of this machine.
-        told: Certificates made or renewed, and the reasons, a line each.
+        notices: Certificates made or renewed, and the reasons, a line each.
     """
 
     authority: Signed
     leaf: Path
-    told: tuple[str, ...]
+    notices: tuple[str, ...]
 
 
 def data_folder() -> Path:
@@ -87,7 +87,7 @@ def _private(folder: Path) -> None:
     folder.chmod(0o700)
 
 
-def _read(path: Path, told: list[str]) -> Signed | None:
+def _read(path: Path, notices: list[str]) -> Signed | None:
     """Read a file; None if there is none, or no valid contents."""
     try:
         data = path.read_bytes()
@@ -97,13 +97,13 @@ def _read(path: Path, told: list[str]) -> Signed | None:
     try:
         return Signed.read(data)
     except (ValueError, TypeError):
-        told.append(f"{path.name} is broken, and replaced")
+        notices.append(f"{path.name} is broken, and replaced")
         return None
 
 
-def _renewed(what: str, fault: str, told: list[str], more: str = "") -> None:
+def _renewed(what: str, fault: str, notices: list[str], more: str = "") -> None:
     if fault:
-        told.append(f"the {what} for phones is replaced: {fault}{'; ' + more if more else ''}")
+        notices.append(f"the {what} for phones is replaced: {fault}{'; ' + more if more else ''}")
 
 
 def _write(path: Path, signed: Signed) -> None:

@@ -80,7 +80,7 @@ class PageFeed:
         state = self._state
         self._wants_snapshot, self._have_scene = False, state.scene_version
         self._have = {kind: known.version for kind, known in state.latest.items()}
-        self._have_places, self._have_story = state.place_version, state.told
+        self._have_places, self._have_story = state.place_version, state.story_count
         self._have_seats = {seat: known.version for seat, known in state.seats_short.items()}
         self._have_windows.clear()
         for own in ("seat", "guard"):
@@ -91,7 +91,7 @@ class PageFeed:
         if source == "d":
             return self._moved()
         if source == "story":
-            return self._told()
+            return self._next_story_line()
         if source == "others":
             return self._others()
         if source == "windows":
@@ -133,9 +133,9 @@ class PageFeed:
         since, self._have_places = self._have_places, state.place_version
         return state.moved_since(since)
 
-    def _told(self) -> str | None:
+    def _next_story_line(self) -> str | None:
         state = self._state
-        missing = state.told - self._have_story
+        missing = state.story_count - self._have_story
         if missing <= 0:
             return None
         if missing > len(state.story):

@@ -23,14 +23,14 @@ class PhoneListener(NamedTuple):
         access: Its rules.
         certificate: File with key and certificate.
         door: Address and certificate, for display.
-        told: Renewals, for people, a line each.
+        notices: Renewals, for people, a line each.
     """
 
     sock: socket.socket
     access: Entrance
     certificate: Path
     door: PhoneDoor
-    told: tuple[str, ...]
+    notices: tuple[str, ...]
 
 
 def listen_for_phones(
@@ -62,4 +62,4 @@ def listen_for_phones(
     base = address_of(shown, port, "https")
     token = tokens.phone
     door = PhoneDoor(f"{base}?token={token}" if token else f"{base}phone", kept.authority.der)
-    return PhoneListener(sock, access, kept.leaf, door, kept.told)
+    return PhoneListener(sock, access, kept.leaf, door, kept.notices)

@@ -115,10 +115,10 @@ class Rest:
         asked = request.query_params.get("from", "0")
         if not asked.isascii() or not asked.isdigit() or len(asked) > 9:
             return problem(400, "from should be a whole number")
-        oldest = state.told - len(state.story)
-        first = min(max(int(asked), oldest), state.told)
+        oldest = state.story_count - len(state.story)
+        first = min(max(int(asked), oldest), state.story_count)
         lines = list(state.story)[first - oldest :]
-        body = {"from": first, "next": state.told, "lines": lines}
+        body = {"from": first, "next": state.story_count, "lines": lines}
         return JSONResponse(body, headers=NOT_KEPT)
 
     async def action(self, request: Request) -> Response:

@@ -23,7 +23,7 @@ from dva_sim.serving.pipes import Lines, WatchedEnd
 MOST_COMPLAINTS = 20
 
 Answer = dict[str, Any]
-Told = Callable[[Answer], object]
+OnAnswer = Callable[[Answer], object]
 
 
 class Simulation:
@@ -51,7 +51,7 @@ class Simulation:
         self._asked = OutgoingLines()
         self._pipe: WatchedEnd | None = None
         self._heard = clock()
-        self._pending: dict[str, list[Told]] = {}
+        self._pending: dict[str, list[OnAnswer]] = {}
         self._complaints = 0
 
     def open(self, number: int) -> None:
@@ -119,8 +119,8 @@ class Simulation:
         self._pipe.flush()
         return True
 
-    def ask(self, asked: Asked, told: Told) -> None:
-        """Send a request; `told` receives the reply, which may be that the queue is full.
+    def ask(self, asked: Asked, on_answer: OnAnswer) -> None:
+        """Send a request; `on_answer` receives the reply, which may be that the queue is full.
 
         Ids are those of the client that asks: the same id of another one is another question.
         """
@@ -128,7 +128,7 @@ class Simulation:
         key = f"{asked['client']}/{given}"
 
         def answered(line: Answer) -> None:
-            told(line | {"id": given})
+            on_answer(line | {"id": given})
 
         if self.ended.is_set():
             answered({"k": "done", "ok": False, "text": self.why})
@@ -149,8 +149,8 @@ class Simulation:
         loop, patience = asyncio.get_running_loop(), action.patience
         loop.call_later(patience, self._give_up, key, answered, patience)
 
-    def _give_up(self, key: str, told: Told, patience: float) -> None:
-        if told in self._pending.get(key, ()):
+    def _give_up(self, key: str, on_answer: OnAnswer, patience: float) -> None:
+        if on_answer in self._pending.get(key, ()):
             text = f"no answer within {patience:g} s"
             self._answer({"k": "done", "id": key, "ok": False, "text": text, "late": True})
 

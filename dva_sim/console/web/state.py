@@ -23,7 +23,7 @@ STORY_SHOWN = 200  # of them in a snapshot
 # Kinds of which only the newest counts.
 LATEST = (
     *("rows", "hazards", "events", "control", "alarms", "audit", "pictures"),
-    *("told", "shelf"),
+    *("story_so_far", "shelf"),
 )
 MOST_SEATS = 256  # of which anything is remembered
 
@@ -73,7 +73,7 @@ class RunState:
         self._left: dict[int, int] = {}
         self.place_version, self.place_time = 0, 0
         self.story: deque[Line] = deque(maxlen=STORY_KEPT)
-        self.told = 0
+        self.story_count = 0
         self.seats: dict[str, Versioned] = {}
         self.seats_short: dict[str, Versioned] = {}
         self.guards: dict[str, Versioned] = {}
@@ -100,7 +100,7 @@ class RunState:
         elif kind == "robot":
             self.windows[line["i"]] = Versioned(self.version, body_of(line))
         elif kind == "story":
-            self.told += 1
+            self.story_count += 1
             self.story.append(line)
         elif kind == "log":
             self.logs.take(line)
@@ -179,7 +179,7 @@ class RunState:
             state = {
                 "pos": list(self.places.values()),
                 "story": list(self.story)[-STORY_SHOWN:],
-                "story_from": self.told - min(STORY_SHOWN, len(self.story)),
+                "story_from": self.story_count - min(STORY_SHOWN, len(self.story)),
                 "seats": self.seats_known(),
                 **self.lines,
             }

@@ -161,9 +161,9 @@ class StoryLine(Happened):
     k: Literal["story"]
 
 
-class ToldLine(TypedDict):
+class StorySoFarLine(TypedDict):
     """All that has happened up to a moment of a recording."""
 
-    k: Literal["told"]
+    k: Literal["story_so_far"]
     t: int
     lines: list[Happened]

@@ -14,7 +14,7 @@ from dva_sim.console.wire.events import (
     EventsLine,
     HazardsLine,
     StoryLine,
-    ToldLine,
+    StorySoFarLine,
 )
 from dva_sim.console.wire.pages import (
     LogLine,
@@ -31,7 +31,7 @@ from dva_sim.console.wire.seats import DoneLine, GuardLine, SeatLine
 from dva_sim.serving.pipes import LineKinds
 
 # Lines from a console to the web process.
-Told: TypeAlias = (
+WorldLine: TypeAlias = (
     SceneLine
     | EmptySceneLine
     | PlacesLine
@@ -44,7 +44,7 @@ Told: TypeAlias = (
     | AlarmsLine
     | AuditLine
     | StoryLine
-    | ToldLine
+    | StorySoFarLine
     | SeatLine
     | GuardLine
     | ExchangesLine
@@ -66,7 +66,7 @@ ToPage: TypeAlias = (
     | AlarmsLine
     | AuditLine
     | StoryLine
-    | ToldLine
+    | StorySoFarLine
     | SeatLine
     | OtherSeatLine
     | GuardLine
@@ -83,12 +83,12 @@ ToPage: TypeAlias = (
 class Tell(Protocol):
     """Takes lines for pages, and a key for those of which the newest counts."""
 
-    def __call__(self, line: Told, key: object = "", /) -> object:
+    def __call__(self, line: WorldLine, key: object = "", /) -> object:
         """Take one."""
 
 
 KINDS: Final = LineKinds(
-    newest=frozenset({"pos", "seat", "rows", "hazards", "events", "devices", "told"}),
+    newest=frozenset({"pos", "seat", "rows", "hazards", "events", "devices", "story_so_far"}),
     kept=frozenset({"scene", "shelf", "done", "bye"}),
     first_dropped=frozenset({"log"}),  # whose numbers tell what is missing
 )

@@ -11,7 +11,7 @@ from dva_sim.console.wire.events import (
     EventsLine,
     HazardsLine,
     StoryLine,
-    ToldLine,
+    StorySoFarLine,
 )
 from dva_sim.console.wire.records import PicturesLine, ShelfLine
 from dva_sim.console.wire.rows import RowsLine
@@ -103,7 +103,7 @@ class SnapState(TypedDict, total=False):
     alarms: AlarmsLine
     audit: AuditLine
     pictures: PicturesLine
-    told: ToldLine
+    story_so_far: StorySoFarLine
     shelf: ShelfLine
 
 

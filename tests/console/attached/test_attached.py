@@ -14,7 +14,7 @@ from helpers.processes.programs import Program, Programs
 
 from dva_sim.console.attached import lines
 from dva_sim.console.attached.options import AttachOptions
-from dva_sim.console.attached.told import DeviceState
+from dva_sim.console.attached.system_state import DeviceState
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.keys import KeyRing, create_keys
 from dva_sim.protocol import messages as m
@@ -31,23 +31,23 @@ HERE = GeoFrame(38.66, -9.2)
 # --- what is told ------------------------------------------------------------------------------
 
 
-def told(kind: str = "Robot", **more: object) -> DeviceState:
+def device_state(kind: str = "Robot", **more: object) -> DeviceState:
     return DeviceState(m.Device(ROBOT, "robot-1", kind, "10.0.0.1:5600"), 0.0, **more)
 
 
 def test_of_a_robot_that_has_said_nothing_everything_is_unknown():
-    row = lines.robot_row(told(), 0, 5.0)
+    row = lines.robot_row(device_state(), 0, 5.0)
     assert (row["mode"], row["holder"], row["camera"]) == ("unknown", None, None)
-    assert lines.device_row(told(), 5.0, False, False)["link"] is None
-    assert lines.device_row(told(), 5.0, False, False)["holder_known"] is False
-    assert lines.positions({ROBOT: told()}, {ROBOT: 0}, HERE) == []
+    assert lines.device_row(device_state(), 5.0, False, False)["link"] is None
+    assert lines.device_row(device_state(), 5.0, False, False)["holder_known"] is False
+    assert lines.positions({ROBOT: device_state()}, {ROBOT: 0}, HERE) == []
 
 
 def test_a_robot_is_shown_as_it_says_itself():
     latitude, longitude = HERE.to_latlon(3.0, -4.0)
     status = m.RobotStatus("Teleoperation", m.Position(latitude, longitude), 1.0, 0.25, 0.0, 7)
     holder = m.RobotHolder(id_of("operator", 1), "ana", 10.0), 2.0
-    robot = told(status=status, holder=holder, heard=4.0)
+    robot = device_state(status=status, holder=holder, heard=4.0)
     row = lines.robot_row(robot, 3, 5.0)
     shown = (row["mode"], row["holder_label"], row["session_age_s"])
     assert shown == ("Teleoperation", "ana", 13.0)
@@ -58,7 +58,7 @@ def test_a_robot_is_shown_as_it_says_itself():
 
 
 def test_a_device_that_left_the_list_is_shown_as_lost_for_a_while():
-    assert lines.device_row(told(heard=1.0), 30.0, False, False)["silent"] is True
+    assert lines.device_row(device_state(heard=1.0), 30.0, False, False)["silent"] is True
 
 
 def test_an_event_is_shown_as_the_dva_tells_it():

@@ -81,7 +81,7 @@ def test_what_others_and_the_policy_decide_is_a_row_by_the_dvas_record(page):
     world.do("room_join", name="bob", role="supervise")
     world.do("event_acknowledge", event=1, role="supervise")
     world.do("dispatch_mode", mode="automatic", role="supervise")
-    page.until(lambda: "min_eta" in str(page.told("story")))
+    page.until(lambda: "min_eta" in str(page.lines_of("story")))
     page.let(0.5)
     rows = {(row.author, row.action) for row in page.written()}
 
@@ -101,7 +101,7 @@ def test_without_a_name_one_is_called_by_ones_page(page):
     assert page.ask("room_join", client="c2", name="")["text"].startswith("you are supervise-1")
     page.actions.take({"id": "bye-1", "client": "c2", "do": "release"})
     page.let(1.0)
-    assert [room["label"] for room in page.told("control")[-1]["rooms"]] == ["ana"]
+    assert [room["label"] for room in page.lines_of("control")[-1]["rooms"]] == ["ana"]
 
     rows = page.written()
     (note,) = [row for row in rows if row.action == "note"]
@@ -112,7 +112,7 @@ def test_without_a_name_one_is_called_by_ones_page(page):
 def test_pages_are_told_how_the_log_stands(page):
     assert page.ask("event_acknowledge", event=1)["ok"]
     page.let(0.5)
-    line = page.told("audit")[-1]
+    line = page.lines_of("audit")[-1]
 
     assert (line["rows"], line["lasting"], line["problem"]) == (page.keeper.number, True, "")
     assert line["hash"] == page.keeper.head

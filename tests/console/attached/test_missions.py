@@ -25,7 +25,7 @@ def page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[AttachedPa
 
 def number(page: AttachedPage, label: str) -> int:
     """By which the page knows a device, as the web process says it."""
-    return next(t["i"] for t in page.told("scene")[-1]["things"] if t["label"] == label)
+    return next(t["i"] for t in page.lines_of("scene")[-1]["things"] if t["label"] == label)
 
 
 def sent_by(page: AttachedPage) -> list[bytes]:
@@ -43,7 +43,7 @@ def test_a_robot_goes_and_looks_by_itself_and_is_given_back(page):
     page.until(lambda: robot.controller.grant is None, within=400.0)
     page.let(1.0)
 
-    story = [line["what"] for line in page.told("story")]
+    story = [line["what"] for line in page.lines_of("story")]
     assert any(unnamed(what, "mission", "robot-1", "done") == [] for what in story)
     sent = [data for data in sent_by(page) if isinstance(data, bytes)]
     kinds = {type(decode(data).body) for data in sent}
@@ -68,7 +68,7 @@ def test_a_robot_that_falls_silent_on_its_way_is_given_back(page):
     robot = page.world.robot()
     assert page.ask("mission", robot=number(page, "robot-1"), event=1)["ok"]
     page.world.world.run.network.leave(robot.device.id_tag)
-    page.until(lambda: "how its mission stands is unknown" in str(page.told("story")))
+    page.until(lambda: "how its mission stands is unknown" in str(page.lines_of("story")))
     page.let(1.0)
 
     given_back = [decode(data).body for data in sent_by(page) if isinstance(data, bytes)][-9:]

@@ -25,7 +25,7 @@ def robot_1(page: AttachedPage) -> int:
 
 def readings(page: AttachedPage) -> dict[str, str]:
     """Sensor readings of the first robot on the page."""
-    rows = {row["i"]: row["sensors"] for row in page.told("rows")[-1]["robots"]}
+    rows = {row["i"]: row["sensors"] for row in page.lines_of("rows")[-1]["robots"]}
     return dict(one.split(" ", 1) for one in rows.get(robot_1(page), ()))
 
 

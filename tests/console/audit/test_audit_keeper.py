@@ -22,7 +22,7 @@ def keeper(tmp_path: Path) -> Iterator[AuditKeeper]:
         kept.close()
 
 
-def told(keeper: AuditKeeper, action: str) -> list[str]:
+def problems_of(keeper: AuditKeeper, action: str) -> list[str]:
     """Result of keeping an action: an empty text once it is on disk."""
     reports: list[str] = []
     keeper.put(keeper.entry(action, "ana"), reports.append)
@@ -34,7 +34,7 @@ def test_who_waits_for_a_row_is_told_when_it_is_in_the_file(keeper):
     seen: list[AuditRow] = []
     keeper.on_rows = seen.extend
 
-    assert told(keeper, "acknowledge") == [""]
+    assert problems_of(keeper, "acknowledge") == [""]
     rows = read_rows(keeper.path)
     assert [row.action for row in rows] == [BEGIN, "acknowledge"]
     assert rows[0].details == {"scenario": "hands-on"}
@@ -55,7 +55,7 @@ def test_a_console_that_ends_writes_what_waits_and_says_that_it_ended(keeper):
 
 def test_on_a_full_disk_nobody_is_told_that_it_is_done_and_nothing_is_lost(keeper, monkeypatch):
     monkeypatch.setattr(audit_keeper, "AGAIN", 0.01)
-    assert told(keeper, "before") == [""]
+    assert problems_of(keeper, "before") == [""]
     keeper._log._file.execute("PRAGMA max_page_count = 1")
     big: dict[str, Any] = {"text": "x" * 100_000}
     reports: list[str] = []
@@ -83,7 +83,7 @@ def test_what_waits_for_a_full_disk_is_bounded_and_what_was_lost_is_told(keeper,
 def test_without_a_file_the_log_is_gone_with_the_console():
     kept = AuditKeeper(None, lambda: 0.0, {})
     assert not kept.is_lasting
-    assert told(kept, "note") == [""]
+    assert problems_of(kept, "note") == [""]
     assert kept.path.exists()
     kept.close()
 

@@ -39,7 +39,7 @@ def devices(page):
     """The table as a page that looks at it gets it."""
     page.actions.take({"do": "look", "logs": {}, "tables": ["devices"]})
     page.let(2.5)
-    return {row["id"]: row for row in page.told("devices")[-1]["devices"]}
+    return {row["id"]: row for row in page.lines_of("devices")[-1]["devices"]}
 
 
 def asked_of(page, device, peer, body):
@@ -65,18 +65,18 @@ def listed(page):
 
 def test_a_stopped_server_answers_nobody_and_a_started_one_does(page):
     assert page.do("server_stop") == (True, "the server is stopped")
-    assert page.told("rows")[-1]["server"]["listens"] is False
+    assert page.lines_of("rows")[-1]["server"]["listens"] is False
     assert asked_of(page, someone(page), DVA, m.GetDeviceList()) is None
     done, text = page.do("server_start", port=6000)
     assert (done, unnamed(text, "192.168.0.2:6000")) == (True, [])
     assert asked_of(page, someone(page), DVA, m.GetDeviceList()).code == m.OK
-    assert page.told("rows")[-1]["server"] == {
+    assert page.lines_of("rows")[-1]["server"] == {
         "listens": True,
         "address": "192.168.0.2:6000",
         "port": 6000,
         "modelled": True,
     }
-    assert page.told("scene")[-1]["dva_address"] == "192.168.0.2:6000"
+    assert page.lines_of("scene")[-1]["dva_address"] == "192.168.0.2:6000"
 
 
 def test_devices_outlast_a_server_that_was_stopped_for_long(page):
@@ -92,14 +92,14 @@ def test_a_person_is_told_for_how_long_the_server_has_been_silent(page):
     page.let(5.0)
     page.do("server_stop")
     page.let(15.0)
-    alerts = [line["alert"] for line in page.told("seat") if line["seat"] == page.client]
+    alerts = [line["alert"] for line in page.lines_of("seat") if line["seat"] == page.client]
     reported = dict.fromkeys(alert for alert in alerts if alert)
     assert len(reported) > 2
     assert all(re.search(r"DVA.* 1[1-6] s", alert) for alert in reported)
     page.do("server_start", port=5555)
     page.let(5.0)
     assert page.seat()["alert"] == ""
-    story = [line["what"] for line in page.told("story")]
+    story = [line["what"] for line in page.lines_of("story")]
     assert any(unnamed(what, "DVA", "silent") == [] for what in story)
 
 
@@ -213,7 +213,7 @@ def test_an_id_of_ones_own_is_taken_once(page):
     assert page.do("fake_add", label="one", type="TeleOp", id_tag=own.lower())[0]
     for taken in (own, DVA, "7"):
         assert page.do("fake_add", label="two", type="TeleOp", id_tag=taken)[0] is False
-    assert own in page.told("done")[-3]["text"]
+    assert own in page.lines_of("done")[-3]["text"]
     done, text = page.do("fake_add", label="two", type="TeleOp")
     assert (done, unnamed(text, "two", GHOST)) == (True, [])
 
@@ -263,12 +263,12 @@ def test_the_end_of_a_permission_is_that_of_the_rule_that_allows_it(monkeypatch)
     page = Page(monkeypatch, access=[rule])
     page.do("take", robots=["robot-1"])
     row = devices(page)[page.robot().device.id_tag]
-    assert row["ends_s"] == pytest.approx(100.0 - page.told("devices")[-1]["t"] / 1000, abs=0.1)
+    assert row["ends_s"] == pytest.approx(100.0 - page.lines_of("devices")[-1]["t"] / 1000, abs=0.1)
 
 
 def test_nobody_who_does_not_look_is_told_of_devices(page):
     page.let(5.0)
-    assert page.told("devices") == []
+    assert page.lines_of("devices") == []
 
 
 @pytest.mark.parametrize(
@@ -285,7 +285,7 @@ def test_the_link_of_a_device_is_judged_by_when_it_was_heard(heard_s, silent, li
 def test_who_joins_is_shown_with_what_the_dva_knows(page):
     page.do("fake_add", label="robot-1", type="Robot", id_tag=GHOST)
     page.let(1.0)
-    scene, rows = page.told("scene")[-1], page.told("rows")[-1]
+    scene, rows = page.lines_of("scene")[-1], page.lines_of("rows")[-1]
     (ghost,) = [thing for thing in scene["things"] if thing["id"] == GHOST]
     assert (ghost["kind"], ghost["label"]) == ("robot", f"robot-1 ({GHOST})")
     (row,) = [row for row in rows["robots"] if row["i"] == ghost["i"]]
@@ -294,4 +294,4 @@ def test_who_joins_is_shown_with_what_the_dva_knows(page):
     assert page.seat()["drives"][0]["i"] == 0
     page.do("fake_remove", device=GHOST)
     page.let(1.0)
-    assert ghost["i"] not in [row["i"] for row in page.told("rows")[-1]["robots"]]
+    assert ghost["i"] not in [row["i"] for row in page.lines_of("rows")[-1]["robots"]]

@@ -39,7 +39,7 @@ def fire(one: PhonePage) -> None:
 
 def events(one: PhonePage) -> list[dict[str, Any]]:
     """Events as a page receives them."""
-    shown = one.told("events")
+    shown = one.lines_of("events")
     return list(shown[-1]["events"]) if shown else []
 
 
@@ -50,7 +50,7 @@ def event(one: PhonePage, number: int = 1) -> dict[str, Any]:
 
 def alarms(one: PhonePage) -> list[dict[str, Any]]:
     one.let(1.0)
-    return list(one.told("alarms")[-1]["alarms"])
+    return list(one.lines_of("alarms")[-1]["alarms"])
 
 
 def sent_by(one: PhonePage, label: str) -> list[bytes]:
@@ -83,12 +83,12 @@ def test_what_is_under_way_is_answered_though_its_person_takes_another_name(room
     about = asked if what == "take_over" else {"event": 1, **asked}
     room.actions.take({"id": "under way", "do": what, **taken, **about})
     assert room.do("room_join", name="bea", role="supervise")[0]
-    room.until(lambda: any(line["id"] == "under way" for line in room.told("done")))
+    room.until(lambda: any(line["id"] == "under way" for line in room.lines_of("done")))
 
-    (line,) = (line for line in room.told("done") if line["id"] == "under way")
+    (line,) = (line for line in room.lines_of("done") if line["id"] == "under way")
     assert (line["ok"], "outcome" in line) == (True, False)
     room.let(0.3)
-    assert [one["label"] for one in room.told("control")[-1]["rooms"]] == ["bea"]
+    assert [one["label"] for one in room.lines_of("control")[-1]["rooms"]] == ["bea"]
     room.until(lambda: left(room, "ana"))
 
 
@@ -100,7 +100,7 @@ def left(one: PhonePage, label: str) -> bool:
 def test_who_is_sent_goes_and_what_the_policy_would_have_done_is_told(room):
     done, _ = room.do("event_proposal", event=1)
     assert done
-    proposal = room.told("done")[-1]["proposal"]
+    proposal = room.lines_of("done")[-1]["proposal"]
     assert proposal["label"]
     assert {who["label"] for who in proposal["candidates"]} >= {"guard-1", "guard-2", "robot-1"}
     other = next(
@@ -117,10 +117,10 @@ def test_who_is_sent_goes_and_what_the_policy_would_have_done_is_told(room):
 def test_who_is_at_another_event_is_not_free_and_the_dva_refuses_to_send_it(room):
     about = {"kind": "flood", "severity": "low", "x_m": 8.0, "y_m": 12.0}
     assert room.do("event_raise", **about)[0]
-    number = room.told("done")[-1]["event"]
+    number = room.lines_of("done")[-1]["event"]
     assert room.do("event_assign", event=1, device="guard-1")[0]
     room.do("event_proposal", event=number)
-    who = {one["label"]: one for one in room.told("done")[-1]["proposal"]["candidates"]}
+    who = {one["label"]: one for one in room.lines_of("done")[-1]["proposal"]["candidates"]}
     assert (who["guard-1"]["free"], who["guard-2"]["free"]) == (False, True)
 
     done, text = room.do("event_assign", event=number, device="guard-1")
@@ -165,7 +165,7 @@ def test_who_was_sent_is_taken_off_and_a_note_is_for_all(room):
 def test_an_event_is_raised_at_a_place_and_nowhere_else(room):
     about = {"kind": "flood", "severity": "critical", "x_m": 20.0, "y_m": 12.0}
     assert room.do("event_raise", **about)[0]
-    number = room.told("done")[-1]["event"]
+    number = room.lines_of("done")[-1]["event"]
     assert event(room, number)["kind"] == "flood"
     assert event(room, number)["severity"] == "critical"
     done, text = room.do("event_raise", **about | {"x_m": 1e5})
@@ -200,12 +200,12 @@ def test_a_dispatcher_does_not_take_a_robot_from_its_holder(monkeypatch):
 
 def test_the_policy_acts_by_itself_once_it_is_let(room):
     assert event(room)["assigned"] == []
-    assert room.told("control")[-1]["dispatch"]["mode"] == "ask_first"
+    assert room.lines_of("control")[-1]["dispatch"]["mode"] == "ask_first"
     assert room.do("dispatch_mode", mode="automatic")[0]
 
     room.let(1.0)
     assert event(room)["assigned"]
-    shown = room.told("control")[-1]["dispatch"]
+    shown = room.lines_of("control")[-1]["dispatch"]
     assert (shown["mode"], shown["switched"]["label"]) == ("automatic", "ana")
 
 
@@ -261,7 +261,7 @@ def test_a_shelved_alarm_comes_back_and_a_row_that_is_gone_is_told(room):
     (alarm,) = [one for one in alarms(room) if one["event"] == 1]
     assert room.do("alarm_shelve", alarm=alarm["key"], for_s=60)[0]
     assert not [one for one in alarms(room) if one["event"] == 1]
-    assert room.told("alarms")[-1]["shelved"][0]["shelved_by"] == "ana"
+    assert room.lines_of("alarms")[-1]["shelved"][0]["shelved_by"] == "ana"
     room.let(60.0)
     assert [one for one in alarms(room) if one["event"] == 1]
     done, _ = room.do("alarm_acknowledge", alarm="event 99")
@@ -272,7 +272,7 @@ def test_a_page_that_is_gone_for_good_has_no_room_any_more(room):
     room.actions.take({"id": "bye-release-a1", "client": "a1", "do": "release"})
     room.let(1.0)
 
-    assert room.told("control")[-1]["rooms"] == []
+    assert room.lines_of("control")[-1]["rooms"] == []
 
 
 def test_every_message_of_a_control_room_keeps_the_schema(room):

@@ -30,7 +30,7 @@ def guard(page, number=2):
 
 
 def line(page, client="g1"):
-    return next(x for x in reversed(page.told("guard")) if x["seat"] == client)
+    return next(x for x in reversed(page.lines_of("guard")) if x["seat"] == client)
 
 
 def ordered(page):
@@ -59,7 +59,7 @@ def beside(page, order):
 
 
 def test_the_scene_says_whom_people_may_play(page):
-    things = {t["label"]: t for t in page.told("scene")[0]["things"] if t["kind"] == "guard"}
+    things = {t["label"]: t for t in page.lines_of("scene")[0]["things"] if t["kind"] == "guard"}
     assert things["guard-2"]["person"] is True
     assert "person" not in things["guard-1"]
 
@@ -117,7 +117,7 @@ def test_what_is_declined_goes_to_others_and_the_reason_is_told(page):
     assert page.do("guard_answer", accept=False, reason="a broken <leg>")[0]
     page.let(2.0)
     assert line(page)["order"] is None
-    assert any("a broken <leg>" in x["what"] for x in page.told("story"))
+    assert any("a broken <leg>" in x["what"] for x in page.lines_of("story"))
     assert guard(page, 1)._protocol.order is not None
 
 
@@ -147,7 +147,7 @@ def test_a_body_stands_where_the_person_says_and_others_see_it(page):
         if page.do("guard_place", x_m=x, y_m=y)[0]
     )
     page.let(2.5)
-    at = {row[0]: row[1:3] for row in page.told("pos")[-1]["p"]}
+    at = {row[0]: row[1:3] for row in page.lines_of("pos")[-1]["p"]}
     number = line(page)["guard"]
     assert at[number] == [pytest.approx(100 * x, abs=3), pytest.approx(100 * y, abs=3)]
     known = page.world.run.dva.core.registry.entries[guard(page).device.id_tag].position
@@ -183,7 +183,7 @@ def test_a_person_reports_an_event(page):
     done, _ = page.do("guard_report", kind="gas_leak", x_m=x, y_m=y, severity="high")
     assert done
     page.let(0.5)
-    found = [e for e in page.told("events")[-1]["events"] if e["kind"] == "gas_leak"]
+    found = [e for e in page.lines_of("events")[-1]["events"] if e["kind"] == "gas_leak"]
     assert len(page.world.run.dva.core.events.open) == before + 1
     assert found[0]["severity"] == "high"
     for wrong in ({"kind": "war"}, {"severity": 7}, {"x_m": math.inf}):

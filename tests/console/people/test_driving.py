@@ -75,10 +75,10 @@ def test_while_held_by_lag_nobody_starts_and_the_page_says_why(driving):
     driving.let(0.5)
     done, text = driving.do("start")
     assert (done, "real time" in text) == (False, True)
-    assert driving.told("rows")[-1]["clock"]["held_by_lag"]
+    assert driving.lines_of("rows")[-1]["clock"]["held_by_lag"]
     assert "behind real time" in driving.seat()["alert"]
     driving.let(3.0)
-    assert not driving.told("rows")[-1]["clock"]["held_by_lag"]
+    assert not driving.lines_of("rows")[-1]["clock"]["held_by_lag"]
     assert driving.robot().controller.mode is Mode.IDLE
     assert driving.do("start")[0]
 
@@ -91,7 +91,7 @@ def test_a_robot_has_one_holder_and_the_second_is_told_who(page):
     assert "console-1" in text
     assert page.do("take", robots=[1], client="c2")[0]
     page.let(1.0)
-    holders = {row["i"]: row["holder_label"] for row in page.told("rows")[-1]["robots"]}
+    holders = {row["i"]: row["holder_label"] for row in page.lines_of("rows")[-1]["robots"]}
     assert holders == {0: "console-1", 1: "console-2"}
 
 
@@ -128,14 +128,16 @@ def test_an_emergency_with_an_id_that_was_used_before_stops_all_the_same(driving
     driving.actions.take(line)  # by another path, at the same time: the same one
     driving.let(2.0)
     assert driving.robot().controller.mode is Mode.IDLE
-    answers = [entry for entry in driving.told("done") if entry["id"] == "x"]
+    answers = [entry for entry in driving.lines_of("done") if entry["id"] == "x"]
     assert driving.do("start")[0]
     driving.let(2.0)
     assert driving.robot().controller.mode is Mode.TELEOPERATION
     driving.actions.take(line)
     driving.let(1.0)
     assert driving.robot().controller.mode is Mode.IDLE
-    assert len([entry for entry in driving.told("done") if entry["id"] == "x"]) == len(answers) + 1
+    assert (
+        len([entry for entry in driving.lines_of("done") if entry["id"] == "x"]) == len(answers) + 1
+    )
 
 
 def test_an_action_said_twice_is_done_once_and_answered_twice(page):
@@ -143,7 +145,7 @@ def test_an_action_said_twice_is_done_once_and_answered_twice(page):
     page.actions.take(line)
     page.let(2.0)
     page.actions.take(line)
-    answers = [entry for entry in page.told("done") if entry["id"] == "once"]
+    answers = [entry for entry in page.lines_of("done") if entry["id"] == "once"]
     assert len(answers) == 2
     assert answers[0]["text"] == answers[1]["text"] == "robot-1 is yours"
 
@@ -197,7 +199,7 @@ def test_another_pattern_needs_a_standstill_first_and_then_carries_the_commands(
 
 def test_an_order_of_the_dva_is_shown_driven_to_and_confirmed(page):
     page.let(30.0)
-    order = page.told("rows")[-1]["order"]
+    order = page.lines_of("rows")[-1]["order"]
     assert order["kind"] == "fire"
     assert page.do("take", robots=[order["robot"]])[0]
     assert page.seat()["order"] == order
@@ -207,7 +209,7 @@ def test_an_order_of_the_dva_is_shown_driven_to_and_confirmed(page):
     done, text = page.do("confirm")
     assert done, text
     page.let(0.2)
-    event = page.told("events")[-1]["events"][0]
+    event = page.lines_of("events")[-1]["events"][0]
     assert event["state"] == "confirmed"
     assert page.seat()["order"] is None
     assert page.world.recorder.drives[-1].outcome == "confirmed"
@@ -226,18 +228,18 @@ def test_whoever_takes_the_robot_of_an_order_that_waits_sits_where_it_waits(page
     assert page.seat()["order"]["kind"] == "fire"
     assert page.do("release")[0]  # and declines it
     page.let(2.0)
-    order = page.told("rows")[-1]["order"]
+    order = page.lines_of("rows")[-1]["order"]
     assert order["kind"] == "fire"
 
     assert page.do("take", robots=[order["robot"]], client="c3")[0]
-    seat = [line for line in page.told("seat") if line["seat"] == "c3"][-1]
+    seat = [line for line in page.lines_of("seat") if line["seat"] == "c3"][-1]
     assert (seat["label"], seat["order"]) == ("console-2", order)
 
 
 def test_who_loses_an_order_is_told_and_may_take_the_robot_again(monkeypatch):
     page = Page(monkeypatch, dispatch__still_within_s=20)
     page.let(30.0)
-    order = page.told("rows")[-1]["order"]
+    order = page.lines_of("rows")[-1]["order"]
     assert page.do("take", robots=[order["robot"]])[0]
     assert page.do("start")[0]
     page.let(40.0)
@@ -261,14 +263,14 @@ def test_a_robot_that_pushes_against_something_says_so_while_it_creeps(driving):
         if robot.body.in_contact and robot.body.speed < 0.05:
             break
     driving.let(0.6)
-    shown = driving.told("rows")[-1]["robots"][0]["stop_reason"]
+    shown = driving.lines_of("rows")[-1]["robots"][0]["stop_reason"]
     assert not before
     assert any(word in shown for word in ("way", "stuck"))
 
 
 def test_the_age_of_an_event_is_that_of_its_state(page):
     page.let(20.0)
-    event = page.told("events")[-1]["events"][0]
+    event = page.lines_of("events")[-1]["events"][0]
     assert (event["state"], event["over"]) == ("assigned", False)
     events = page.world.run.dva.core.events
     assert event["since_ms"] == round(1000 * events.open[event["number"]].times["assigned"])
@@ -283,8 +285,8 @@ def test_the_age_of_a_command_is_the_links_delay_and_no_more_than_that_by_much(d
 
 def test_an_order_to_an_empty_seat_is_declined_after_a_while_and_others_go(page):
     page.let(120.0)
-    assert any("declines event 1" in line["what"] for line in page.told("story"))
-    assert page.told("events")[-1]["events"][0]["assigned"] == ["guard-2"]
+    assert any("declines event 1" in line["what"] for line in page.lines_of("story"))
+    assert page.lines_of("events")[-1]["events"][0]["assigned"] == ["guard-2"]
 
 
 def test_no_rule_of_safety_is_broken_by_all_that(driving):

@@ -234,7 +234,7 @@ def test_lost_samples_are_counted(driving):
 
 
 def test_the_scene_offers_what_a_phone_may_choose(page):
-    scene = page.told("scene")[0]
+    scene = page.lines_of("scene")[0]
     assert scene["dva_address"] == "192.168.0.2:5555"
     assert set(scene["phone"]["pipelines"]) == {"default", "dissertation"}
     assert scene["phone"]["pipelines"]["dissertation"]["filter"] == "median20-copy"

@@ -46,14 +46,14 @@ class Told:
 
     def __init__(self, run, shelf=None):
         self.lines, self.shown, self.answers, self.logs = {}, [], [], []
-        self.told = []
+        self.received = []
         self.player = Player(run, shelf)
         self.player.tell, self.player.show = self._take, self._show
 
     def _take(self, line, key=None):
         line = checked(line)
         self.lines[line["k"]] = line
-        self.told.append(line)
+        self.received.append(line)
         if line["k"] == "log":
             self.logs.append(line)
         if line["k"] == "done":
@@ -167,10 +167,10 @@ def test_a_driver_sees_the_picture_that_had_come_by_then(recorded):
 def test_a_jump_back_tells_the_moment_it_leads_to(recorded, playing):
     lines = playing(recorded)
     assert lines.ask("seek", "1", t_ms=80_000)["ok"]
-    late = lines.lines["told"]["lines"]
+    late = lines.lines["story_so_far"]["lines"]
     assert lines.lines["rows"]["t"] == 80_000
     assert lines.ask("seek", "2", t_ms=20_000)["ok"]
-    early = lines.lines["told"]["lines"]
+    early = lines.lines["story_so_far"]["lines"]
     assert lines.lines["rows"]["t"] == 20_000
     assert len(early) < len(late)
     assert all(line["t"] <= 20_000 for line in early)
@@ -367,5 +367,15 @@ def test_what_a_page_gets_of_a_recording_is_as_declared(playing, recorded):
     for t_ms in (20_000, 40_000):
         played.ask("seek", str(t_ms), t_ms=t_ms)
         played.player.take({"do": "look", "client": "c"} | looked)
-    kinds = {message["k"] for message in at_page(played.told, "c")}
-    assert kinds >= {"snap", "d", "rows", "robot", "log", "devices", "events", "told", "hazards"}
+    kinds = {message["k"] for message in at_page(played.received, "c")}
+    assert kinds >= {
+        "snap",
+        "d",
+        "rows",
+        "robot",
+        "log",
+        "devices",
+        "events",
+        "story_so_far",
+        "hazards",
+    }

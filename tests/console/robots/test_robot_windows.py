@@ -22,7 +22,7 @@ def opened(page):
 
 def window(page):
     page.let(0.2)
-    return [line for line in page.told("robot") if line["i"] == 0][-1]
+    return [line for line in page.lines_of("robot") if line["i"] == 0][-1]
 
 
 def by_hand(page, speed=0.0, turn=0.0, held=True, seconds=1.0, client="c1"):
@@ -34,12 +34,12 @@ def by_hand(page, speed=0.0, turn=0.0, held=True, seconds=1.0, client="c1"):
 
 
 def story(page):
-    return [line["what"] for line in page.told("story") if line["who"] == "robot-1"]
+    return [line["what"] for line in page.lines_of("story") if line["who"] == "robot-1"]
 
 
 def test_only_robots_that_somebody_looks_at_are_told(page):
     page.let(1.0)
-    assert {line["i"] for line in page.told("robot")} == {0}
+    assert {line["i"] for line in page.lines_of("robot")} == {0}
 
 
 def test_a_robot_that_stands_says_so_once_and_shows_its_sensors_with_units(page):

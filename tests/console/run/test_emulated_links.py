@@ -73,7 +73,7 @@ def test_a_person_drives_over_the_link_and_sees_how_late_everything_is(monkeypat
         assert picture >= 1000 * EACH_WAY
         assert drive_shown["loop_ms"] >= 1000 * EACH_WAY
         assert not page.world.recorder.violations
-        shown = page.told("rows")[-1]["link"]
+        shown = page.lines_of("rows")[-1]["link"]
         assert (shown["kind"], shown["delay_s"], shown["loss"]) == ("real", EACH_WAY, 0.0)
         done, text = page.do("link", delay_s=0.1)
         assert (done, unnamed(text, "--link")) == (False, [])

@@ -67,17 +67,17 @@ def test_half_of_all_packets_lost_makes_frames_and_commands_rarer_and_later(driv
     rare = driving.robot().applied - before
     assert usual == pytest.approx(100, abs=5)
     assert rare < usual / 4
-    assert driving.told("rows")[-1]["robots"][0]["lost"] > 20
+    assert driving.lines_of("rows")[-1]["robots"][0]["lost"] > 20
 
 
 def test_jitter_keeps_within_the_delay_and_comes_back_with_it(driving):
     done, text = driving.do("link", jitter_s=0.2)
     assert done
     assert unnamed(text, "jitter", "0 s") == []
-    assert driving.told("rows")[-1]["link"]["jitter_s"] == 0.0
-    assert driving.told("rows")[-1]["link"]["jitter_wanted_s"] == 0.2
+    assert driving.lines_of("rows")[-1]["link"]["jitter_s"] == 0.0
+    assert driving.lines_of("rows")[-1]["link"]["jitter_wanted_s"] == 0.2
     assert driving.do("link", delay_s=0.3)[0]
-    assert driving.told("rows")[-1]["link"]["jitter_s"] == 0.2
+    assert driving.lines_of("rows")[-1]["link"]["jitter_s"] == 0.2
     driving.let(5.0)
     log = driving.world.recorder.newest_drive[driving.robot().device.id_tag]
     took = {round(c.arrived - c.sent, 4) for c in log.applied[-5:]}
@@ -98,7 +98,7 @@ def test_a_slow_computer_of_the_robot_shows_in_the_round_trip(driving):
     assert driving.do("link", processing_s=0.25)[0]
     _, _, trip = ages(driving, 4.0)
     assert trip == pytest.approx(252, abs=10)
-    assert driving.told("rows")[-1]["link"]["processing_s"] == 0.25
+    assert driving.lines_of("rows")[-1]["link"]["processing_s"] == 0.25
 
 
 def test_over_a_long_link_a_robot_is_still_taken_and_says_why_it_stands(monkeypatch):
@@ -110,7 +110,7 @@ def test_over_a_long_link_a_robot_is_still_taken_and_says_why_it_stands(monkeypa
     assert done, text
     page.want(0.3)
     page.let(20.0)
-    shown = page.told("rows")[-1]["robots"][0]["stop_reason"]
+    shown = page.lines_of("rows")[-1]["robots"][0]["stop_reason"]
     assert "3 s" in shown
 
 
@@ -121,8 +121,8 @@ def test_the_rate_of_a_recorded_link_is_the_recordings(monkeypatch, tmp_path):
     done, text = page.do("link", rate_bps=1e6)
     assert not done
     assert "trace" in text
-    assert page.told("rows")[-1]["link"]["trace"] == str(trace)
-    assert page.told("rows")[-1]["link"]["rate_trace"] == str(trace)
+    assert page.lines_of("rows")[-1]["link"]["trace"] == str(trace)
+    assert page.lines_of("rows")[-1]["link"]["rate_trace"] == str(trace)
     assert page.do("link", delay_s=0.1)[0]
 
 
@@ -140,7 +140,7 @@ def test_an_emergency_waits_for_no_connection_whatever_the_delay(monkeypatch):
     page.let(0.51)
     assert page.robot().controller.mode is Mode.IDLE
     page.let(0.1)
-    assert page.told("rows")[-1]["robots"][0]["mode"] == "Idle"
+    assert page.lines_of("rows")[-1]["robots"][0]["mode"] == "Idle"
 
 
 def test_until_the_first_command_comes_the_robot_says_what_it_waits_for(monkeypatch):
@@ -148,7 +148,7 @@ def test_until_the_first_command_comes_the_robot_says_what_it_waits_for(monkeypa
     assert page.do("link", delay_s=0.5)[0]
     page.let(10.0)
     page.sets_out(then=0.6)
-    shown = page.told("rows")[-1]["robots"][0]["stop_reason"]
+    shown = page.lines_of("rows")[-1]["robots"][0]["stop_reason"]
     assert "connection" in shown
 
 

@@ -82,15 +82,15 @@ def test_nothing_of_a_real_link_can_be_chosen(page, what, about, why):
 
 def test_how_long_a_robots_computer_takes_can_be_chosen_all_the_same(page):
     assert page.do("link", processing_s=0.2)[0]
-    becomes(page, lambda: page.told("rows")[-1]["link"]["processing_s"] == 0.2)
-    assert page.told("rows")[-1]["link"] == {"kind": "real", "processing_s": 0.2}
+    becomes(page, lambda: page.lines_of("rows")[-1]["link"]["processing_s"] == 0.2)
+    assert page.lines_of("rows")[-1]["link"] == {"kind": "real", "processing_s": 0.2}
 
 
 def test_a_phone_registers_and_drives_over_sockets(page):
     host, _, port = page.world.sockets.dva.partition(":")
     asked = {"label": "mine", "type": "Teleoperation", "server": host, "port": int(port)}
     wait = {"within": PATIENCE_S}
-    assert page.told("scene")[0]["dva_address"] == f"{host}:{port}"
+    assert page.lines_of("scene")[0]["dva_address"] == f"{host}:{port}"
     assert page.do("phone_register", **asked, **wait)[0]
     assert page.do("phone_devices", **wait)[0]
     robot = page.robot().device.id_tag

@@ -100,7 +100,7 @@ class Viewer:
         self.raw.close()
 
 
-def told(served: Served) -> list[int]:
+def watched(served: Served) -> list[int]:
     """Robots that the renderer is asked to draw next."""
     assert select.select([served.pictures], [], [], PATIENCE_S)[0]
     lines = served.pictures.recv(1 << 16).splitlines()
@@ -130,7 +130,7 @@ def test_nobody_is_drawn_until_somebody_looks_and_once_for_all(console):
     console.asked_so_far()
     viewers = [Viewer(console, "robot-2") for _ in range(3)]
     assert console.next_asked("watch")["robots"] == [1]
-    assert told(console) == [1]
+    assert watched(console) == [1]
     console.show(1, 5, jpeg(5))
     assert [viewer.part()[1] for viewer in viewers] == [jpeg(5)] * 3
     for viewer in viewers[1:]:

@@ -44,7 +44,7 @@ def test_a_leaf_names_this_machine_and_is_valid_for_at_most_397_days(tmp_path):
     assert list(usage) == [ExtendedKeyUsageOID.SERVER_AUTH]
     assert not extension(leaf, x509.BasicConstraints).value.ca
     certificate.verify_directly_issued_by(kept.authority.certificate)
-    assert kept.told == ()
+    assert kept.notices == ()
 
 
 def test_an_authority_signs_no_other_and_nothing_on_the_internet(tmp_path):
@@ -84,7 +84,7 @@ def test_both_are_kept_while_nothing_changes(tmp_path):
     certificates(tmp_path, HOSTS, NOW)
     before = [(tmp_path / name).read_bytes() for name in (AUTHORITY, LEAF)]
     fewer = Hosts.of(["localhost", "192.168.1.7"])
-    assert certificates(tmp_path, fewer, NOW + timedelta(days=300)).told == ()
+    assert certificates(tmp_path, fewer, NOW + timedelta(days=300)).notices == ()
     assert [(tmp_path / name).read_bytes() for name in (AUTHORITY, LEAF)] == before
 
 
@@ -105,9 +105,9 @@ def test_a_leaf_is_renewed_by_the_same_authority_and_that_is_told_in_a_line(
     kept = certificates(tmp_path, hosts, NOW + later)
     assert kept.authority.der == first.authority.der
     assert leaf_in(tmp_path).certificate.serial_number != serial
-    assert len(kept.told) == 1
-    assert why in kept.told[0]
-    assert "\n" not in kept.told[0]
+    assert len(kept.notices) == 1
+    assert why in kept.notices[0]
+    assert "\n" not in kept.notices[0]
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_an_authority_that_may_not_sign_for_this_machine_is_renewed(tmp_path, ho
     first = certificates(tmp_path, HOSTS, NOW)
     kept = certificates(tmp_path, hosts, NOW)
     assert kept.authority.der != first.authority.der
-    assert "trust" in kept.told[0]
+    assert "trust" in kept.notices[0]
     leaf_in(tmp_path).certificate.verify_directly_issued_by(kept.authority.certificate)
 
 
@@ -127,7 +127,7 @@ def test_a_broken_file_is_made_again_and_told_in_a_line(tmp_path, name, damage):
     certificates(tmp_path, HOSTS, NOW)
     (tmp_path / name).write_bytes(damage)
     kept = certificates(tmp_path, HOSTS, NOW)
-    assert len([line for line in kept.told if name in line]) == 1
+    assert len([line for line in kept.notices if name in line]) == 1
     leaf_in(tmp_path).certificate.verify_directly_issued_by(kept.authority.certificate)
 
 
@@ -137,7 +137,7 @@ def test_a_key_of_another_certificate_is_broken(tmp_path):
     one, other = ((tmp_path / name / LEAF).read_bytes() for name in "ab")
     mark = b"-----BEGIN CERTIFICATE"
     (tmp_path / "a" / LEAF).write_bytes(one[: one.index(mark)] + other[other.index(mark) :])
-    assert len(certificates(tmp_path / "a", HOSTS, NOW).told) == 1
+    assert len(certificates(tmp_path / "a", HOSTS, NOW).notices) == 1
 
 
 def test_a_folder_that_cannot_be_written_is_told_in_a_line(tmp_path):

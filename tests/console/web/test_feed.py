@@ -11,7 +11,7 @@ from dva_sim.console.web.state import RunState
 from dva_sim.console.wire.limits import OWN_KEPT, STORY_KEPT
 
 
-def told(*lines):
+def run_state(*lines):
     state = RunState()
     for line in lines:
         state.take(line)
@@ -27,14 +27,16 @@ def all_of(feed):
 
 def opened(*lines):
     """A run of which so much was told, and a page that knows it."""
-    state = told(scene(), *lines)
+    state = run_state(scene(), *lines)
     feed = PageFeed(state, "c1")
     all_of(feed)
     return state, feed
 
 
 def test_a_page_begins_with_all_there_is():
-    state = told(scene(), places(100, [0, 1, 2, 3, 4]), {"k": "events", "t": 100, "events": []})
+    state = run_state(
+        scene(), places(100, [0, 1, 2, 3, 4]), {"k": "events", "t": 100, "events": []}
+    )
     (snap,) = all_of(PageFeed(state, "c1"))
     assert (snap["k"], snap["s"], snap["t"]) == ("snap", 1, 100)
     assert snap["scene"]["scenario"] == "test"
@@ -43,7 +45,7 @@ def test_a_page_begins_with_all_there_is():
 
 
 def test_a_page_that_opens_before_the_run_gets_the_scene_when_it_is_told():
-    state = told()
+    state = run_state()
     feed = PageFeed(state, "c1")
     assert all_of(feed)[0]["scene"] is None
     state.take(scene())
@@ -68,7 +70,7 @@ def test_a_page_that_slept_gets_all_who_moved_meanwhile_once():
 
 
 def test_the_same_text_serves_all_who_are_equally_far():
-    state = told(scene(), places(0, [0, 0, 0, 0, 0]))
+    state = run_state(scene(), places(0, [0, 0, 0, 0, 0]))
     assert state.moved_since(0) is state.moved_since(0)
     assert state.snapshot() is state.snapshot()
 
@@ -102,14 +104,14 @@ def test_the_story_comes_whole_or_as_a_snapshot():
     (snap,) = all_of(feed)
     assert snap["k"] == "snap"
     assert snap["state"]["story"][-1]["what"] == str(STORY_KEPT)
-    assert snap["state"]["story_from"] + len(snap["state"]["story"]) == state.told
+    assert snap["state"]["story_from"] + len(snap["state"]["story"]) == state.story_count
 
 
 SEAT = seat("c1", t=1, phase="driving", alert="secret", drives=[{"i": 4, "n": 1}])
 
 
 def test_a_page_gets_its_own_seat_whole_and_those_of_others_in_short():
-    state = told(scene())
+    state = run_state(scene())
     mine, theirs = PageFeed(state, "c1"), PageFeed(state, "c2")
     all_of(mine), all_of(theirs)
     state.take(SEAT)
@@ -124,7 +126,7 @@ def test_a_page_gets_its_own_seat_whole_and_those_of_others_in_short():
 
 
 def test_lines_for_one_page_alone_are_bounded():
-    feed = PageFeed(told(scene()), "c1")
+    feed = PageFeed(run_state(scene()), "c1")
     assert all(feed.put({"k": "pong", "at": n}) for n in range(OWN_KEPT))
     assert not feed.put({"k": "pong", "at": "too much"})
     assert [m["s"] for m in all_of(feed)] == list(range(1, OWN_KEPT + 2))
@@ -135,7 +137,7 @@ rows = st.dictionaries(st.integers(0, 5), st.integers(0, 3), max_size=6)
 
 @given(st.lists(st.tuples(rows, st.booleans()), max_size=30))
 def test_whenever_a_page_asks_it_then_knows_where_everybody_is(steps):
-    state = told(scene())
+    state = run_state(scene())
     feed, here = PageFeed(state, "c1"), {}
     for t, (row, asks) in enumerate(steps):
         state.take(places(t, *([i, x, 0, 0, 0] for i, x in row.items())))

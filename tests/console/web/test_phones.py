@@ -238,8 +238,8 @@ def test_a_folder_that_cannot_be_written_leaves_all_else_as_it_is(tmp_path):
     (tmp_path / "file").write_text("in the way")
     with serving("--phones-port", "0", "--certificates", str(tmp_path / "file" / "x")) as served:
         assert served.serving["phone"] is None
-        assert len(served.serving["told"]) == 1
-        assert "certificate" in served.serving["told"][0]
+        assert len(served.serving["notices"]) == 1
+        assert "certificate" in served.serving["notices"][0]
         assert served.ask("/healthz").status == 200
 
 
@@ -249,7 +249,7 @@ def test_an_expired_certificate_is_renewed_at_the_start_and_a_phone_gets_in(tmp_
     certificates(tmp_path, hosts, long_ago)
     words = ("--phones-host", "127.0.0.1", "--phones-port", "0", "--certificates", str(tmp_path))
     with serving(*words) as served:
-        text = " ".join(served.serving["told"])
+        text = " ".join(served.serving["notices"])
         assert "certificate" in text
         assert ask(served, "/phone", token=served.phone).status == 200  # verified
 

@@ -41,7 +41,7 @@ async def until(condition: Callable[[], object]) -> None:
 def play(story: Callable[[Simulation, Clock, socket.socket], Awaitable[None]]) -> None:
     """Tell a story of a simulation."""
 
-    async def told() -> None:
+    async def received() -> None:
         clock = Clock()
         simulation = Simulation(clock)
         simulation.open(number)
@@ -50,7 +50,7 @@ def play(story: Callable[[Simulation, Clock, socket.socket], Awaitable[None]]) -
         await asyncio.sleep(0)
 
     with ends() as (ours, number):
-        asyncio.run(told())
+        asyncio.run(received())
 
 
 def say(end: socket.socket, *lines: dict[str, object]) -> None:
@@ -163,10 +163,10 @@ class Asking:
 
     def __init__(self, **query: str) -> None:
         self.query_params = query
-        self.told: Response | None = None
+        self.received: Response | None = None
 
     async def send_denial_response(self, response: Response) -> None:
-        self.told = response
+        self.received = response
 
     async def accept(self) -> None:
         raise AssertionError("it was let in")
@@ -181,7 +181,7 @@ def test_after_the_end_no_page_is_let_in_that_would_take_the_world_for_lost():
         sees, drives = Asking(), Asking(key=client.key)
         await hub.see(sees, Role.DRIVE)
         await hub.drive(drives, Role.DRIVE)
-        return [sees.told, drives.told]
+        return [sees.received, drives.received]
 
     for entry in asyncio.run(story()):
         assert entry is not None

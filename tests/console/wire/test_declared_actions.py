@@ -134,7 +134,7 @@ def test_a_mark_stands_in_the_story_under_the_name_of_its_author(monkeypatch):
     assert page.do("take", robots=[0])[0]
     assert page.do("mark", text="the participant sighs")[0]
     page.let(0.2)
-    shown = [(line["who"], line["what"], line["kind"]) for line in page.told("story")]
+    shown = [(line["who"], line["what"], line["kind"]) for line in page.lines_of("story")]
     assert ("console-1", "marks: the participant sighs", "event") in shown
     assert not page.do("mark", text="two\nlines")[0]
 

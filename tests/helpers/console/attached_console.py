@@ -59,7 +59,7 @@ class AttachedPage:
         """Let so much time go by."""
         self.world.let(seconds)
 
-    def told(self, kind: str) -> list[dict[str, Any]]:
+    def lines_of(self, kind: str) -> list[dict[str, Any]]:
         """All lines of a kind."""
         return [line for line in self.lines if line["k"] == kind]
 
@@ -71,7 +71,7 @@ class AttachedPage:
         self.actions.take(usual | about)
         end = self.world.world.clock.now + within
         while self.world.world.clock.now < end:
-            for line in self.told("done"):
+            for line in self.lines_of("done"):
                 if line["id"] == number:
                     return line
             self.let(0.01)
@@ -79,13 +79,13 @@ class AttachedPage:
 
     def events(self) -> list[dict[str, Any]]:
         """Events as the page shows them now."""
-        shown = self.told("events")
+        shown = self.lines_of("events")
         return list(shown[-1]["events"]) if shown else []
 
     def alarms(self) -> list[str]:
         """The texts of the list, the gravest first."""
         self.let(1.0)
-        return [row["text"] for row in self.told("alarms")[-1]["alarms"]]
+        return [row["text"] for row in self.lines_of("alarms")[-1]["alarms"]]
 
     def until(self, seen: Any, within: float = 120.0) -> None:
         """Let time go by until something is so."""

@@ -42,7 +42,7 @@ def _adapter(declared: Any, kind: str) -> TypeAdapter[Any]:
     return TypeAdapter(Union[*kinds_of(declared)[kind]])
 
 
-def checked(line: Mapping[str, Any], declared: Any = lines.Told) -> dict[str, Any]:
+def checked(line: Mapping[str, Any], declared: Any = lines.WorldLine) -> dict[str, Any]:
     """A line as it arrives at the other end, where it is as declared."""
     text = json.dumps(line)
     _adapter(declared, line["k"]).validate_json(text)
@@ -50,11 +50,11 @@ def checked(line: Mapping[str, Any], declared: Any = lines.Told) -> dict[str, An
     return arrived
 
 
-def at_page(told: Iterable[Mapping[str, Any]], client: str) -> list[dict[str, Any]]:
+def at_page(lines: Iterable[Mapping[str, Any]], client: str) -> list[dict[str, Any]]:
     """Messages of the web process to one page that looks at everything."""
     state, messages = RunState(), []
     feed = PageFeed(state, client)
-    for line in told:
+    for line in lines:
         if line["k"] in ("done", "bye"):
             continue
         if state.take(line) == "scene":

@@ -74,7 +74,7 @@ class Page:
         self.actions.take({"id": number, "client": client or self.client, "do": what, **about})
         end = self.world.clock.now + within
         while self.world.clock.now < end:
-            for line in self.told("done"):
+            for line in self.lines_of("done"):
                 if line["id"] == number:
                     return line["ok"], line["text"]
             self.let(0.01)
@@ -105,14 +105,14 @@ class Page:
             assert self.world.clock.now < end, f"not so within {within} s"
             self.let(step)
 
-    def told(self, kind):
+    def lines_of(self, kind):
         return [line for line in self.lines if line["k"] == kind]
 
     def robot(self, number=0):
         return list(self.world.run.field.robots.values())[number]
 
     def seat(self):
-        return [line for line in self.told("seat") if line["seat"] == self.client][-1]
+        return [line for line in self.lines_of("seat") if line["seat"] == self.client][-1]
 
     def drive(self, number=0):
         return self.seat()["drives"][number]

@@ -116,9 +116,9 @@ class PhonePage(Page):
     def ask(self, what, /, client=None, **about):
         """An action, and its whole answer."""
         self.do(what, within=60.0, client=client, **about)
-        return self.told("done")[-1]
+        return self.lines_of("done")[-1]
 
     def phone(self, client=None):
         """The phone's part of its newest line."""
         mine = client or self.client
-        return next(x for x in reversed(self.told("seat")) if x["seat"] == mine)["phone"]
+        return next(x for x in reversed(self.lines_of("seat")) if x["seat"] == mine)["phone"]

@@ -188,7 +188,7 @@
  */
 /**
  * All that has happened up to a moment of a recording.
- * @typedef {{k: 'told', t: number, lines: Happened[]}} Told
+ * @typedef {{k: 'story_so_far', t: number, lines: Happened[]}} StorySoFar
  */
 /**
  * A column of the list of recordings.
@@ -208,7 +208,7 @@
  * The newest of everything.
  * @typedef {{pos?: number[][], story?: Story[], story_from?: number, seats?: OtherSeat[],
  *   rows?: Rows, hazards?: Hazards, events?: Events, control?: Control, alarms?: Alarms,
- *   audit?: Audit, pictures?: Pictures, told?: Told, shelf?: Shelf}} SnapState
+ *   audit?: Audit, pictures?: Pictures, story_so_far?: StorySoFar, shelf?: Shelf}} SnapState
  */
 /**
  * All there is, for a page that begins.
@@ -382,7 +382,7 @@
 /**
  * A line sent to a page.
  * @typedef {(Snap | Moved | Rows | RobotWindow | Devices | Hazards | Events | Control | Alarms |
- *   Audit | Story | Told | Seat | OtherSeat | Guard | Log | Shelf | Pictures | Done | Bye | You |
- *   Pong) & {s?: number}} ToPage
+ *   Audit | Story | StorySoFar | Seat | OtherSeat | Guard | Log | Shelf | Pictures | Done | Bye |
+ *   You | Pong) & {s?: number}} ToPage
  */
 export {};

@@ -57,9 +57,9 @@ let heardRows = null;
 function Watchdog({ robot }) {
   useEvery(100);
   if (rows.value !== heardRows) [heardRows, heardAt] = [rows.value, performance.now()];
-  const told = rowOf(robot.i)?.watchdog_left_s;
-  if (told === null || told === undefined) return html`<span class="watchdog off">watchdog off</span>`;
-  const left = Math.max(0, told - Math.min(0.5, (performance.now() - heardAt) / 1000));
+  const reported = rowOf(robot.i)?.watchdog_left_s;
+  if (reported === null || reported === undefined) return html`<span class="watchdog off">watchdog off</span>`;
+  const left = Math.max(0, reported - Math.min(0.5, (performance.now() - heardAt) / 1000));
   return html`<span class=${left < 1 ? 'watchdog low' : 'watchdog'} title="The robot stops by itself if no command arrives for this long">
     <meter min="0" max="3" value=${left} aria-label=${`Watchdog of ${robot.label}`}></meter>watchdog ${left.toFixed(1)} s</span>`;
 }

@@ -47,19 +47,19 @@ function Facts({ event }) {
 
 /** @param {{event: SiteEvent}} props */
 function Doing({ event }) {
-  const [told, tell] = useState('');
+  const [result, setResult] = useState('');
   const field = useRef(/** @type {HTMLInputElement | null} */ (null));
   const words = reason.value.trim();
   const about = { event: event.number, decisions: event.decisions ?? null };
   const ask = async (/** @type {import('../net/actions.js').Action} */ what, /** @type {object} */ more) => {
     const done = await act(what, more);
-    tell(done.ok ? done.text : '');
+    setResult(done.ok ? done.text : '');
     if (done.ok) reason.value = '';
   };
   const withWords = (/** @type {() => void} */ then) => () => {
     if (words) then();
     else {
-      tell('Enter a reason or note first.');
+      setResult('Enter a reason or note first.');
       field.current?.focus();
     }
   };
@@ -70,7 +70,7 @@ function Doing({ event }) {
     <input id="reason" ref=${field} type="text" maxlength="256" autocomplete="off" value=${reason.value}
       onInput=${(/** @type {any} */ typed) => (reason.value = typed.currentTarget.value)} />
     <div class="buttons" role="group" aria-label="What to do">
-      ${!over && html`<${Sending} event=${event} off=${off} tell=${tell} />`}
+      ${!over && html`<${Sending} event=${event} off=${off} setResult=${setResult} />`}
       ${!over && sentTo(event).map((who, n) => html`<button type="button" disabled=${off} title=${`Calls ${who} off`}
         onClick=${() => ask('event_take_off', { ...about, device: who, reason: words })}>
         ${n ? `Take off ${who}` : 'Take off'}</button>`)}
@@ -81,8 +81,8 @@ function Doing({ event }) {
       <button type="button" disabled=${off}
         onClick=${withWords(() => ask('event_note', { event: event.number, text: words }))}>Note</button>
     </div>
-    ${maySupervise.value && html`<${TakeOver} off=${off} words=${words} event=${event} tell=${tell} />`}
-    <p role="status" aria-label="Done">${told}</p></div>`;
+    ${maySupervise.value && html`<${TakeOver} off=${off} words=${words} event=${event} setResult=${setResult} />`}
+    <p role="status" aria-label="Done">${result}</p></div>`;
 }
 
 /** Who is on the way or there; not who drives a robot. @param {SiteEvent} event */
@@ -93,17 +93,17 @@ const sentTo = (event) =>
 const idleRobot = () =>
   robots.value.find((robot) => modeOf(robot.i) === 'Idle' && !rowOf(robot.i)?.holder)?.label ?? '';
 
-/** @param {{event: SiteEvent, off: boolean, tell: (text: string) => void}} props */
-function Sending({ event, off, tell }) {
+/** @param {{event: SiteEvent, off: boolean, setResult: (text: string) => void}} props */
+function Sending({ event, off, setResult }) {
   const guard = nearestGuard.value;
   const robot = nearestRobot.value || idleRobot();
   const send = async () => {
     const done = await assignTo(event, guard);
-    tell(done.ok ? done.text : '');
+    setResult(done.ok ? done.text : '');
   };
   const mission = async () => {
     const done = await act('mission', { robot, event: event.number });
-    tell(done.ok ? done.text : '');
+    setResult(done.ok ? done.text : '');
   };
   return html`<button type="button" disabled=${off || !guard} title=${guard ? `Sends ${guard}` : 'No guard is available'}
       onClick=${send}>Send a guard</button>
@@ -111,17 +111,17 @@ function Sending({ event, off, tell }) {
       onClick=${mission}>Send a robot on a mission</button>`;
 }
 
-/** @param {{off: boolean, words: string, event: SiteEvent, tell: (text: string) => void}} props */
-function TakeOver({ off, words, event, tell }) {
+/** @param {{off: boolean, words: string, event: SiteEvent, setResult: (text: string) => void}} props */
+function TakeOver({ off, words, event, setResult }) {
   const here = robots.value.filter((robot) => event.assigned.includes(robot.label));
   const [picked, pick] = useState('');
   const label = picked || (here[0] ?? robots.value[0])?.label || '';
   const take = async () => {
-    tell('');
+    setResult('');
     const done = await act('take_over', { robot: label, reason: words || (isAttached.value ? 'taken over' : 'taken over by hand') });
     if (!done.ok) return;
     if (isAttached.value) {
-      tell(done.text);
+      setResult(done.text);
       return;
     }
     selection.value = null;

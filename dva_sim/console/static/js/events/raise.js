@@ -50,15 +50,15 @@ function middle(points) {
 function Form() {
   const [kind, setKind] = useState('fire');
   const [severity, setSeverity] = useState('high');
-  const [told, tell] = useState('');
+  const [result, setResult] = useState('');
   const [x, y] = where();
   const [left, low, right, high] = scene.value?.site.extent_m ?? [0, 0, 0, 0];
   const wrong = [wrongNumber(`${x}`, left, right, 'm'), wrongNumber(`${y}`, low, high, 'm')];
   const raise = async () => {
-    tell('');
+    setResult('');
     const done = await act('event_raise', { kind, severity, x_m: x, y_m: y });
     if (!done.ok) return;
-    tell(done.text);
+    setResult(done.text);
     if (done.event) selection.value = { kind: 'event', key: done.event };
   };
   return html`<div class="report">
@@ -70,7 +70,7 @@ function Form() {
     <button type="button" class="wide" disabled=${!maySteer.value || Boolean(wrong[0] || wrong[1])}
       onClick=${raise}>Raise event</button>
     <p class="soft">${wrong[0] || wrong[1] ? '' : `Location: ${placeOf({ x_m: x, y_m: y })}.`}</p>
-    <p role="status" aria-label="Raised">${told}</p></div>`;
+    <p role="status" aria-label="Raised">${result}</p></div>`;
 }
 
 /** @param {number} value */

@@ -28,10 +28,10 @@ export function metres({ latitude, longitude }, origin) {
 
 /** Tell where one is for as long as it is wanted. @returns {() => void} how to end that */
 export function follow() {
-  let told = -Infinity;
+  let lastSent = -Infinity;
   const take = (/** @type {GeolocationPosition} */ found) => {
     const site = scene.peek()?.site;
-    if (!site?.origin || !guard.peek() || performance.now() - told < EVERY_MS) return;
+    if (!site?.origin || !guard.peek() || performance.now() - lastSent < EVERY_MS) return;
     const [x, y] = metres(found.coords, site.origin);
     const [xmin, ymin, xmax, ymax] = site.extent_m;
     if (x < xmin - ROOM_M || x > xmax + ROOM_M || y < ymin - ROOM_M || y > ymax + ROOM_M) {
@@ -39,7 +39,7 @@ export function follow() {
       notice.value = 'You are not at this scenario’s site. Tap the map instead.';
       return;
     }
-    told = performance.now();
+    lastSent = performance.now();
     act('guard_place', { x_m: x, y_m: y });
   };
   const fail = (/** @type {GeolocationPositionError} */ error) => {

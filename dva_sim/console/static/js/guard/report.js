@@ -14,18 +14,18 @@ const SEVERITIES = pairs(['low', 'medium', 'high', 'critical']);
 export function Report({ me }) {
   const [kind, setKind] = useState('fire');
   const [severity, setSeverity] = useState('medium');
-  const [told, tell] = useState('');
+  const [result, setResult] = useState('');
   const report = async () => {
-    tell('');
+    setResult('');
     const at = tracks.last(me.guard);
     if (!at) return;
     const done = await act('guard_report', { kind, severity, x_m: at.x, y_m: at.y });
-    tell(done.ok ? `Told: ${done.text}` : '');
+    setResult(done.ok ? `Told: ${done.text}` : '');
   };
   return html`<section class="panel" aria-label="Report"><details><summary>Report an event</summary>
     <div class="report"><${Choice} name="Kind" value=${kind} options=${KINDS} onInput=${setKind} />
       <${Choice} name="Severity" value=${severity} options=${SEVERITIES} onInput=${setSeverity} />
       <button type="button" class="big" disabled=${!maySteer.value || !tracks.last(me.guard)}
         onClick=${report}>Report at my position</button>
-      <p role="status" aria-label="Report">${told}</p></div></details></section>`;
+      <p role="status" aria-label="Report">${result}</p></div></details></section>`;
 }

@@ -27,7 +27,7 @@ export function newId() {
  * @param {object} [more]
  */
 export async function act(what, more = {}) {
-  return told(await ask(what, more));
+  return showRefusal(await ask(what, more));
 }
 
 /**
@@ -54,7 +54,7 @@ export async function ask(what, more = {}, id = newId()) {
 }
 
 /** @param {import('../types.js').Answer} done */
-function told(done) {
+function showRefusal(done) {
   notice.value = done.ok ? '' : done.text;
   return done;
 }

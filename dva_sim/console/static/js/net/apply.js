@@ -32,7 +32,7 @@ const LINES = {
   control: (line) => (control.value = line),
   alarms: (line) => (alarmList.value = line),
   audit: (line) => (audit.value = line),
-  told: (line) => (story.value = line.lines),
+  story_so_far: (line) => (story.value = line.lines),
   shelf: (line) => (shelf.value = line),
   story: (line) => (story.value = [...story.value, line].slice(-STORY_KEPT)),
   seat: (line) => {
@@ -75,11 +75,11 @@ function snap(line) {
   seat.value = null;
   guard.value = null;
   windows.value = new Map();
-  const { pos, story: told, story_from: _, seats: __, ...others } = line.state;
+  const { pos, story: lines, story_from: _, seats: __, ...others } = line.state;
   if (pos) {
     tracks.put(pos, performance.now());
     tracks.keep(new Set(pos.map((row) => row[0])));
   }
-  if (told) story.value = told.slice(-STORY_KEPT);
+  if (lines) story.value = lines.slice(-STORY_KEPT);
   for (const newest of Object.values(others)) take(newest);
 }

@@ -32,8 +32,8 @@ export function hear(t) {
   const now = performance.now();
   heard = now;
   newest = t;
-  const told = t - pace * now;
-  offset = Number.isNaN(offset) || told > offset ? told : offset + PULL * (told - offset);
+  const latest = t - pace * now;
+  offset = Number.isNaN(offset) || latest > offset ? latest : offset + PULL * (latest - offset);
 }
 
 /** A message without a time of the world. */

@@ -57,11 +57,11 @@ function RealLink() {
 
 /**
  * What the slider shows: the world's value, unless the person has just moved it.
- * @param {number} told
+ * @param {number} reported
  * @param {(value: number) => void} send
  * @returns {[number, (value: number) => void]}
  */
-function useOwn(told, send) {
+function useOwn(reported, send) {
   const [own, keep] = useState(/** @type {number | null} */ (null));
   const timers = useRef({ send: 0, forget: 0 });
   useEffect(() => () => Object.values(timers.current).forEach((timer) => window.clearTimeout(timer)), []);
@@ -72,7 +72,7 @@ function useOwn(told, send) {
     timers.current.send = window.setTimeout(() => send(value), SETTLE_MS);
     timers.current.forget = window.setTimeout(() => keep(null), QUIET_MS);
   };
-  return [own ?? told, set];
+  return [own ?? reported, set];
 }
 
 /** @param {{knob: Knob}} props */
@@ -99,8 +99,8 @@ function Bandwidth() {
   const [least, most] = scene.value?.link_limits?.rate_bps ?? [1e4, 1e9];
   const decades = Math.log10(most / least);
   const rateOf = (/** @type {number} */ step) => least * 10 ** ((decades * step) / EACH);
-  const told = link.value?.rate_bps ?? most;
-  const at = Math.round((EACH * Math.log10(told / least)) / decades);
+  const reported = link.value?.rate_bps ?? most;
+  const at = Math.round((EACH * Math.log10(reported / least)) / decades);
   const [value, set] = useOwn(at, (step) => act('link', { rate_bps: Math.round(rateOf(step)) }));
   const trace = link.value?.rate_trace;
   const text = (/** @type {number} */ step) => (trace ? 'by the trace' : rateText(rateOf(step)));

@@ -7,10 +7,10 @@ import { Field } from '../ui/fields.js';
 /** The panel. */
 export function MarkMoment() {
   const [text, setText] = useState('');
-  const [told, tell] = useState('');
+  const [result, setResult] = useState('');
   const mark = async () => {
     const done = await act('mark', { text: text.trim() });
-    tell(done.ok ? done.text : '');
+    setResult(done.ok ? done.text : '');
     if (done.ok) setText('');
   };
   return html`<section class="panel" aria-label="Mark">
@@ -18,5 +18,5 @@ export function MarkMoment() {
     <div class="filters"><${Field} name="Note" value=${text} most=${256} onInput=${setText} />
       <button type="button" disabled=${!maySteer.value || !isOperator.value || !text.trim()}
         onClick=${mark}>Mark</button></div>
-    <p role="status" aria-label="Marked">${told}</p></section>`;
+    <p role="status" aria-label="Marked">${result}</p></section>`;
 }

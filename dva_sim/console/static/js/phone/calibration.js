@@ -19,7 +19,7 @@ const FULL = 12; // of a bar [m/s^2]
 export function CalibrationScreen() {
   useDefaults();
   const [marked, mark] = useState(false);
-  const [told, tell] = useState('');
+  const [result, setResult] = useState('');
   const { force, radius, delay, reference, calibrated } = choices.value;
   const wrong = {
     force: wrongNumber(force, 0.01, 10, 'm/s²'),
@@ -29,17 +29,17 @@ export function CalibrationScreen() {
   const blind = tilts.value && state.value === 'looking';
   const calibrate = async () => {
     mark(true);
-    tell('');
+    setResult('');
     if (wrong.force || wrong.radius || wrong.delay) return;
     await ask();
     const held = tilts.peek() ? pose() : null;
-    if (tilts.peek() && !held) return tell('No sensor data is arriving, so nothing was calibrated.');
+    if (tilts.peek() && !held) return setResult('No sensor data is arriving, so nothing was calibrated.');
     const comma = (/** @type {string} */ text) => text.replace(',', '.').trim();
     const numbers = { force: comma(force), radius: comma(radius), delay: comma(delay) };
     choose({ ...numbers, reference: held, calibrated: true });
     const done = await sendCalibration(true);
-    if (!isKnown.peek()) tell('Saved on this phone. It takes effect once you have registered.');
-    else if (done?.ok) tell(choices.peek().keep ? `${capital(done.text)}.` : 'Calibrated.');
+    if (!isKnown.peek()) setResult('Saved on this phone. It takes effect once you have registered.');
+    else if (done?.ok) setResult(choices.peek().keep ? `${capital(done.text)}.` : 'Calibrated.');
   };
   return html`<${Sensor} />
     <${Live} />
@@ -56,10 +56,10 @@ export function CalibrationScreen() {
     </section>
     <${Habits} />
     ${calibrated && html`<p class="soft">Kept: ${reference ? `reference ${reference.map((v) => v.toFixed(1)).join(', ')} m/s²` : 'no reference, steered by the stick'}.</p>`}
-    <div class="thumb"><p role="status" aria-label="Calibration">${told}</p>
-      <button type="button" class=${told ? 'big' : 'big go'} disabled=${!maySteer.value || blind}
+    <div class="thumb"><p role="status" aria-label="Calibration">${result}</p>
+      <button type="button" class=${result ? 'big' : 'big go'} disabled=${!maySteer.value || blind}
         onClick=${calibrate}>Calibrate</button>
-      ${calibrated && html`<a class=${told ? 'big go' : 'big'} href="#/teleoperation">Continue: Teleoperation</a>`}
+      ${calibrated && html`<a class=${result ? 'big go' : 'big'} href="#/teleoperation">Continue: Teleoperation</a>`}
     </div>`;
 }
 

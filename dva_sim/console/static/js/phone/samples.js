@@ -55,7 +55,7 @@ function send() {
   timer = 0;
   if (!waiting.length || backlog() > MOST_BACKLOG) return;
   const batch = waiting;
-  const told = {
+  const message = {
     do: 'samples',
     n: count,
     at: batch.map((sample) => Number(sample.at.toFixed(3))),
@@ -64,7 +64,7 @@ function send() {
     orientation: orientation(),
     seen: seenPictures(),
   };
-  if (!steer(told)) return;
+  if (!steer(message)) return;
   sent = performance.now();
   count += batch.length;
   waiting = [];

@@ -6,14 +6,14 @@ import { clockText } from '../ui/words.js';
 
 /** The page. */
 export function StoryPage() {
-  const told = story.value;
-  const last = told.at(-1)?.t ?? -1;
+  const lines = story.value;
+  const last = lines.at(-1)?.t ?? -1;
   const later = (replay.value?.marks ?? []).filter((mark) => mark.t > last);
   return html`<main class="page story-page" id="main" tabindex="-1">
     <h1>Story</h1>
     <p class="soft">Select a line to jump to that moment.</p>
     <h2>Told so far</h2>
-    <${Lines} name="Told so far" lines=${told} />
+    <${Lines} name="Told so far" lines=${lines} />
     <h2>Still to come</h2>
     <${Lines} name="Still to come" lines=${later} />
   </main>`;

@@ -40,37 +40,37 @@ function Knob({ name, hint, on, ask }) {
 
 /**
  * What was asked for is shown until the world says the same, or refuses.
- * @param {boolean} told
+ * @param {boolean} reported
  * @param {(wanted: boolean) => Promise<import('../types.js').Answer>} ask
  * @returns {[boolean, (wanted: boolean) => void]}
  */
-function useAsked(told, ask) {
+function useAsked(reported, ask) {
   const [asked, set] = useState(/** @type {boolean | null} */ (null));
   useEffect(() => {
-    if (asked === told) set(null);
-  }, [asked, told]);
+    if (asked === reported) set(null);
+  }, [asked, reported]);
   const change = (/** @type {boolean} */ wanted) => {
     set(wanted);
     ask(wanted).then((done) => !done.ok && set(null));
   };
-  return [asked ?? told, change];
+  return [asked ?? reported, change];
 }
 
 /** @param {{robot: Thing}} props */
 function Processing({ robot }) {
-  const told = windowOf(robot.i)?.faults.processing_s ?? null;
+  const reported = windowOf(robot.i)?.faults.processing_s ?? null;
   const [own, set] = useState(MOST_PROCESSING_S);
   const ask = (/** @type {boolean} */ on, seconds = own) =>
     act('fault', { robot: robot.i, what: 'processing', on, ...(on ? { seconds } : {}) });
-  const [isSlow, slow] = useAsked(told !== null, (on) => ask(on));
+  const [isSlow, slow] = useAsked(reported !== null, (on) => ask(on));
   const change = (/** @type {number} */ seconds) => {
     set(seconds);
-    if (told !== null) ask(true, seconds);
+    if (reported !== null) ask(true, seconds);
   };
   return html`<div class="processing">
     <label class="tick" title="Its computer needs this long for each message."><input type="checkbox" checked=${isSlow}
       disabled=${!maySteer.value} onInput=${(/** @type {any} */ event) => slow(event.currentTarget.checked)} /> Slow computer</label>
-    <${Slider} name="Processing time" min=${0} max=${MOST_PROCESSING_S} step=${0.1} value=${told ?? own}
+    <${Slider} name="Processing time" min=${0} max=${MOST_PROCESSING_S} step=${0.1} value=${reported ?? own}
       disabled=${!maySteer.value} text=${(/** @type {number} */ s) => `${s.toFixed(1)} s`} onInput=${change} />
   </div>`;
 }

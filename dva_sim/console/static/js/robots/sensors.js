@@ -17,9 +17,9 @@ export function Sensors({ robot }) {
 
 /** @param {import('../lines.js').Sensor} sensor */
 function valueText({ name, unit, values, least }) {
-  const told = UNITS[unit] ?? unit;
-  if (least !== undefined) return `nearest ${least.toFixed(2)} ${told}`;
+  const label = UNITS[unit] ?? unit;
+  if (least !== undefined) return `nearest ${least.toFixed(2)} ${label}`;
   if (!values?.length) return 'no value: it is lost';
   if (name === 'battery') return `${(100 * values[0]).toFixed(0)} %`;
-  return `${values.join(' ')} ${told}`;
+  return `${values.join(' ')} ${label}`;
 }
