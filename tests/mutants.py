@@ -92,7 +92,7 @@ class Mutant:
         return parts[1] if len(parts) > 2 else "dva_sim"
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         old, new = (" ".join(text.split())[:40] for text in (self.old, self.new))
         return f"{self.file}:{self.line} {self.place}: {old} -> {new}"
 
@@ -379,15 +379,15 @@ def main() -> int:
     parser.add_argument("--draw", default="", metavar="WORD", help="others, by the same rule")
     parser.add_argument("--only", default="", metavar="WORD", help="those with it in their line")
     asked = parser.parse_args()
-    mutants = [m for m in drawn(asked.draw) if asked.only in m.told]
+    mutants = [m for m in drawn(asked.draw) if asked.only in m.description]
     if asked.list:
-        print(*(mutant.told for mutant in mutants), sep="\n")
+        print(*(mutant.description for mutant in mutants), sep="\n")
         return 0
     noticed, whole = Counter[str](), Counter(mutant.room for mutant in mutants)
     for mutant, test, took in tried(mutants):
         noticed[mutant.room] += bool(test)
         verdict = "noticed " if test else "NOT SEEN"
-        print(f"{verdict} {mutant.told}  {test} {took:.0f} s", flush=True)
+        print(f"{verdict} {mutant.description}  {test} {took:.0f} s", flush=True)
     for room, number in whole.items():
         print(f"{room:12} {noticed[room]:3} of {number:3}")
     print(f"{noticed.total()} of {whole.total()} faults were noticed")

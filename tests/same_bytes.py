@@ -27,7 +27,7 @@ from dva_sim.experiments.study.loading import load_study
 RECORDED = ("drive-to-event", "fire-drill")
 
 
-def told_of_run(name, index, job):
+def line_of_run(name, index, job):
     """One line: which run, its configuration and seed, and the hash of all rows of its tables."""
     where = f"{name} {job.part} {index}: config {job.config}, seed {job.seed}"
     return f"{where}, tables {digest_of_run(job)}"
@@ -49,13 +49,13 @@ def digests():
             if file.name.endswith(".registration.yaml"):
                 continue
             reports += [
-                pool.submit(told_of_run, file.stem, *run) for run in sampled_jobs(load_study(file))
+                pool.submit(line_of_run, file.stem, *run) for run in sampled_jobs(load_study(file))
             ]
         for line in reports:
             yield line.result()
 
 
-def told_by(root):
+def lines_of(root):
     """The lines that the version in a folder prints."""
     environment = os.environ | {"PYTHONPATH": str(root), "PYTHONHASHSEED": "0"}
     program = [sys.executable, str(root / "tests/same_bytes.py")]
@@ -65,7 +65,7 @@ def told_by(root):
 def compare(commit):
     """Tell every line that differs; the exit code."""
     with version(commit) as other:
-        theirs, ours = told_by(other), told_by(ROOT)
+        theirs, ours = lines_of(other), lines_of(ROOT)
     different = [line for line in theirs if line not in ours]
     for line in different:
         print(f"not the same as in {commit}: {line.split(':')[0]}")

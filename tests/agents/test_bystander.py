@@ -39,7 +39,7 @@ class Building(People):
 
     def __init__(self, site=None, refuges=(EAST, WEST)) -> None:
         super().__init__(site or hall(40, 3))
-        self.refuges, self.told, self.bystanders = refuges, [], []
+        self.refuges, self.story, self.bystanders = refuges, [], []
 
     def bystander(
         self,
@@ -64,7 +64,7 @@ class Building(People):
             air=air,
             sees=sees,
             leaves=lambda: self.world.remove(walking.body),
-            tell=self.told.append,
+            tell=self.story.append,
         )
         made.start()
         self.bystanders.append(made)
@@ -97,7 +97,7 @@ def test_who_hears_the_alarm_gets_ready_walks_to_the_nearer_exit_and_is_out():
     building.pass_time(60.0)
     assert one.activity == "safe"
     assert math.dist((one.x, one.y), WEST) < LEAVING.through_m
-    assert building.told == ["leaves", "is out"]
+    assert building.story == ["leaves", "is out"]
     assert building.world.people == []
 
 
@@ -163,7 +163,7 @@ def test_who_notices_smoke_heat_water_or_the_smell_of_gas_gets_ready_without_an_
     building.pass_time(10.0)
     assert one.activity == "alarmed"
     assert one.leaves_at == pytest.approx(4.0 + PREMOVEMENT, abs=PERIOD)
-    assert building.told == ["notices danger"]
+    assert building.story == ["notices danger"]
 
 
 def test_who_feels_a_fire_waits_for_nothing():

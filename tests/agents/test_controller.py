@@ -455,23 +455,23 @@ def test_a_mission_that_was_sent_before_an_emergency_does_not_begin_after_it(ben
     assert bench.say(ANA, MESSAGES[name], now=2.3, arrived=2.2).code == m.OK
 
 
-def told(bench: Bench) -> tuple[str, int, str]:
+def mission_state(bench: Bench) -> tuple[str, int, str]:
     status = bench.say(RUI, m.GetMissionStatus(), session=0).content
     assert isinstance(status, m.MissionStatus)
     return status.mission_state, status.waypoints_left, status.reason
 
 
 def test_how_a_mission_stands_is_told_to_everybody_who_asks(bench):
-    assert told(bench) == ("none", 0, "")
+    assert mission_state(bench) == ("none", 0, "")
     bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
     bench.say(ANA, m.Patrol((HERE, HERE, HERE), 2), number=41)
-    assert told(bench) == ("under_way", 3, "")
+    assert mission_state(bench) == ("under_way", 3, "")
     assert bench.robot.mission_status.mission_id == 41
     assert bench.robot.mission_changed("waiting", 2, "jammed")
     assert not bench.robot.mission_changed("waiting", 2, "jammed")
-    assert told(bench) == ("waiting", 2, "jammed")
+    assert mission_state(bench) == ("waiting", 2, "jammed")
     assert bench.robot.mission_changed("failed", 2, "no way")
-    assert told(bench) == ("failed", 2, "no way")
+    assert mission_state(bench) == ("failed", 2, "no way")
     assert bench.robot.mode is Mode.IDLE
 
 
@@ -488,7 +488,7 @@ def test_a_mission_that_somebody_ends_has_failed_and_says_why(bench, source, bod
     bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
     bench.say(ANA, m.GoTo((HERE,)))
     assert bench.say(source, body, now=1.0).set_point == STAND
-    assert told(bench) == ("failed", 1, reason)
+    assert mission_state(bench) == ("failed", 1, reason)
 
 
 def test_what_a_robot_says_of_a_mission_that_is_over_is_no_news(bench):
@@ -496,7 +496,7 @@ def test_what_a_robot_says_of_a_mission_that_is_over_is_no_news(bench):
     bench.say(ANA, m.GoTo((HERE,)))
     bench.say(ANA, m.CancelMission())
     assert not bench.robot.mission_changed("done", 0, "")
-    assert told(bench) == ("failed", 1, "cancelled")
+    assert mission_state(bench) == ("failed", 1, "cancelled")
 
 
 # --- what is forged, or cannot be ------------------------------------------------------

@@ -93,7 +93,7 @@ class Silenced:
         self.run.network.come_back(DVA)  # type: ignore[attr-defined]
         self.run.dva.silence(False)
 
-    def told(self, who: str, what: str) -> list[float]:
+    def times_of(self, who: str, what: str) -> list[float]:
         return [
             t for t, name, entry, _ in self.run.recorder.timeline if name == who and what in entry
         ]
@@ -106,15 +106,15 @@ def test_everybody_says_that_the_dva_is_silent_and_that_it_is_back():
     drill.unplug()
     drill.until(35.0)
     for who in ("robot-1", "robot-2", "guard-1", "guard-2", "operator-1", "operator-2"):
-        (noticed,) = drill.told(who, "DVA is silent")
+        (noticed,) = drill.times_of(who, "DVA is silent")
         assert 28.0 <= noticed <= 33.0
-    assert drill.told("robot-1", "obeys its driver")
-    assert drill.told("guard-1", "order in hand")
+    assert drill.times_of("robot-1", "obeys its driver")
+    assert drill.times_of("guard-1", "order in hand")
     assert counted(drill.run.recorder.counters, "silent") == 6
     drill.plug_in()
     drill.until(50.0)
     for who in ("robot-1", "guard-1", "operator-1"):
-        assert len(drill.told(who, "hears the DVA again")) == 1
+        assert len(drill.times_of(who, "hears the DVA again")) == 1
     assert not drill.run.recorder.violations
 
 
@@ -124,12 +124,12 @@ def test_a_robot_registers_at_once_when_the_dva_is_back():
     drill.until(21.0)
     drill.unplug()
     drill.until(40.0)
-    assert drill.told("robot-1", "DVA is silent")
+    assert drill.times_of("robot-1", "DVA is silent")
     before = len(drill.registrations)
     drill.plug_in()
     drill.until(41.0)
     assert len(drill.registrations) == before + 1
-    assert drill.told("robot-1", "hears the DVA again")
+    assert drill.times_of("robot-1", "hears the DVA again")
 
 
 def test_a_drive_goes_on_while_the_dva_is_silent():
@@ -140,7 +140,7 @@ def test_a_drive_goes_on_while_the_dva_is_silent():
     drill.unplug()
     since, sent = drill.run.clock.now, drives[0].sent
     drill.until(since + 15.0)
-    assert drill.told("robot-1", "DVA is silent")
+    assert drill.times_of("robot-1", "DVA is silent")
     assert drives[0].sent > sent + 20
     assert drives[0].ended is None or drives[0].outcome == "confirmed"
     assert not drill.run.recorder.violations
@@ -164,10 +164,10 @@ def test_forged_heartbeats_hide_a_silence_only_until_a_request_is_not_answered(b
 
     drill.run.clock.every(1.0, forge)
     drill.until(33.0)
-    assert bool(drill.told("robot-1", "DVA is silent")) == (by == "another")
+    assert bool(drill.times_of("robot-1", "DVA is silent")) == (by == "another")
     drill.until(90.0)  # the registration that is renewed has been sent three times
-    assert len(drill.told("robot-1", "DVA is silent")) == 1
-    assert drill.told("robot-1", "hears the DVA again") == []
+    assert len(drill.times_of("robot-1", "DVA is silent")) == 1
+    assert drill.times_of("robot-1", "hears the DVA again") == []
 
 
 def test_no_heartbeat_feeds_the_watchdog_of_the_motors():

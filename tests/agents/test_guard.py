@@ -93,7 +93,7 @@ def test_only_the_dva_gives_orders(dva, guard):
     dva.run_for(60.0)
     assert codes == [m.NOT_PERMITTED] * 5
     assert at(guard) == POST
-    assert dva.told == []
+    assert dva.received == []
 
 
 def test_a_guard_drives_no_robots(dva, guard):
@@ -286,7 +286,7 @@ def test_an_idle_guard_that_is_relocated_walks_there_and_waits(dva, guard):
     dva.run_for(60.0)
     assert at(guard) == pytest.approx(FAR, abs=0.2)
     assert guard.activity == "waiting"
-    assert dva.told == []
+    assert dva.received == []
 
 
 def test_a_guard_tells_where_it_is_while_it_moves(dva, guard):

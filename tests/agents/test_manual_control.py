@@ -130,23 +130,25 @@ def test_a_hand_of_which_nothing_is_heard_has_let_go(in_hand):
 def test_a_trace_of_a_robot_that_was_in_a_hand_is_replayed_to_the_same_decisions(robot, tmp_path):
     log = DecisionLog(tmp_path / "robot.trace.jsonl", robot)
 
-    def told(source: str, body: m.Body, now: float, number: int) -> None:
+    def receive(source: str, body: m.Body, now: float, number: int) -> None:
         message = m.Message(ROBOT, number, source, "12:00:00", 8, body)
         log.decided(message, now, now, False, robot.handle(message, now, now, False))
         if isinstance(body, m.PermissionGrant | m.PermissionRevocation):
             log.happened(ASKS, now)
             robot.inquiry.next(now)
-            told(DVA, confirmation(body if isinstance(body, m.PermissionGrant) else None), now, 1)
+            receive(
+                DVA, confirmation(body if isinstance(body, m.PermissionGrant) else None), now, 1
+            )
 
-    told(DVA, m.PermissionGrant(ANA, "both", 7), 1.0, 1)
-    told(DVA, m.PermissionRevocation(ROBOT, ANA, 7), 2.0, 2)
+    receive(DVA, m.PermissionGrant(ANA, "both", 7), 1.0, 1)
+    receive(DVA, m.PermissionRevocation(ROBOT, ANA, 7), 2.0, 2)
     robot.take_by_hand(HERE, 3.0, moving=False)
     log.happened(TAKEN_BY_HAND, 3.0)
-    told(DVA, m.PermissionGrant(ANA, "both", 8), 4.0, 3)
-    told(ANA, m.StartTeleOp(), 5.0, 4)
+    receive(DVA, m.PermissionGrant(ANA, "both", 8), 4.0, 3)
+    receive(ANA, m.StartTeleOp(), 5.0, 4)
     robot.let_go(HERE)
     log.happened(LET_GO, 6.0)
-    told(ANA, m.StartTeleOp(), 7.0, 5)
+    receive(ANA, m.StartTeleOp(), 7.0, 5)
     log.close()
 
     asked = list(replay(tmp_path / "robot.trace.jsonl"))

@@ -48,7 +48,7 @@ def test_a_robot_visits_its_waypoints_in_order_and_is_done():
     fleet.run(120.0)
     assert robot.end == ("done", "")
     assert math.dist(robot.here, (13.1, 20.0)) < NEAR + 0.05
-    assert [step.left for _, step in robot.told] == [2, 1, 0]
+    assert [step.left for _, step in robot.steps] == [2, 1, 0]
     assert untouched(robot)
 
 
@@ -58,7 +58,7 @@ def test_a_patrol_goes_round_as_often_as_it_was_told():
     robot = fleet.robot(1, (*WEST, EASTWARD), to(*beat, laps=3))
     fleet.run(400.0)
     assert robot.end == ("done", "")
-    assert [step.left for _, step in robot.told] == [2, 1, 2, 1, 2, 1, 0]
+    assert [step.left for _, step in robot.steps] == [2, 1, 2, 1, 2, 1, 0]
     legs = 3.0 + 5 * 3.0
     assert robot.body.distance == pytest.approx(legs - 6 * 2 * NEAR + NEAR, abs=1.0)
 
@@ -68,7 +68,7 @@ def test_a_patrol_without_a_number_of_laps_does_not_end():
     robot = fleet.robot(1, (*WEST, EASTWARD), to((8.0, 12.0), WEST, laps=0))
     fleet.run(300.0)
     assert not robot.over
-    assert len(robot.told) > 8
+    assert len(robot.steps) > 8
 
 
 def test_there_is_no_way_into_a_wall_block_and_the_robot_says_so_at_once():
@@ -262,7 +262,7 @@ def test_a_robot_that_cannot_get_in_has_failed_after_so_many_jams():
     robot = fleet.robot(1, (*SOUTH_OF_DOOR, NORTHWARD), to(NORTH_OF_DOOR))
     fleet.run(400.0)
     assert robot.end == ("failed", "jammed")
-    jammed = [step for _, step in robot.told if step.reason == "jammed"]
+    jammed = [step for _, step in robot.steps if step.reason == "jammed"]
     assert len(jammed) == MOST_JAMS + 1 == 4
 
 

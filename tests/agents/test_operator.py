@@ -72,7 +72,7 @@ def test_who_drives_the_same_robot_on_keeps_its_permission(dva, operator):
     dva.start(1, EAST)
     dva.order(2, WEST, robot=ROBOT)
     dva.run_until(lambda: "departed" in dva.progress(2))
-    assert not any(isinstance(entry.body, m.PermissionRevocation) for entry in dva.told)
+    assert not any(isinstance(entry.body, m.PermissionRevocation) for entry in dva.received)
     assert dva.sessions[ROBOT].session == 1
 
 

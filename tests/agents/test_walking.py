@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from helpers.processes.second_process import told_here_and_elsewhere
+from helpers.processes.second_process import run_here_and_elsewhere
 from helpers.worlds.hall_with_people import People, gap, hall, two_rooms
 
 from dva_sim.agents.people.pedestrian_avoidance import (
@@ -422,6 +422,6 @@ print([repr(c) for w in people.walkings for c in w.place])
 
 @pytest.mark.system
 def test_two_processes_walk_a_crowd_to_the_same_bit():
-    here, elsewhere = told_here_and_elsewhere(CROWD)
+    here, elsewhere = run_here_and_elsewhere(CROWD)
     assert here == elsewhere
     assert len(here) > 500

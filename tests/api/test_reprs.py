@@ -24,7 +24,7 @@ def with_much(tables):
 
 
 @pytest.mark.parametrize(
-    ("of", "told"),
+    ("of", "expected"),
     [
         (lambda r: r, "42 runs in 9 configurations\nWhich is quicker?"),
         (lambda r: r.answer, "REQ/REP"),
@@ -38,9 +38,9 @@ def with_much(tables):
         ),
     ],
 )
-def test_results_and_what_comes_of_them_fit_a_screen(results, of, told):
+def test_results_and_what_comes_of_them_fit_a_screen(results, of, expected):
     shown = repr(of(results))
-    assert told in shown
+    assert expected in shown
     assert len(shown) <= CHARACTERS
     assert len(shown.splitlines()) <= LINES
 

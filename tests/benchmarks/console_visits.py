@@ -17,8 +17,8 @@ from playwright.sync_api import Browser, Page
 
 REAL = ("-m", "dva_sim.cli", "console", "--no-open", "--port", "0")
 FAKE = (str(TESTS / "console" / "fake_world.py"),)
-TOLD = r"^Console: +(\S+)\n()"
-TOLD_TO_PHONES = r"^Console: +(\S+)\n.*^Phone: \S+token=(\S+)$.*trust this machine"
+ADDRESS = r"^Console: +(\S+)\n()"
+ADDRESSES = r"^Console: +(\S+)\n.*^Phone: \S+token=(\S+)$.*trust this machine"
 TICK_S = 1 / os.sysconf("SC_CLK_TCK")
 
 # What a page does is noted: keys, what it sends and is told, and which input a robot obeys when.
@@ -95,7 +95,7 @@ def console(folder: Path, *words: str, program: Sequence[str] = REAL) -> Iterato
         command = [sys.executable, *program, *words]
         process = subprocess.Popen(command, stdout=file, stderr=file, env=environment)
     try:
-        wanted = re.compile(TOLD_TO_PHONES if "--phones" in words else TOLD, re.M | re.S)
+        wanted = re.compile(ADDRESSES if "--phones" in words else ADDRESS, re.M | re.S)
         assert becomes(lambda: wanted.search(out.read_text()) or process.poll() is not None)
         found = wanted.search(out.read_text())
         assert found is not None, out.read_text()

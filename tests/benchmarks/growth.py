@@ -308,8 +308,8 @@ def main() -> None:
         return
     for number, size in enumerate(size for size in SIZES[asked.kind] if size <= asked.most):
         words = [sys.executable, __file__, asked.kind, "--only", str(size)]
-        told = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True).stdout
-        costs = json.loads(told.splitlines()[-1])
+        output = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True).stdout
+        costs = json.loads(output.splitlines()[-1])
         if not number:
             heads = [name if name == "MB" else f"{name} [s]" for name in costs]
             print(f"| {asked.kind} | {' | '.join(heads)} |")

@@ -44,7 +44,7 @@ def parent() -> str:
 def figures(root: Path, names: Sequence[str], counter: str, repeats: int) -> Figures:
     """Costs of cases in the version in a folder."""
     with tempfile.TemporaryDirectory() as folder:
-        into = Path(folder) / "told"
+        into = Path(folder) / "results"
         into.touch()
         under = Callgrind.words(Path(folder)) if counter == Callgrind.name else []
         program = [sys.executable, runner.__file__, counter, str(repeats), str(into), *names]

@@ -64,10 +64,10 @@ def in_a_copy(name: str, counter: str, repeats: int, into: Path) -> None:
     os._exit(0)
 
 
-def write(told: dict[str, Any], into: Path) -> None:
+def write(row: dict[str, Any], into: Path) -> None:
     """Append the measurements of a case."""
     with into.open("a") as file:
-        file.write(json.dumps(told) + "\n")
+        file.write(json.dumps(row) + "\n")
 
 
 def read(into: Path) -> Iterator[dict[str, Any]]:

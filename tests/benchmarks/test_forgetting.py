@@ -366,7 +366,9 @@ class Scene:
         output = json.loads(subprocess.run(words, stdout=subprocess.PIPE, check=True).stdout)
         return self.rest(began + period - time.monotonic(), f"wave {self._waves}", output)
 
-    def rest(self, seconds: float, name: str, told: dict[str, int] | None = None) -> Figures:
+    def rest(
+        self, seconds: float, name: str, codes_received: dict[str, int] | None = None
+    ) -> Figures:
         """Let time pass [s], and look."""
         time.sleep(max(0.0, seconds))
         here, honest = Path(f"/proc/{self.process.pid}"), self.honest
@@ -381,7 +383,9 @@ class Scene:
         honest.codes, honest.lost = {}, 0
         used, self._cpu = cpu - self._cpu, cpu
         memory = pages * os.sysconf("SC_PAGE_SIZE") / 1e6
-        return Figures(name, files, memory, used, trips, lost, codes, told or {}, self._kept())
+        return Figures(
+            name, files, memory, used, trips, lost, codes, codes_received or {}, self._kept()
+        )
 
     def _kept(self) -> tuple[int, int]:
         with closing(sqlite3.connect(f"file:{self.state}?mode=ro", uri=True, timeout=5)) as file:

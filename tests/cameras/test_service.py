@@ -38,9 +38,9 @@ class LiveWorld:
     """The world of a live run, and what programs on this machine see of its cameras."""
 
     def __init__(self, port: int = 0) -> None:
-        self.clock, self.told = LiveClock(), list[str]()
+        self.clock, self.reports = LiveClock(), list[str]()
         self.network = SocketNetwork(self.clock)
-        self.service = CameraService("127.0.0.1", port, self.clock, self.told.append)
+        self.service = CameraService("127.0.0.1", port, self.clock, self.reports.append)
         scenario = build(load("fire-drill"), {})
         join = lambda kind, number: self.network.join(id_of(kind, number))  # noqa: E731
         shown = Cameras(self.service.url, topic_of)
@@ -137,7 +137,7 @@ def test_the_url_that_a_robot_tells_is_a_stream_that_any_player_shows(world):
     reported = world.robots[ROBOT].controller.camera_url
     assert reported == f"http://127.0.0.1:{world.port}/camera/robot-1.mjpg"
     assert m.SensorInfo(reported, ()).camera_url == reported
-    (line,) = world.told
+    (line,) = world.reports
     assert unnamed(line, f"http://127.0.0.1:{world.port}/camera/LABEL.mjpg") == []
     seen = list[tuple[dict[str, str], bytes]]()
     world.let(lambda: seen.extend(pictures(world.port, "/camera/robot-1.mjpg", 3)))
@@ -219,7 +219,7 @@ def test_a_process_is_there_while_somebody_looks_and_replaced_when_it_was_killed
 
     os.kill(first, signal.SIGKILL)
     world.until(lambda: world.process == 0)
-    assert unnamed(world.told[-1], "0.05 s", "killed") == []
+    assert unnamed(world.reports[-1], "0.05 s", "killed") == []
     world.let(lambda: pictures(world.port, "/camera/robot-1.mjpg", 1))
     second = world.process
     assert second not in (0, first)

@@ -166,7 +166,7 @@ class FakePhones:
         else:
             guard["order"], guard["doing"] = None, f"declined: {asked['reason']}"
         self.tell_guard(asked["client"])
-        return "told"
+        return "reported"
 
     def do_guard_say(self: Any, asked: dict[str, Any]) -> str:
         guard = self.guards[asked["client"]]
@@ -174,12 +174,12 @@ class FakePhones:
         if asked["what"] in ("refuted", "contained"):
             guard["order"] = None
         self.tell_guard(asked["client"])
-        return "told"
+        return "reported"
 
     def do_guard_place(self: Any, asked: dict[str, Any]) -> str:
         walker = self.scene.all[self.guards[asked["client"]]["guard"]]
         walker.x, walker.y = asked["x_m"], asked["y_m"]
-        return "told"
+        return "reported"
 
     def do_guard_report(self: Any, asked: dict[str, Any]) -> str:
         return f"{asked['kind']} reported"

@@ -137,12 +137,14 @@ def test_what_its_holder_was_to_look_at_is_open_to_others(office):
 
 
 @pytest.mark.parametrize(
-    ("told", "waited"), [(False, ANSWER_WITHIN), (True, STOP_WITHIN)], ids=["asked", "stopping"]
+    ("is_acknowledged", "waited"),
+    [(False, ANSWER_WITHIN), (True, STOP_WITHIN)],
+    ids=["asked", "stopping"],
 )
-def test_a_handover_that_leads_nowhere_ends(office, told, waited):
+def test_a_handover_that_leads_nowhere_ends(office, is_acknowledged, waited):
     hold(office)
     sends = ask(office)[1]
-    if told:
+    if is_acknowledged:
         office.ok(sends)
     assert office.core.next_deadline() <= waited
     office.tick(waited)

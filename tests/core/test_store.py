@@ -193,21 +193,21 @@ def killed_before_the_robot_hears(file: Path) -> tuple[Office, Store, Send]:
 
 
 def test_a_robot_that_has_not_heard_of_an_end_is_told_by_the_next_life(file):
-    office, memory, untold = killed_before_the_robot_hears(file)
+    office, memory, notice = killed_before_the_robot_hears(file)
     memory.close()
-    assert next_life(office, file, 1.0).go_on() == [untold]
+    assert next_life(office, file, 1.0).go_on() == [notice]
 
 
 def test_a_robot_that_did_not_answer_is_told_by_every_life_until_it_does(file):
-    office, memory, untold = killed_before_the_robot_hears(file)
+    office, memory, notice = killed_before_the_robot_hears(file)
     for life in range(3):
-        office.no([untold], life)
+        office.no([notice], life)
         keep(office, memory)
         memory.close()
-        assert next_life(office, file, life).go_on() == [untold]
+        assert next_life(office, file, life).go_on() == [notice]
         memory = Store(file)
         memory.recall(office.new_core(), life)
-    office.ok([untold], 3.0)
+    office.ok([notice], 3.0)
     keep(office, memory)
     memory.close()
     assert next_life(office, file, 4.0).go_on() == []

@@ -234,9 +234,9 @@ def test_every_study_has_a_page_and_every_kept_answer_is_on_it():
     assert set(pages) == set(results.paths())
     summary = pages["results/index.md"]
     for answer in all_kept(results.KEPT):
-        told = pages[f"results/{answer.study}.md"]
-        assert answer.date in told
-        assert f"{answer.runs} runs" in told
+        result_page = pages[f"results/{answer.study}.md"]
+        assert answer.date in result_page
+        assert f"{answer.runs} runs" in result_page
         assert f"{answer.version}, {answer.date}" in summary
 
 

@@ -39,8 +39,8 @@ def test_a_page_does_what_it_says(page, tmp_path):
 def numbers_in(page):
     """Measured numbers in the sentences and tables of a page: those with a decimal point."""
     text = page.read_text(encoding="utf-8").replace("\n", " ")
-    told = re.sub(r"```.*?```", "", text)
-    return numbers_in_text(re.sub(r"<!--.*?-->", "", told)) - GIVEN
+    prose = re.sub(r"```.*?```", "", text)
+    return numbers_in_text(re.sub(r"<!--.*?-->", "", prose)) - GIVEN
 
 
 def numbers_in_text(text):

@@ -71,8 +71,8 @@ def test_the_start_of_the_version_in_a_folder_is_measured_wherever_one_stands(tm
 
 def test_a_case_whose_process_dies_is_told_as_a_crash(tmp_path, monkeypatch):
     monkeypatch.setitem(cases.CASES, "dies", cases.Case("run", lambda: os._exit(7)))
-    runner.in_a_copy("dies", counting.Nothing.name, 0, tmp_path / "told")
-    assert list(runner.read(tmp_path / "told")) == [{"case": "dies", "error": "crashed (7)"}]
+    runner.in_a_copy("dies", counting.Nothing.name, 0, tmp_path / "results")
+    assert list(runner.read(tmp_path / "results")) == [{"case": "dies", "error": "crashed (7)"}]
 
 
 def test_a_ratio_is_told_where_both_its_cases_were_measured():

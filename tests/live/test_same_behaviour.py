@@ -13,7 +13,7 @@ from helpers.network.scripted_session import (
     over_sockets,
     pipelined,
     published,
-    told_in_virtual_time,
+    story_in_virtual_time,
 )
 from helpers.wording import unnamed
 
@@ -68,7 +68,7 @@ GIVEN_UP = [("starts", 200), ("1 of 200", "stale", "10 s"), ("stops", "obeyed")]
 
 @pytest.mark.parametrize(("changes", "words"), [({}, WHOLE), (LATE, GIVEN_UP)])
 def test_the_operator_tells_what_was_done_and_gives_up_a_robot_that_obeys_no_more(changes, words):
-    reported = told_in_virtual_time(**changes)
+    reported = story_in_virtual_time(**changes)
     missing = [unnamed(line, "robot-1", *each) for line, each in zip(reported, words, strict=True)]
     assert missing == [[]] * len(words)
 

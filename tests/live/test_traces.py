@@ -209,7 +209,7 @@ def test_a_line_taken_out_is_found_out(drive):
 # --- no trace ------------------------------------------------------------------------------
 
 
-def is_told_at(path: Path, number: int) -> bool:
+def is_reported_at(path: Path, number: int) -> bool:
     """True if a trace is refused in one line that names it and a line number."""
     with pytest.raises(ConfigError) as error:
         list(replay(path))
@@ -220,7 +220,7 @@ def is_told_at(path: Path, number: int) -> bool:
 def test_a_trace_that_ends_in_the_middle_of_a_line_ends_in_one_line(drive, kept):
     data = drive.read_text().rstrip("\n")
     drive.write_text(data[:kept])
-    assert is_told_at(drive, data[:kept].count("\n") + 1)
+    assert is_reported_at(drive, data[:kept].count("\n") + 1)
 
 
 FOREIGN = [
@@ -233,7 +233,7 @@ FOREIGN = [
 def test_a_foreign_file_ends_in_one_line(tmp_path, data):
     path = tmp_path / "foreign"
     path.write_bytes(data)
-    assert is_told_at(path, 1)
+    assert is_reported_at(path, 1)
 
 
 FOREIGN_LINES = [
@@ -249,7 +249,7 @@ def test_a_foreign_line_and_a_value_of_another_type_are_told_by_their_number(dri
     whole = drive.read_text().splitlines()
     whole[3] = line if isinstance(line, str) else json.dumps(json.loads(whole[3]) | line)
     drive.write_text("\n".join(whole))
-    assert is_told_at(drive, 4)
+    assert is_reported_at(drive, 4)
 
 
 def test_a_file_that_is_not_there_is_told_in_one_line(tmp_path):

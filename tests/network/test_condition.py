@@ -53,7 +53,7 @@ def test_only_a_publisher_waits_for_a_subscription_after_its_handshake():
 
 
 @pytest.mark.parametrize(
-    ("changed", "told"),
+    ("changed", "expected"),
     [
         ({"pattern": "push"}, "pattern 'push' is unknown; known: req-rep, pub-sub, pipelined"),
         ({"timeout_ms": 100}, "timeout_ms and attempts belong to pattern req-rep, and only to it"),
@@ -62,10 +62,10 @@ def test_only_a_publisher_waits_for_a_subscription_after_its_handshake():
         ({"proc_ms": math.inf}, "proc_ms inf should be a finite number from 0 on"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line(changed, told):
+def test_what_cannot_be_is_refused_in_one_line(changed, expected):
     with pytest.raises(ConfigError) as refused:
         dataclasses.replace(Condition("pub", 10), **changed)
-    assert refused.value.problem == told
+    assert refused.value.problem == expected
 
 
 def test_a_word_where_a_number_belongs_is_refused():

@@ -82,7 +82,7 @@ def test_a_run_says_what_it_used(changes, depth):
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "expected"),
     [
         ({"zeromq.high_water_mark": 0}, "zeromq.high_water_mark"),
         ({"zeromq.conflate": "robot"}, "none, publisher, subscriber or both"),
@@ -91,6 +91,6 @@ def test_a_run_says_what_it_used(changes, depth):
         ({"network_depth": "packet"}, "auto, message or segment"),
     ],
 )
-def test_what_cannot_be_set_is_refused(changes, told):
-    with pytest.raises(ConfigError, match=told):
+def test_what_cannot_be_set_is_refused(changes, expected):
+    with pytest.raises(ConfigError, match=expected):
         scenarios.build({}, changes)

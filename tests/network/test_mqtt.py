@@ -50,7 +50,7 @@ class Outsider:
         self.client.loop_start()
         assert self._ready.wait(PATIENCE_S)
 
-    def publish(self, topic: str, data: bytes, retain: bool = False, **told: object) -> str:
+    def publish(self, topic: str, data: bytes, retain: bool = False, **attributes: object) -> str:
         """Publish, and say what the broker made of it."""
         from paho.mqtt.packettypes import PacketTypes
         from paho.mqtt.properties import Properties
@@ -62,7 +62,7 @@ class Outsider:
             done.set(),
         )
         properties = Properties(PacketTypes.PUBLISH)
-        for name, value in told.items():
+        for name, value in attributes.items():
             setattr(properties, name, value)
         self.client.publish(topic, data, 1, retain, properties)
         assert done.wait(PATIENCE_S)

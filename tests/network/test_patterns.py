@@ -33,7 +33,7 @@ def test_every_pattern_says_all_that_reports_and_pages_tell_of_it():
 
 
 @pytest.mark.parametrize(
-    ("name", "options", "told"),
+    ("name", "options", "expected"),
     [
         ("reqrep", {}, "pattern 'reqrep' is unknown; did you mean 'req-rep'?"),
         ("mine", {}, "or a file: mine.py:Mine"),
@@ -44,10 +44,10 @@ def test_every_pattern_says_all_that_reports_and_pages_tell_of_it():
         ("gone.py:Mine", {}, "file 'gone.py' not found"),
     ],
 )
-def test_a_pattern_that_cannot_be_had_is_told_in_a_line(name, options, told):
+def test_a_pattern_that_cannot_be_had_is_told_in_a_line(name, options, expected):
     with pytest.raises(ConfigError, match=r".") as caught:
         load_pattern(name, options)()
-    assert told in str(caught.value)
+    assert expected in str(caught.value)
 
 
 def test_a_package_offers_patterns_by_name(monkeypatch):

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.system
 SHORT = ["horizon_s=12", "link.delay_s=0.1"]
 
 
-def told(pictures: Wanted | None = None, patterns: str = "req-rep,latest-wins") -> str:
+def output_of(pictures: Wanted | None = None, patterns: str = "req-rep,latest-wins") -> str:
     reported = StringIO()
     where = Console(file=reported, width=120)
     episode(EpisodeRequest("drive-to-event", 2, SHORT, patterns, pictures or Wanted()), where)
@@ -26,7 +26,7 @@ def told(pictures: Wanted | None = None, patterns: str = "req-rep,latest-wins") 
 
 
 def test_without_any_picture_both_stories_are_told_and_how_they_ended_beside_each_other():
-    reported = told()
+    reported = output_of()
     assert reported.count("robot-1 to event 1") == 2
     headings = ("req-rep, 100 ms each way", "latest-wins, 100 ms each way", "side by side")
     places = [reported.index(f" {heading}") for heading in headings]
@@ -37,7 +37,7 @@ def test_without_any_picture_both_stories_are_told_and_how_they_ended_beside_eac
 
 
 def test_a_still_and_a_strip_show_both(tmp_path):
-    reported = told(Wanted(still=tmp_path / "one.png", strip=tmp_path / "more.png", panels=2))
+    reported = output_of(Wanted(still=tmp_path / "one.png", strip=tmp_path / "more.png", panels=2))
     assert "Still: " in reported
     assert "Strip: " in reported
     with Image.open(tmp_path / "one.png") as one, Image.open(tmp_path / "more.png") as more:
@@ -48,8 +48,8 @@ def test_a_still_and_a_strip_show_both(tmp_path):
 def test_a_camera_is_one_of_one_run():
     eye = Wanted(still=Path("eye.png"), camera="robot-1")
     with pytest.raises(ConfigError, match=r"--camera .*--side-by-side"):
-        told(eye)
+        output_of(eye)
 
 
 def test_the_same_pattern_may_stand_on_both_sides():
-    assert told(patterns="pub-sub,pub-sub").count("plain PUB/SUB") == 2
+    assert output_of(patterns="pub-sub,pub-sub").count("plain PUB/SUB") == 2

@@ -143,7 +143,7 @@ def test_a_client_of_a_bridge_that_says_anything_goes_on(message, data):
         {"/robot_1/odom": Subscribed("nav_msgs/Odometry", lambda _: None, 100_000)},
         {},
         on_change=lambda _: None,
-        on_bad=lambda *told: refused.append(told),
+        on_bad=lambda *reasons: refused.append(reasons),
     )
     client._take(json.dumps(message).encode())
     client._take(data)

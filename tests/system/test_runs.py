@@ -5,7 +5,7 @@ import json
 from typing import Any
 
 import pytest
-from helpers.processes.second_process import told_here_and_elsewhere
+from helpers.processes.second_process import run_here_and_elsewhere
 
 from dva_sim.agents.operator.delay_estimation import DelayEstimate
 from dva_sim.agents.robot.controller import Decision, RobotController
@@ -38,7 +38,7 @@ print(rows(run("fire-drill", 5, horizon_s=60, **rough)))
 
 
 def test_the_same_seed_gives_the_same_bytes_in_two_processes():
-    here, elsewhere = told_here_and_elsewhere(PROGRAM)
+    here, elsewhere = run_here_and_elsewhere(PROGRAM)
     assert here == elsewhere
     assert len(here) > 5_000
 

@@ -101,7 +101,7 @@ class Refusing(Plain):
 
 
 @pytest.mark.parametrize(
-    ("bad", "promise", "told"),
+    ("bad", "promise", "expected"),
     [
         (but(written=lambda self, values: values[1:]), figures.NUMBERS, "along y by a line"),
         (but(mark=lime), figures.COLOUR, "#00ff00 of a Line2D"),
@@ -116,10 +116,10 @@ class Refusing(Plain):
         (Misnamed, figures.NAME, "'other' for 'plain'"),
     ],
 )
-def test_a_figure_that_breaks_a_promise_is_told_of_it(bad, promise, told):
+def test_a_figure_that_breaks_a_promise_is_told_of_it(bad, promise, expected):
     shape = "no value at all" if promise == figures.EMPTY else "two words"
     outcome = tried(check_figure, bad, shapes={shape: SHAPES[shape]})
-    assert [text for text in outcome.broken if text.startswith(f"{promise}: ") and told in text]
+    assert [text for text in outcome.broken if text.startswith(f"{promise}: ") and expected in text]
 
 
 @pytest.mark.parametrize("good", [Plain, Refusing])

@@ -73,7 +73,7 @@ AGELESS = property(lambda self: math.nan if self._sample[0] else 0.0)
 
 
 @pytest.mark.parametrize(
-    ("kind", "told"),
+    ("kind", "expected"),
     [
         (gives(lambda level: math.nan if level > 8 else level), "no number: level nan, "),
         (gives(lambda level: 1.5 * level), "range of its input: level "),
@@ -86,9 +86,9 @@ AGELESS = property(lambda self: math.nan if self._sample[0] else 0.0)
         (but(NoFilter, add=leave), "raises: SystemExit: 3 (test_tilt.py:"),
     ],
 )
-def test_a_promise_that_a_filter_breaks_is_told_in_a_plain_line(kind, told):
+def test_a_promise_that_a_filter_breaks_is_told_in_a_plain_line(kind, expected):
     outcome = tried(check_filter, kind, slow=60.0)
-    assert any(told in line for line in outcome.broken), outcome.broken
+    assert any(expected in line for line in outcome.broken), outcome.broken
 
 
 def commands(base, command):
@@ -110,7 +110,7 @@ def half(self, wanted, *_):
 
 
 @pytest.mark.parametrize(
-    ("kind", "told"),
+    ("kind", "expected"),
     [
         (commands(ONE, lambda _, level, turn, dt: (level, turn)), "limits of a command: "),
         (Restless, "faster and faster at rest: after level 3, -12 deg/s"),
@@ -125,9 +125,9 @@ def half(self, wanted, *_):
         (commands(ONE, lambda honest, a, b, c: honest(a, max(b, -5.0), c)), "level 3.8, 11.4 deg"),
     ],
 )
-def test_a_promise_that_a_mapping_breaks_is_told_in_a_plain_line(kind, told):
+def test_a_promise_that_a_mapping_breaks_is_told_in_a_plain_line(kind, expected):
     outcome = tried(check_mapping, kind, slow=60.0)
-    assert any(told in line for line in outcome.broken), outcome.broken
+    assert any(expected in line for line in outcome.broken), outcome.broken
 
 
 def test_what_ends_the_program_when_made_or_asked_is_told_in_a_line(tmp_path, capsys):
@@ -155,7 +155,7 @@ def test_what_ends_the_program_when_made_or_asked_is_told_in_a_line(tmp_path, ca
 
 
 @pytest.mark.parametrize(
-    ("says", "told"),
+    ("says", "expected"),
     [
         ("batch = 0", "its batch is 0;"),
         ("batch = 1001", "its batch is 1001;"),
@@ -168,7 +168,7 @@ def test_what_ends_the_program_when_made_or_asked_is_told_in_a_line(tmp_path, ca
     ],
 )
 def test_a_filter_that_no_phone_could_work_with_is_refused_wherever_it_is_named(
-    tmp_path, capsys, says, told
+    tmp_path, capsys, says, expected
 ):
     path = tmp_path / "odd.py"
     path.write_text(
@@ -176,7 +176,7 @@ def test_a_filter_that_no_phone_could_work_with_is_refused_wherever_it_is_named(
         f"class Odd(NoFilter):\n    {says}\n"
         "    def add(self, sample): super().add(sample)\n"
     )
-    line = f"filter '{path}:Odd': {told}"
+    line = f"filter '{path}:Odd': {expected}"
     assert checks.check(["filter", f"{path}:Odd"]) == 1
     assert capsys.readouterr().out.startswith(f"{path}:Odd: {line}")
     with pytest.raises(ConfigError) as caught:

@@ -24,7 +24,7 @@ def split(rooms, walls, ways=()):
     return of_rooms(rasterise(floor, lines, 0.05), rooms, lines, ways)
 
 
-def told(opening):
+def described(opening):
     return {opening.room_a, opening.room_b}, opening.kind, round(opening.width, 2)
 
 
@@ -33,9 +33,9 @@ def test_the_openings_of_caparica_are_its_fifteen_doors_and_two_open_corridor_en
     doors = [o for o in site.openings if o.kind == "door"]
     borders = [o for o in site.openings if o.kind == "border"]
     assert len(doors) == len(site.doors) == 15
-    assert ({"Server room", "Control room"}, "door", 1.1) in map(told, doors)
-    assert ({"Main corridor", "Canteen"}, "door", 1.3) in map(told, doors)
-    assert sorted(map(told, borders), key=lambda border: sorted(border[0])) == [
+    assert ({"Server room", "Control room"}, "door", 1.1) in map(described, doors)
+    assert ({"Main corridor", "Canteen"}, "door", 1.3) in map(described, doors)
+    assert sorted(map(described, borders), key=lambda border: sorted(border[0])) == [
         ({"Main corridor", end}, "border", 2.2) for end in ("North corridor", "South corridor")
     ]
     for opening in doors:
@@ -61,10 +61,10 @@ def test_a_border_without_a_wall_is_open_over_its_whole_length_and_to_the_lower_
     rooms = [box("a", 0, 0, 4, 4, ceiling=3.5), box("b", 4, 0, 8, 4, ceiling=2.6)]
     around = [(0, 0, 8, 0), (8, 0, 8, 4), (8, 4, 0, 4), (0, 4, 0, 0)]
     (opening,) = split(rooms, around).openings
-    assert told(opening) == ({"a", "b"}, "border", 4.0)
+    assert described(opening) == ({"a", "b"}, "border", 4.0)
     assert opening.height == 2.6
     (lower,) = split(rooms, [*around, (4, 1.5, 4, 4)]).openings
-    assert told(lower) == ({"a", "b"}, "border", 1.5)
+    assert described(lower) == ({"a", "b"}, "border", 1.5)
 
 
 def test_a_walled_border_is_closed_even_when_it_is_drawn_three_centimetres_beside_it():

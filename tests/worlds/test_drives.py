@@ -254,7 +254,7 @@ def answering(what):
 
 
 @pytest.mark.parametrize(
-    ("answer", "told"),
+    ("answer", "expected"),
     [
         ((math.nan, 0.0), "answers nan, 0.0"),
         ((0.0, -math.inf), "answers 0.0, -inf"),
@@ -266,12 +266,12 @@ def answering(what):
         (SystemExit(3), "SystemExit: 3"),
     ],
 )
-def test_a_drive_without_an_answer_brakes_and_is_counted(answer, told):
+def test_a_drive_without_an_answer_brakes_and_is_counted(answer, expected):
     drive = answering(answer)
     assert drive.set_point(0.5, 0.5) == (0.0, 0.0)
     assert drive.accelerations(0.5, 0.5, 0.5, 0.5, DT) == (-1.0, -1.5)
     assert drive.accelerations(0.5, 0.5, 0.01, 0.0, DT) == (pytest.approx(-0.01 / DT), 0.0)
-    assert (drive.failures, drive.first_failure) == (3, told)
+    assert (drive.failures, drive.first_failure) == (3, expected)
 
 
 def test_drives_are_made_by_name_and_by_file(tmp_path, monkeypatch):

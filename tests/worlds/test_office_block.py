@@ -148,14 +148,14 @@ def test_detectors_and_cameras_hang_where_the_floor_is_free():
     assert {zone.use for zone in site.zones} == {"restricted", "charging"}
 
 
-def told(features):
+def plain(features):
     return [(f.kind, f.shape.wkt, dict(f.properties)) for f in features]
 
 
 def test_the_same_seed_gives_the_same_house_and_another_seed_another():
-    one = told(office_block(OfficeBlock(seed=4, width_m=70, depth_m=30)))
-    assert one == told(office_block(OfficeBlock(seed=4, width_m=70, depth_m=30)))
-    assert one != told(office_block(OfficeBlock(seed=5, width_m=70, depth_m=30)))
+    one = plain(office_block(OfficeBlock(seed=4, width_m=70, depth_m=30)))
+    assert one == plain(office_block(OfficeBlock(seed=4, width_m=70, depth_m=30)))
+    assert one != plain(office_block(OfficeBlock(seed=5, width_m=70, depth_m=30)))
 
 
 def test_more_robots_do_not_move_a_wall():

@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers.processes.second_process import told_here_and_elsewhere
+from helpers.processes.second_process import run_here_and_elsewhere
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.drives import DriveSpec
@@ -206,6 +206,6 @@ print([(b.x.hex(), b.y.hex(), b.body.angle.hex(), b.contacts, b.impulse.hex()) f
 
 @pytest.mark.system
 def test_two_processes_give_the_same_trajectories_to_the_bit():
-    here, elsewhere = told_here_and_elsewhere(DRIVE)
+    here, elsewhere = run_here_and_elsewhere(DRIVE)
     assert here == elsewhere
     assert "0x" in here

@@ -38,7 +38,7 @@ def small_sender(
     network: VirtualNetwork,
     pattern: Pattern,
     seen: list[int | None],
-    told: list[str] | None = None,
+    refusals: list[str] | None = None,
     phone: Phone | None = None,
     recorder: Recorder | None = None,
 ) -> CommandSender:
@@ -66,7 +66,7 @@ def small_sender(
         window=8,
         seen_tick=lambda: seen[-1],
         on_lost=lambda why: None,
-        on_refused=lambda why: told.append(why) if told is not None else None,
+        on_refused=lambda why: refusals.append(why) if refusals is not None else None,
     )
 
 

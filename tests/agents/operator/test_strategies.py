@@ -209,7 +209,7 @@ def test_time_by_moving_and_waiting_grows_with_the_delay_by_the_number_of_waits(
 
 def test_who_is_never_shown_a_move_tries_again_at_last():
     strategy = MoveAndWait(person(), ROBOT)
-    track = drive(strategy, way((0, 0), (9, 0)), 300.0, 60.0, told=lambda now: 1.0)
+    track = drive(strategy, way((0, 0), (9, 0)), 300.0, 60.0, reported_delay=lambda now: 1.0)
     moves = [since for going, since, _ in spells(track) if going]
     assert len(moves) > 3
     assert min(b - a for a, b in pairwise(moves)) > 3.0 * 1.6
@@ -249,7 +249,7 @@ def test_the_better_the_prediction_the_sooner_one_arrives():
     assert time(0.0) > time(0.5) + 5.0 > time(1.0) + 10.0
 
 
-class Told(Strategy):
+class GivenDelay(Strategy):
     """An oracle in a closed loop: everything is seen without delay."""
 
     def __init__(self, *given: Any) -> None:
@@ -262,7 +262,7 @@ class Told(Strategy):
 
 def test_the_oracle_steers_from_where_what_it_asks_for_takes_effect():
     without = drive(Pursuit(person(), ROBOT), way(*CORNER), 0.0, 40.0)
-    reported = drive(Told(person(), ROBOT), way(*CORNER), 2.0, 40.0)
+    reported = drive(GivenDelay(person(), ROBOT), way(*CORNER), 2.0, 40.0)
     for ideal, at in zip(without, reported, strict=True):
         assert at.wanted == pytest.approx(ideal.wanted, abs=1e-6)
 
@@ -273,7 +273,7 @@ def test_the_oracle_steers_from_where_what_it_asks_for_takes_effect():
 def test_who_adapts_changes_once_as_the_delay_grows_and_says_for_how_long():
     strategy = Adaptive(person(), ROBOT)
     reported = lambda now: 0.05 * now  # noqa: E731
-    track = drive(strategy, way((0, 0), (400, 0)), 0.5, 100.0, told=reported)
+    track = drive(strategy, way((0, 0), (400, 0)), 0.5, 100.0, reported_delay=reported)
     assert strategy.using == "move_and_wait"
     assert strategy.switches == 1
     since = next(at.time for at in track[10:] if at.wanted == (0.0, 0.0))
@@ -292,7 +292,7 @@ def test_who_adapts_does_not_wait_for_what_it_has_not_done():
 def test_a_delay_that_comes_and_goes_a_little_changes_nothing():
     strategy = Adaptive(person(), ROBOT)
     grows = lambda now: 0.05 * min(now, 60.0) + 0.2 * (int(now) % 2)  # noqa: E731
-    drive(strategy, way((0, 0), (400, 0)), 0.5, 120.0, told=grows)
+    drive(strategy, way((0, 0), (400, 0)), 0.5, 120.0, reported_delay=grows)
     assert strategy.switches == 1
 
 

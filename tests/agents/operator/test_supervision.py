@@ -44,7 +44,7 @@ def test_a_fire_that_the_robot_shows_is_confirmed(dva, operator):
 
 def test_it_takes_the_permission_for_missions_and_drives_nothing(dva, operator):
     dva.start(1, fire(dva))
-    asked = [t.body for t in dva.told if isinstance(t.body, m.PermissionRequest)]
+    asked = [t.body for t in dva.received if isinstance(t.body, m.PermissionRequest)]
     assert [wish.level for wish in asked] == ["missions"]
     (log,) = dva.stage.recorder.drives
     assert log.sent == 0

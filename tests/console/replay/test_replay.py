@@ -41,7 +41,7 @@ def recorded(files):
     return RecordedRun(read_recording(files / "drill.mcap"), "drill.mcap")
 
 
-class Told:
+class PlayedWorld:
     """A player, and the newest line of each kind that it tells."""
 
     def __init__(self, run, shelf=None):
@@ -73,7 +73,7 @@ def playing():
     made = []
 
     def play(*what):
-        made.append(Told(*what))
+        made.append(PlayedWorld(*what))
         made[-1].player.begin()
         return made[-1]
 

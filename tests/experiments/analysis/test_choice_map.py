@@ -137,7 +137,7 @@ map: {models: operator.strategy}
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "told"),
+    ("before", "after", "expected"),
     [
         ("models: operator.strategy", "models: operator.strategi", "is not a factor"),
         ("models: operator.strategy", "models: pattern", "compares or runs over"),
@@ -147,7 +147,7 @@ map: {models: operator.strategy}
         ("strategy}\n", "strategy, choosing: adaptive}\n", "'adaptive'"),
     ],
 )
-def test_a_map_that_cannot_be_drawn_is_refused(tmp_path, before, after, told):
+def test_a_map_that_cannot_be_drawn_is_refused(tmp_path, before, after, expected):
     file = tmp_path / "which.yaml"
     file.write_text(FILE)
     load_study(file)
@@ -162,7 +162,7 @@ def test_a_map_that_cannot_be_drawn_is_refused(tmp_path, before, after, told):
     file.write_text(text)
     with pytest.raises(ConfigError, match=r".") as caught:
         load_study(file)
-    assert told in str(caught.value)
+    assert expected in str(caught.value)
 
 
 def test_beside_the_regret_stand_the_loss_itself_and_what_drives_are_like():

@@ -51,7 +51,7 @@ def test_a_comparison_of_levels_that_were_not_run_is_said_not_to_have_been(runs)
 
 
 @pytest.mark.parametrize(
-    ("persons", "smallest_s", "told"),
+    ("persons", "smallest_s", "expected"),
     [
         (4, 50.0, ["too few persons (4)"] * 2),  # with four no permutation test shows anything
         (10, 0.001, ["too few persons (10)"] * 2),  # what matters is not ruled out
@@ -59,7 +59,7 @@ def test_a_comparison_of_levels_that_were_not_run_is_said_not_to_have_been(runs)
     ],
 )
 def test_what_is_not_shown_is_for_want_of_persons_or_else_there_is_little(
-    persons, smallest_s, told
+    persons, smallest_s, expected
 ):
     rows = synthetic_results.drive_rows(persons, 2, effect_s=40.0, missed=0.0)
     same = SAME | {"smallest_effect_s": smallest_s}
@@ -68,10 +68,12 @@ def test_what_is_not_shown_is_for_want_of_persons_or_else_there_is_little(
         study(comparisons={"same": same}, hypotheses=claims), synthetic_results.columns(rows)
     )
     lead = verdict_lead(found.tested, "person", is_extrapolated=False, only_model="")
-    assert ("too few" in lead) == ("few" in told[0])
+    assert ("too few" in lead) == ("few" in expected[0])
     cells = [hypothesis_table(found.tested).rows[0][-1], comparison_table(found).rows[0][-1]]
-    assert [word for cell, word in zip(cells, told, strict=True) if word not in cell] == []
-    assert [len(cell) > len("? not shown") for cell in cells] == ["few" in word for word in told]
+    assert [word for cell, word in zip(cells, expected, strict=True) if word not in cell] == []
+    assert [len(cell) > len("? not shown") for cell in cells] == [
+        "few" in word for word in expected
+    ]
 
 
 @pytest.mark.parametrize(

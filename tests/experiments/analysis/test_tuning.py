@@ -162,7 +162,7 @@ def test_a_measure_that_no_run_has_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "expected"),
     [
         ("seed: 7001", "seed: 3", "seed of its own"),
         ("by: [pattern]", "by: [profile]", "'profile' is not a factor"),
@@ -173,10 +173,10 @@ def test_a_measure_that_no_run_has_is_refused(tmp_path):
         ("part: drive\n", "part: drove\n", "tuning.part 'drove' is not a part"),
     ],
 )
-def test_a_tuning_that_makes_no_sense_is_refused(tmp_path, old, new, told):
+def test_a_tuning_that_makes_no_sense_is_refused(tmp_path, old, new, expected):
     with pytest.raises(ConfigError) as caught:
         study_in(tmp_path, old=old, new=new)
-    assert told in str(caught.value)
+    assert expected in str(caught.value)
 
 
 def test_the_command_tries_chooses_tells_and_keeps(tmp_path, capsys):

@@ -126,10 +126,10 @@ def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("says", "told"),
+    ("says", "expected"),
     [(b"HTTP/1.0 400 Bad request\r\n\r\n", "something else"), (b"", r"nothing within 0\.2 s")],
 )
-def test_another_program_is_not_taken_for_a_scheduler(says, told, monkeypatch):
+def test_another_program_is_not_taken_for_a_scheduler(says, expected, monkeypatch):
     monkeypatch.setattr(dask_cluster, "_CONNECT_S", 30.0 if says else 0.2)
     over = threading.Event()
 
@@ -142,7 +142,7 @@ def test_another_program_is_not_taken_for_a_scheduler(says, told, monkeypatch):
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         listener = threading.Thread(target=answer, daemon=True)
         listener.start()
-        with pytest.raises(ConfigError, match=f"no scheduler answers at {address}: .*{told}"):
+        with pytest.raises(ConfigError, match=f"no scheduler answers at {address}: .*{expected}"):
             dask_cluster.DaskCluster(address)
         over.set()
         listener.join()

@@ -16,7 +16,7 @@ STUDY = (sys.executable, "-m", "helpers.studies.interrupted_study")
 NAMESPACE = ["unshare", "--map-root-user", "--mount"]
 
 
-def told(*words: str | Path) -> dict[str, Any]:
+def report_of(*words: str | Path) -> dict[str, Any]:
     path = PYTHON_PATH
     environment = {**os.environ, "PYTHONPATH": path}
     ran = patience.run(
@@ -30,7 +30,7 @@ def told(*words: str | Path) -> dict[str, Any]:
 @pytest.mark.soak
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_hundred_kills_at_any_moment_lose_and_double_nothing(tmp_path):
-    found = told(*STUDY, "kills", tmp_path)
+    found = report_of(*STUDY, "kills", tmp_path)
     assert min(found["call"], found["writing"], found["clock"]) >= kit.KILLS_EACH
     assert found["equal"] == found["ended"] >= 100 // kit.KILLS_A_STUDY
     assert (found["doubled"], found["left behind"]) == (0, 0)
@@ -50,11 +50,11 @@ def mounts_are_allowed(folder: Path) -> bool:
 def test_a_full_disk_is_told_in_one_line_and_nothing_is_lost(tmp_path):
     if not mounts_are_allowed(tmp_path):
         pytest.skip("this system lets nobody but root mount a small disk")
-    found = told(*NAMESPACE, *STUDY, "disk", tmp_path)
-    assert len(found["told"]) >= 3
-    assert all("\n" not in line for line in found["told"])
-    assert any("journal.sqlite: " in line for line in found["told"])
-    assert any("tables cannot be written" in line for line in found["told"])
+    found = report_of(*NAMESPACE, *STUDY, "disk", tmp_path)
+    assert len(found["errors"]) >= 3
+    assert all("\n" not in line for line in found["errors"])
+    assert any("journal.sqlite: " in line for line in found["errors"])
+    assert any("tables cannot be written" in line for line in found["errors"])
     assert found["equal"]
     assert found["report"]
     assert "\n" not in found["report"]

@@ -226,7 +226,7 @@ def test_a_worker_killed_once_changes_nothing(tmp_path, plain):
 
 
 @pytest.mark.parametrize(
-    ("tables", "told"),
+    ("tables", "expected"),
     [
         ({"runs": [{"seed": 1}]}, "name the design"),
         ({"runs": [{"pattern": 1}]}, "name the design"),
@@ -235,10 +235,10 @@ def test_a_worker_killed_once_changes_nothing(tmp_path, plain):
         ({"runs": [{"x": {1}}]}, "cannot be kept"),
     ],
 )
-def test_tables_that_cannot_be_kept_are_failures(tmp_path, tables, told):
+def test_tables_that_cannot_be_kept_are_failures(tmp_path, tables, expected):
     study = kit.study_in(tmp_path)
     out = run_study(study, tmp_path / "out", jobs=1, episode=lambda _: tables)
-    assert told in Results.load(out).failures[-1]["error"]
+    assert expected in Results.load(out).failures[-1]["error"]
 
 
 def test_numpy_numbers_are_kept_as_numbers(tmp_path):

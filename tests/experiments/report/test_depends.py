@@ -20,12 +20,12 @@ def reading(tmp_path, rows=None, study=None, **tables):
     return synthetic_results.reading(tmp_path / "r", runs, facts, **tables)
 
 
-def told(found):
+def texts(found):
     return {about: words.replace("\N{NO-BREAK SPACE}", " ") for about, words in found.items()}
 
 
 def test_persons_are_simulated_and_how_they_steer_is_said(tmp_path):
-    persons = told(reading(tmp_path).answer.depends)["Persons"]
+    persons = texts(reading(tmp_path).answer.depends)["Persons"]
     parts = ("6 simulated, 2 trials each", "no human", "strategy adaptive", "not tried here")
     assert unnamed(persons, *parts) == []
 
@@ -34,7 +34,7 @@ def test_who_chooses_to_move_and_wait_did_so_for_a_share_of_the_time(tmp_path):
     rows = synthetic_results.drive_rows(6, 2, effect_s=30.0, missed=0.0)
     for row in rows:
         row["move_and_wait_share"] = 0.86 if row["pattern"] == "req-rep" else 0.54
-    persons = told(reading(tmp_path, rows).answer.depends)["Persons"]
+    persons = texts(reading(tmp_path, rows).answer.depends)["Persons"]
     assert re.search(r"86 %.* under REQ/REP.*54 %.* under latest-wins", persons)
 
 
@@ -42,13 +42,13 @@ def test_other_models_of_persons_say_how_far_the_effect_reaches(tmp_path):
     effects = {("pursuit", 0): 20, ("pursuit", 1): 5, ("adaptive", 0): 1, ("adaptive", 1): -4}
     claims = {"robustness": synthetic_results.CLAIMS["robustness"]}
     found = reading(tmp_path, study=claims, robustness=synthetic_results.repeat_rows(effects))
-    persons = told(found.answer.depends)["Persons"]
+    persons = texts(found.answer.depends)["Persons"]
     assert unnamed(persons, "2 of 3", "difference at 1 s") == []
 
 
 def test_the_answer_under_the_other_settings_that_were_run_stands_beside_it(tmp_path):
     found = reading(tmp_path)
-    settings = told(found.answer.depends)["Settings"]
+    settings = texts(found.answer.depends)["Settings"]
     assert "for profile default." in settings
     assert "with profile dissertation." in settings
     assert settings.endswith("Not varied: phone default.")
@@ -62,13 +62,13 @@ def test_the_assumed_numbers_are_counted_and_the_screening_of_the_main_study_is_
     kept.parent.mkdir(parents=True)
     effects = "key,size,mean_low,mean_high\na.b,51.6,-9,70\nc.d,{0}\nphone.warming_k,0,0,0\n"
     kept.write_text(effects.format("22,-30,-14"))
-    told_of = told(reading(tmp_path / "one").answer.depends)["Assumptions"]
-    assert unnamed(told_of, str(len(all_assumptions())), MAIN, " c.d moved") == []
-    assert "a.b" not in told_of
+    text = texts(reading(tmp_path / "one").answer.depends)["Assumptions"]
+    assert unnamed(text, str(len(all_assumptions())), MAIN, " c.d moved") == []
+    assert "a.b" not in text
     kept.write_text(effects.format("22,-30,14"))
-    told_of = told(reading(tmp_path / "none").answer.depends)["Assumptions"]
-    assert unnamed(told_of, MAIN, "none") == []
-    assert "c.d" not in told_of
+    text = texts(reading(tmp_path / "none").answer.depends)["Assumptions"]
+    assert unnamed(text, MAIN, "none") == []
+    assert "c.d" not in text
 
 
 def test_a_study_without_a_contrast_depends_on_nothing_that_can_be_told(tmp_path):

@@ -259,16 +259,16 @@ def two_factor_view(effect):
 
 @blank
 @pytest.mark.parametrize(
-    ("effect", "told"),
+    ("effect", "expected"),
     [
         (lambda ratio, wait: 10 * np.log2(ratio) - 0.5 * wait, "Thick line"),
         (lambda ratio, wait: 30.0 + wait, "zero nowhere"),
     ],
 )
-def test_the_heat_map_draws_the_line_where_the_effect_turns_round_if_it_does(effect, told):
+def test_the_heat_map_draws_the_line_where_the_effect_turns_round_if_it_does(effect, expected):
     with styled():
         drawn = HeatMap().draw(two_factor_view(effect), NOTHING_ELSE)
-    assert told in drawn.caption
+    assert expected in drawn.caption
     rows = drawn.csv.decode().splitlines()
     assert rows[0] == "wait_s,ratio,mean_s,band_low_s,band_high_s"
     assert len(rows) == 1 + 12
@@ -427,12 +427,12 @@ def test_the_key_of_the_figure_that_answers_tells_open_from_little():
     many = answered((0.0, 5.0, 9.0), smallest_effect=2.0)
     few = replace(many, low=many.mean - 80.0, high=many.mean + 80.0, persons=4)
 
-    def told(found):
+    def labels_of(found):
         drawn = drawn_answer(found)
         return [text.get_text() for text in drawn.figure.legends[0].get_texts()], drawn.caption
 
-    assert told(many)[0] == ["differs from zero", "too little to matter"]
-    names, words = told(few)
+    assert labels_of(many)[0] == ["differs from zero", "too little to matter"]
+    names, words = labels_of(few)
     assert names == ["open: too few persons (4) to tell"]
     assert words.startswith("Too few persons (4)")
 

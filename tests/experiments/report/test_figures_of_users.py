@@ -76,7 +76,7 @@ def test_one_that_fails_is_left_out_and_told_of_on_the_page_and_as_an_error(resu
 
 
 @pytest.mark.parametrize(
-    ("names", "told"),
+    ("names", "expected"),
     [
         (["Named"], "'Answer 1'; should be small letters"),
         (["Answer"], "'answer' is drawn already"),
@@ -85,8 +85,8 @@ def test_one_that_fails_is_left_out_and_told_of_on_the_page_and_as_an_error(resu
         (["Nowhere"], "no class 'Nowhere'"),
     ],
 )
-def test_one_that_cannot_be_used_is_refused_in_a_line(results, names, told):
-    with pytest.raises(ConfigError, match=told):
+def test_one_that_cannot_be_used_is_refused_in_a_line(results, names, expected):
+    with pytest.raises(ConfigError, match=expected):
         mine(results, *names)
 
 

@@ -10,7 +10,7 @@ ANSWERS = Path(__file__).parents[3] / "experiments" / "answers"
 
 @pytest.mark.soak
 def test_a_few_runs_of_every_published_study_give_what_was_kept(tmp_path):
-    told = call("answers", cwd=tmp_path)
-    assert told.returncode == 0, told.stdout + told.stderr
+    ended = call("answers", cwd=tmp_path)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
     kept = {file.name.partition(".")[0] for file in ANSWERS.glob("*.json")}
-    assert {line.partition(":")[0] for line in told.stdout.splitlines()} == kept
+    assert {line.partition(":")[0] for line in ended.stdout.splitlines()} == kept

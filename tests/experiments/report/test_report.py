@@ -322,7 +322,7 @@ def test_what_does_not_vary_is_said_below_a_table_and_not_in_each_row(text):
 
 
 @pytest.mark.parametrize(
-    ("persons", "factors", "told"),
+    ("persons", "factors", "expected"),
     [
         (6, {}, "Study synthetic: 6 persons"),
         (3, {}, "A smaller version of synthetic: 3 persons"),
@@ -330,7 +330,9 @@ def test_what_does_not_vary_is_said_below_a_table_and_not_in_each_row(text):
         (6, {"link.delay_s": [0.0, 1.0]}, "A smaller version of synthetic: 6 persons"),
     ],
 )
-def test_the_version_that_was_run_is_told_beside_the_usual_size(tmp_path, persons, factors, told):
+def test_the_version_that_was_run_is_told_beside_the_usual_size(
+    tmp_path, persons, factors, expected
+):
     facts = synthetic_results.manifest(
         persons, 2, usual=dict(synthetic_results.manifest(6, 2)["study"])
     )
@@ -339,8 +341,8 @@ def test_the_version_that_was_run_is_told_beside_the_usual_size(tmp_path, person
     kept = facts["study"]["factors"]["link.delay_s"]
     rows = [r for r in synthetic_results.drive_rows(persons, 2) if r["link.delay_s"] in kept]
     reported = size_of(synthetic_results.reading(tmp_path / "r", rows, facts))
-    assert reported.startswith(told)
+    assert reported.startswith(expected)
     if persons != 6:
-        assert "6 persons × 2 trials" in reported[len(told) + 10 :]
+        assert "6 persons × 2 trials" in reported[len(expected) + 10 :]
     if factors:
         assert unnamed(reported, "6 levels of one-way", "(here 2)") == []

@@ -39,7 +39,7 @@ def test_older_results_are_loaded(older):
 
 
 @pytest.mark.parametrize(
-    ("command", "told"),
+    ("command", "expected"),
     [
         ("show .", "dva-sim 0.7.0"),
         ("show .", "too small to tell"),
@@ -47,10 +47,10 @@ def test_older_results_are_loaded(older):
         ("replay recordings/drive-0-0-0.mcap", "dva-sim 0.7.0"),
     ],
 )
-def test_older_results_and_recordings_are_shown(older, command, told):
+def test_older_results_and_recordings_are_shown(older, command, expected):
     done = call(*command.split(), cwd=older)
     assert (done.returncode, done.stderr) == (0, "")
-    assert told in done.stdout
+    assert expected in done.stdout
 
 
 @pytest.mark.system  # draws

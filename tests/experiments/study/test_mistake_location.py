@@ -25,7 +25,7 @@ def complaint_of_study(folder, *settings):
 
 
 @pytest.mark.parametrize(
-    ("setting", "told"),
+    ("setting", "expected"),
     [
         ("person=4", "'persons'"),
         ("robots=3", "'robot.count'"),
@@ -47,10 +47,10 @@ def complaint_of_study(folder, *settings):
         ("parts=3", "not 3"),
     ],
 )
-def test_a_mistake_in_a_setting_of_a_study_is_told_at_that_setting(tmp_path, setting, told):
+def test_a_mistake_in_a_setting_of_a_study_is_told_at_that_setting(tmp_path, setting, expected):
     line = complaint_of_study(tmp_path, "persons=2", setting, "replications=1")
     assert line.startswith(f"--set {setting}: ")
-    assert told in line
+    assert expected in line
     assert "\n" not in line
 
 
@@ -81,7 +81,7 @@ def test_a_mistake_of_the_file_itself_stays_there_whatever_is_set(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("setting", "told"),
+    ("setting", "expected"),
     [
         ("robots=2", "'robot.count'"),
         ("link.delay_s=-1", "at least 0, not -1"),
@@ -89,10 +89,10 @@ def test_a_mistake_of_the_file_itself_stays_there_whatever_is_set(tmp_path):
         ("dva.supervisors=[operator-7]", "'operator-7' is unknown; known: operator-1"),
     ],
 )
-def test_a_mistake_in_a_setting_of_an_episode_is_told_at_that_setting(tmp_path, setting, told):
+def test_a_mistake_in_a_setting_of_an_episode_is_told_at_that_setting(tmp_path, setting, expected):
     path = tmp_path / "one.yaml"
     path.write_text("description: one robot\nhorizon_s: 60\n")
     with pytest.raises(ConfigError) as caught, mistakes_of(str(path), ["horizon_s=5", setting], 1):
         played(EpisodeRequest(str(path), set=["horizon_s=5", setting]))
     assert str(caught.value).startswith(f"--set {setting}: ")
-    assert told in str(caught.value)
+    assert expected in str(caught.value)

@@ -61,7 +61,7 @@ def test_its_persons_and_random_numbers_are_those_of_the_registration_alone(tmp_
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "expected"),
     [
         ("margin: 1.0", "margin: 0.5", "other than registered: hypotheses"),
         ("direction: above", "direction: below", "other than registered: hypotheses"),
@@ -75,13 +75,13 @@ def test_its_persons_and_random_numbers_are_those_of_the_registration_alone(tmp_
     ],
 )
 def test_a_study_changed_after_its_registration_is_exploratory_and_says_in_what(
-    tmp_path, old, new, told
+    tmp_path, old, new, expected
 ):
     path = registered(tmp_path)
     path.write_text(CLAIMED.replace(old, new))
     study = load_study(path)
     assert study.status.kind == "exploratory"
-    assert any(told in reason for reason in study.status.why)
+    assert any(expected in reason for reason in study.status.why)
     assert study.seed == 3
 
 

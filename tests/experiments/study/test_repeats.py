@@ -108,14 +108,14 @@ def test_repeats_that_cannot_be_meant_are_refused(tmp_path, old, new, names):
 
 
 @pytest.mark.parametrize(
-    ("bands", "told"),
+    ("bands", "expected"),
     [
         ("{patience: [1, 2]}", "'patience'.* perceptual_delay_s, "),
         ("{hand_lag_s: [0, 0.2]}", "above zero"),
     ],
 )
-def test_a_band_of_an_unknown_trait_or_one_that_reaches_zero_is_refused(tmp_path, bands, told):
+def test_a_band_of_an_unknown_trait_or_one_that_reaches_zero_is_refused(tmp_path, bands, expected):
     study = kit.study_in(tmp_path, text=kit.REPEATED)
     (tmp_path / "bands.yaml").write_text(f"bands: {bands}\n")
-    with pytest.raises(ConfigError, match=told):
+    with pytest.raises(ConfigError, match=expected):
         parameter_sets(study)

@@ -468,7 +468,7 @@ def snapshot(core: Dva) -> dict[str, Any]:
         "grants": permissions.grants,
         "observers": permissions.observers,
         "sessions": permissions.count,
-        "untold": core.sessions.unacknowledged,
+        "unacknowledged": core.sessions.unacknowledged,
     }
 
 

@@ -44,7 +44,7 @@ SETTLED = 0.01  # after this, what somebody said in answer has arrived [s]
 Point = tuple[float, float]
 
 
-class Told(NamedTuple):
+class Received(NamedTuple):
     """Message received by the DVA: time [s], sender and body."""
 
     time: float
@@ -60,7 +60,7 @@ class PretendedDva:
         changes: Changes of the scenario, by dotted key.
 
     Attributes:
-        told: Messages received, without registrations.
+        received: Messages received, without registrations.
         there: Kinds of what is there, wherever a guard of this DVA looks.
         contained: Kinds and places of the events that guards contained.
     """
@@ -79,7 +79,7 @@ class PretendedDva:
             field.robots[robot.device.id_tag] = robot
         self.device = self.stage.device("dva", 1)
         self.device.serve(self._hear)
-        self.told: list[Told] = []
+        self.received: list[Received] = []
         self.there: set[str] = set()
         self.contained: list[tuple[str, Point]] = []
         self.sessions: dict[str, m.PermissionGrant] = {}
@@ -178,7 +178,7 @@ class PretendedDva:
         """States of the order and findings reported for an event, in order."""
         return [
             entry.body.state if isinstance(entry.body, m.OrderProgress) else entry.body.finding
-            for entry in self.told
+            for entry in self.received
             if isinstance(entry.body, m.OrderProgress | m.EventReport)
             and entry.body.event_id == event
         ]
@@ -187,20 +187,20 @@ class PretendedDva:
         """Time of the first report of a state or finding of an event [s]."""
         return next(
             entry.time
-            for entry in self.told
+            for entry in self.received
             if word in (getattr(entry.body, "state", None), getattr(entry.body, "finding", None))
             and getattr(entry.body, "event_id", None) == event
         )
 
     def bids(self) -> list[m.TaskBid]:
-        return [entry.body for entry in self.told if isinstance(entry.body, m.TaskBid)]
+        return [entry.body for entry in self.received if isinstance(entry.body, m.TaskBid)]
 
     # --- what it hears -----------------------------------------------------------------
 
     def _hear(self, message: m.Message) -> m.Reply:
         body = message.body
         if not isinstance(body, m.Registration | m.GetGrant):
-            self.told.append(Told(self.now, message.source, body))
+            self.received.append(Received(self.now, message.source, body))
         if isinstance(body, m.PermissionRequest):
             held = self.sessions.get(body.device)
             if held is not None and held.holder != message.source:

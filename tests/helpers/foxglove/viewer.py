@@ -38,7 +38,7 @@ class Viewer:
             with contextlib.suppress(ConnectionClosed):
                 for data in socket:
                     if isinstance(data, str):
-                        self._told(json.loads(data))
+                        self._take(json.loads(data))
                     elif data[0] == MESSAGE_DATA:
                         topic = self._topics[int.from_bytes(data[1:5], "little")]
                         time = int.from_bytes(data[5:13], "little")
@@ -46,14 +46,14 @@ class Viewer:
                     elif data[0] == TIME:
                         self.times.append(int.from_bytes(data[1:9], "little"))
 
-    def _told(self, told: dict) -> None:
-        if told["op"] == "serverInfo":
-            self.info = told
-        for channel in told.get("channels", ()) if told["op"] == "advertise" else ():
+    def _take(self, message: dict) -> None:
+        if message["op"] == "serverInfo":
+            self.info = message
+        for channel in message.get("channels", ()) if message["op"] == "advertise" else ():
             self.channels[channel["topic"]] = channel
             if self._wants(channel["topic"]):
                 self._subscribe(channel)
-        if told["op"] == "status" and told.get("level", 0) > 0 and self._tries < MOST_TRIES:
+        if message["op"] == "status" and message.get("level", 0) > 0 and self._tries < MOST_TRIES:
             # The server may advertise a channel a moment before it knows it itself.
             self._tries += 1
             time.sleep(0.05)

@@ -162,7 +162,7 @@ def in_virtual_time(way: Way = one_by_one, **changes: object) -> list[Decided]:
     return _act_out(_stage(_quick_network(), changes), way)
 
 
-def told_in_virtual_time(**changes: object) -> list[str]:
+def story_in_virtual_time(**changes: object) -> list[str]:
     """Timeline of the operator in such a session."""
     stage = _stage(_quick_network(), changes)
     _act_out(stage, one_by_one)

@@ -10,7 +10,7 @@ from helpers.processes import patience
 PATHS = [str(TESTS), str(ROOT)]
 
 
-def told_here_and_elsewhere(program: str) -> tuple[str, str]:
+def run_here_and_elsewhere(program: str) -> tuple[str, str]:
     """Outputs of a program in both processes; it can import the test helpers."""
     here = io.StringIO()
     with redirect_stdout(here):

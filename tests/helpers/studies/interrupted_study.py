@@ -233,14 +233,14 @@ def disk(folder: Path) -> dict[str, Any]:
         mount(small, size, "remount")
     equal = kit.files(small / "out") == kit.files(plain)
     (small / "ballast").write_bytes(bytes(shutil.disk_usage(small).free))
-    report = told_by(lambda: write_report(small / "out"))
+    report = errors_of(lambda: write_report(small / "out"))
     (small / "ballast").unlink()
     mount(small, 64 * 1024, "remount")
     write_report(small / "out")
     write_report(plain)
     pages = {(folder / "report.html").read_bytes() for folder in (small / "out", plain)}
     return {
-        "told": reports,
+        "errors": reports,
         "equal": equal,
         "report": report,
         "report equal": len(pages) == 1,
@@ -253,7 +253,7 @@ def mount(where: Path, size_kb: int, *options: str) -> None:
     subprocess.run(["mount", "-t", "tmpfs", "-o", words, "tmpfs", where], check=True)
 
 
-def told_by(work: Callable[[], object]) -> str:
+def errors_of(work: Callable[[], object]) -> str:
     try:
         work()
     except DvaSimError as error:

@@ -65,7 +65,7 @@ def drive(
     seconds: float,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
     stop_before: float = 0.3,
-    told: Callable[[float], float] | None = None,
+    reported_delay: Callable[[float], float] | None = None,
     frame: float = FRAME,
 ) -> list[At]:
     """Drive a robot that does at once what it was asked for `delay` [s] ago.
@@ -76,7 +76,7 @@ def drive(
         seconds: Length of the drive [s].
         start: Pose [m, rad].
         stop_before: So far before the end [m].
-        told: Delay as the person perceives it, by time [s]; by default the true one.
+        reported_delay: Delay as the person perceives it, by time [s]; by default the true one.
         frame: From one to the next [s].
     """
     x, y, heading = start
@@ -87,7 +87,7 @@ def drive(
         now = number * frame
         speed, turn = asked[-late - 1] if number and late < len(asked) else (0.0, 0.0)
         seen = Observation(round(1000 * now), x, y, heading, speed, turn, ())
-        view = View(now, seen, told(now) if told else delay)
+        view = View(now, seen, reported_delay(now) if reported_delay else delay)
         wanted = strategy.drive(route, view, stop_before)
         asked.append(wanted)
         track.append(At(now, x, y, heading, wanted))

@@ -40,7 +40,7 @@ class Robot:
     body: RobotBody
     around: Surrounded
     pilot: Pilot
-    told: list[tuple[float, PilotStep]] = field(default_factory=list)
+    steps: list[tuple[float, PilotStep]] = field(default_factory=list)
     speeds: list[float] = field(default_factory=list)
 
     @property
@@ -49,22 +49,22 @@ class Robot:
 
     @property
     def over(self) -> bool:
-        return bool(self.told) and self.told[-1][1].state in ("done", "failed")
+        return bool(self.steps) and self.steps[-1][1].state in ("done", "failed")
 
     @property
     def end(self) -> tuple[str, str]:
         """State and reason of what was told last."""
-        step = self.told[-1][1]
+        step = self.steps[-1][1]
         return step.state, step.reason
 
     def states(self) -> list[str]:
-        return [step.state for _, step in self.told]
+        return [step.state for _, step in self.steps]
 
     def reasons(self) -> set[str]:
-        return {step.reason for _, step in self.told}
+        return {step.reason for _, step in self.steps}
 
     def when(self, state: str) -> float:
-        return next(time for time, step in self.told if step.state == state)
+        return next(time for time, step in self.steps if step.state == state)
 
 
 class Fleet:
@@ -134,8 +134,8 @@ class Fleet:
             return
         step = robot.pilot.step(self._seen(robot))
         robot.body.drive(*step.intent, self.now + 2 * PERIOD)
-        if not robot.told or robot.told[-1][1][1:] != step[1:]:
-            robot.told.append((self.now, step))
+        if not robot.steps or robot.steps[-1][1][1:] != step[1:]:
+            robot.steps.append((self.now, step))
 
     def _seen(self, robot: Robot) -> Sensed:
         body, pose = robot.body, robot.body.pose()

@@ -46,20 +46,20 @@ def test_a_tuned_send_buffer_grows_with_the_congestion_window():
     assert 46_080 < buffer.limit <= 2 * (window + 1) * 2304
 
 
-@pytest.mark.parametrize("is_told", [True, False])
-def test_a_program_that_does_not_read_closes_the_window_and_what_it_reads_opens_it(is_told):
+@pytest.mark.parametrize("is_announced", [True, False])
+def test_a_program_that_does_not_read_closes_the_window_and_what_it_reads_opens_it(is_announced):
     """If the window update is lost, a probe asks for it."""
     pair = Pair(peer=options(receive_buffer=4096), reads=False)
     pair.write_at([1.0 + number / 100 for number in range(20)], 1000)
     pair.clock.run(5.0)
     assert pair.peer.readable == pair.opener.sender.next == 4096
     pair.peer.on_readable = pair.read
-    if not is_told:
+    if not is_announced:
         pair.at(5.999, pair.back.lose, 1)
     pair.at(6.0, pair.read)
     pair.clock.run(30.0)
     assert sum(count for _, count in pair.arrivals) == 20_000
-    assert (pair.arrivals[1][0] == pytest.approx(6.1)) is is_told
+    assert (pair.arrivals[1][0] == pytest.approx(6.1)) is is_announced
 
 
 def test_a_slowly_reading_program_gets_no_tiny_segments():

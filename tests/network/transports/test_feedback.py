@@ -67,7 +67,7 @@ def test_without_any_answer_everything_is_given_up_after_the_first_second():
     assert feedback.give_up() == [0, 1]
 
 
-class Told:
+class RecordingLaw:
     """Congestion law that records its input."""
 
     gap = 0.5
@@ -86,7 +86,7 @@ class Told:
 
 
 def test_a_law_hears_of_one_loss_per_round_trip_however_many_there_were():
-    law, feedback = Told(), Feedback()
+    law, feedback = RecordingLaw(), Feedback()
     pace = Pace(law, feedback)
     feedback.sent(0.0, 0)
     feedback.acknowledged(0.2, [(0, 0.0)])
@@ -97,7 +97,7 @@ def test_a_law_hears_of_one_loss_per_round_trip_however_many_there_were():
 
 
 def test_a_law_hears_of_a_round_trip_once_it_has_passed_with_the_mean_of_its_samples():
-    law, feedback = Told(), Feedback()
+    law, feedback = RecordingLaw(), Feedback()
     pace = Pace(law, feedback)
     for now, number in ((0.0, 0), (0.2, 1), (0.3, 2)):
         feedback.sent(now, number)
@@ -109,7 +109,7 @@ def test_a_law_hears_of_a_round_trip_once_it_has_passed_with_the_mean_of_its_sam
 
 
 def test_before_the_first_answer_ten_datagrams_may_go_and_then_one_per_time_out():
-    pace, gaps = Pace(Told(), Feedback()), []
+    pace, gaps = Pace(RecordingLaw(), Feedback()), []
     for _ in range(12):
         gaps.append(pace.gap)
         pace.sent()

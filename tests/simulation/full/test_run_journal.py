@@ -15,7 +15,7 @@ from dva_sim.simulation.scenario import build, load
 KEPT = 5  # entries of each list of a drive that are not forgotten
 
 
-def told(tables):
+def plain(tables):
     """Tables as text, so that what is missing is equal to what is missing."""
     return json.dumps(tables, sort_keys=True)
 
@@ -50,8 +50,8 @@ def test_tables_from_the_journal_are_those_of_the_run(name, until, changes):
     whole.clock.run(until)
     expected = whole.recording()
     found = recording_of(scenario, 3, journaled(scenario, 3, until))
-    assert told(tables_of(found)) == told(tables_of(expected))
-    assert told(drive_tables(found)) == told(drive_tables(expected))
+    assert plain(tables_of(found)) == plain(tables_of(expected))
+    assert plain(drive_tables(found)) == plain(drive_tables(expected))
     assert expected.recorder.drives
 
 

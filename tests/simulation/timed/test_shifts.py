@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.processes.second_process import told_here_and_elsewhere
+from helpers.processes.second_process import run_here_and_elsewhere
 
 from dva_sim.core.dispatch import known_policies
 from dva_sim.kernel.yaml_files import load_yaml
@@ -357,7 +357,7 @@ print(recording.counters, [dict(u.spent) for u in recording.units])
 @pytest.mark.system
 def test_the_same_seed_gives_the_same_bytes_in_two_processes():
     scenario = MIXED | {"dispatch": {"policy": "random"}}
-    here, elsewhere = told_here_and_elsewhere(PROGRAM.format(scenario=scenario))
+    here, elsewhere = run_here_and_elsewhere(PROGRAM.format(scenario=scenario))
     assert here == elsewhere
     assert len(here) > 10_000
 

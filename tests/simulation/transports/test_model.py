@@ -57,7 +57,7 @@ def test_who_sees_a_picture_per_second_drives_slower():
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "expected"),
     [
         ({"transport": BTP}, "'transport.longest_gap_s'"),
         ({"transport.kind": "rtnp"}, "'transport.header_bytes'"),
@@ -67,8 +67,8 @@ def test_who_sees_a_picture_per_second_drives_slower():
         ({"operator.strategy": "nobody"}, "nobody"),
     ],
 )
-def test_a_mistake_is_told(changes, told):
-    with pytest.raises(ConfigError, match=told):
+def test_a_mistake_is_told(changes, expected):
+    with pytest.raises(ConfigError, match=expected):
         build(shipped(), changes)
 
 

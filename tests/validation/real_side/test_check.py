@@ -50,7 +50,7 @@ def test_a_link_that_is_two_milliseconds_late_is_found_out():
     assert not any(finding.passed for finding in find_delay(late(right, 0.002)))
 
 
-def told(other: LinkConfig, by: Crossing) -> Crossing:
+def over(other: LinkConfig, by: Crossing) -> Crossing:
     """Same datagrams under different settings of the link."""
     return Crossing(other, by.size, by.sent, by.numbers, by.arrived)
 
@@ -58,18 +58,18 @@ def told(other: LinkConfig, by: Crossing) -> Crossing:
 def test_a_link_that_loses_too_few_is_found_out():
     few = crossing(fast(loss=0.07), 4000, 5e-4)
     assert find_loss(few)[0].passed
-    assert not find_loss(told(fast(loss=0.1), few))[0].passed
+    assert not find_loss(over(fast(loss=0.1), few))[0].passed
 
 
 def test_single_losses_are_not_taken_for_bursts():
     single = crossing(fast(loss=0.1), 4000, 5e-4)
-    assert not find_bursts(told(fast(loss=0.1, bursts=Bursts(mean_packets=4)), single))[0].passed
+    assert not find_bursts(over(fast(loss=0.1, bursts=Bursts(mean_packets=4)), single))[0].passed
 
 
 def test_a_line_that_is_three_percent_slow_is_found_out():
     slow = crossing(LinkConfig(rate_bps=0.97e6, queue_packets=400), 250, 4e-3, 1000)
     assert find_rate(slow)[0].passed
-    assert not find_rate(told(LinkConfig(rate_bps=1e6), slow))[0].passed
+    assert not find_rate(over(LinkConfig(rate_bps=1e6), slow))[0].passed
 
 
 def test_jitter_that_keeps_the_order_is_not_taken_for_free_jitter():
