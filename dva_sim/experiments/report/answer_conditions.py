@@ -84,13 +84,13 @@ def _assumptions(reading: ResultsReading, finding: Finding) -> str:
     if not get(reading.scenario_of(finding.part), STRATEGY):
         return ""
     count = len(all_assumptions())
-    told = f"{count} numbers about people and phones are assumed (dva-sim assumed)."
+    text = f"{count} numbers about people and phones are assumed (dva-sim assumed)."
     effects = kept_effects(_MOST_KEYS)
     if not effects:
-        return f"{told} Which of them move such an answer: dva-sim screen {MAIN}."
+        return f"{text} Which of them move such an answer: dva-sim screen {MAIN}."
     clear = [effect.key for effect in effects if effect.is_clear]
     moved = f"{listing(clear)} moved" if clear else "none of them moved"
-    return f"{told} In the screening of {MAIN} {moved} the answer by more than chance."
+    return f"{text} In the screening of {MAIN} {moved} the answer by more than chance."
 
 
 def _how(view: StudyView, finding: Finding) -> str:

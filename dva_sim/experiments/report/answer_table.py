@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def answer_table(reading: Reading) -> CellTable | None:
     """A row for each level that the answer runs over; None where it has no contrast."""
-    view, finding = reading.view, reading.told
+    view, finding = reading.view, reading.worded_finding
     if view is None or finding is None or not finding.over:
         return None
     first, second = (_means(view, level) for level in (finding.first, finding.second))

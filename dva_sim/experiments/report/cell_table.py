@@ -96,7 +96,7 @@ def cell_table(
     empty = 0 if is_listed else ran.count(False)
     heads = [*names, *(head for head, _ in there)]
     whole = CellTable(part.name, heads, len(names) + len(points), rows, empty)
-    return replace(_told_once(whole), note=_note(whole, _what_is_covered(support)))
+    return replace(_without_constants(whole), note=_note(whole, _what_is_covered(support)))
 
 
 def _constant(table: CellTable) -> list[int]:
@@ -107,7 +107,7 @@ def _constant(table: CellTable) -> list[int]:
     return [n for n in columns if len({row[n] for row in table.rows}) == 1]
 
 
-def _told_once(table: CellTable) -> CellTable:
+def _without_constants(table: CellTable) -> CellTable:
     """Without the columns that do not vary."""
     kept = [n for n in range(len(table.heads)) if n not in _constant(table)]
     heads, rows = [table.heads[n] for n in kept], [[row[n] for n in kept] for row in table.rows]

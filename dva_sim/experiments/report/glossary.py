@@ -22,13 +22,13 @@ class Term:
     Attributes:
         name: Term as the list has it.
         means: In one sentence, without its full stop.
-        said: Pattern of how it is said in a text, if otherwise than its name.
+        regex: Pattern of how it is said in a text, if otherwise than its name.
         in_reports: False for words that only the documentation explains.
     """
 
     name: str
     means: str
-    said: str = ""
+    regex: str = ""
     in_reports: bool = True
 
     @property
@@ -39,7 +39,7 @@ class Term:
     @property
     def pattern(self) -> str:
         """Regular expression that matches the term."""
-        return self.said or rf"\b{re.escape(self.name)}\b"
+        return self.regex or rf"\b{re.escape(self.name)}\b"
 
 
 def _called(kind: type[Pattern]) -> str:

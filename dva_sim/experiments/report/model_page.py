@@ -49,7 +49,7 @@ class ModelPage:
         """True if the page suits this kind of study."""
         return True
 
-    def told(self, finding: Finding) -> Finding:
+    def worded(self, finding: Finding) -> Finding:
         """The finding in the words of this page."""
         return replace(finding, cluster=self.cluster)
 
@@ -60,7 +60,7 @@ class ModelPage:
                 "The contrast that would answer the question was not declared or not run; "
                 "the figures and the table show what was."
             )
-        return answer(self.told(finding))
+        return answer(self.worded(finding))
 
     def cells(self, part: RunGrid) -> CellTable | None:
         """Every cell of a part, where the page has a table of its own for it."""

@@ -126,9 +126,9 @@ class ResultsReading:
         )
 
     @property
-    def told(self) -> Finding | None:
+    def worded_finding(self) -> Finding | None:
         """The finding in the words of the report: where loads are known, along them."""
-        return None if self.finding is None else self.page.told(self.finding)
+        return None if self.finding is None else self.page.worded(self.finding)
 
     @cached_property
     def page(self) -> ModelPage:

@@ -74,7 +74,7 @@ class ShiftPage(ModelPage):
         """True if the study compares policies."""
         return is_dispatch(view)
 
-    def told(self, finding: Finding) -> Finding:
+    def worded(self, finding: Finding) -> Finding:
         """Along the load of people, where that is known."""
         return _along_loads(finding, self.shifts)
 

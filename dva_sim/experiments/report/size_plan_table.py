@@ -15,7 +15,7 @@ def plan_table(found: Sequence[SizePlan], cluster: str) -> CellTable:
     heads = ["to show", "if the true difference is"]
     heads += [f"{cluster}s for {100 * p:.0f} % power" for p in POWERS]
     rows = [
-        [f"{p.name}: {p.what}", p.assumed, *(map(_told, p.counts) if p.counts else _NEVER)]
+        [f"{p.name}: {p.what}", p.assumed, *(map(_count_text, p.counts) if p.counts else _NEVER)]
         for p in found
     ]
     return CellTable("", heads, len(heads), rows, note=_assumes(found, cluster))
@@ -37,13 +37,13 @@ def _line(plan: SizePlan, cluster: str) -> str:
     if not plan.counts:
         return "no number of them, for it is not true then"
     needed = [
-        f"{_told(count)} {cluster}s for {100 * wanted:.0f} % power"
+        f"{_count_text(count)} {cluster}s for {100 * wanted:.0f} % power"
         for count, wanted in zip(plan.counts, POWERS, strict=True)
     ]
     return ", ".join(needed)
 
 
-def _told(count: Count) -> str:
+def _count_text(count: Count) -> str:
     return f"{_persons(count.persons)} ({_persons(count.low)} to {_persons(count.high)})"
 
 

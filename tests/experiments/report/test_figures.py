@@ -463,14 +463,14 @@ def test_who_does_not_drive_has_no_delay_budget(view):
 def test_what_a_command_stands_longer_while_a_request_is_open_is_the_patterns_cost(view):
     """At a phone of 10 Hz: every run made 100 commands, of which 20 went under REQ/REP."""
     runs, asks = view.part.treated, view.part.treated["pattern"] == "req-rep"
-    stands = np.where(asks, 0.25, 0.05)
+    in_force = np.where(asks, 0.25, 0.05)
     fates = {"sent": np.where(asks, 20, 100), "superseded": np.where(asks, 80, 0)}
     fates |= {"applied": fates["sent"]}
     known = {f"commands_{fate}": values for fate, values in fates.items()}
-    changed = with_columns(view, delay_sampling_s=stands, delay_pattern_s=0 * stands, **known)
+    changed = with_columns(view, delay_sampling_s=in_force, delay_pattern_s=0 * in_force, **known)
     stages = stages_of(changed)
     loop = sum(np.nan_to_num(runs[n]) for n in runs if n.startswith("delay_") and n not in DRAWN)
-    grid = changed.part.laid_out(loop - runs["delay_sampling_s"] + stands)
+    grid = changed.part.laid_out(loop - runs["delay_sampling_s"] + in_force)
     np.testing.assert_allclose(sum(stages.values()), grid)  # as the columns add up
     for level, wait in (("req-rep", 0.2), ("latest-wins", 0.0)):
         where = {"pattern": level, "profile": "default"}

@@ -37,9 +37,11 @@ class AnswerFigure(style.ReportFigure):
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
-        if view.contrast is None or reading.told is None:
+        if view.contrast is None or reading.worded_finding is None:
             return None
-        return self.contrast(reading.told, view.difference(view.panels[0], *view.contrast))
+        return self.contrast(
+            reading.worded_finding, view.difference(view.panels[0], *view.contrast)
+        )
 
     def contrast(self, finding: Finding, differences: Floats) -> style.Drawn | None:
         """The difference alone; None where no interval can be given.

@@ -75,7 +75,7 @@ def stages_of(view: StudyView) -> dict[str, Floats]:
     found = {name: part.grid(name) for name in _NAMES if part.has(name)}
     if not part.has("delay_sampling_s"):
         return found
-    stands, wait = part.grid("delay_sampling_s"), np.zeros_like(part.grid("delay_sampling_s"))
+    in_force, wait = part.grid("delay_sampling_s"), np.zeros_like(part.grid("delay_sampling_s"))
     if part.has("commands_superseded"):
         fates = ("sent", "superseded", "applied", "stale")
         sent, replaced, applied, stale = (
@@ -83,9 +83,9 @@ def stages_of(view: StudyView) -> dict[str, Floats]:
         )
         # Of those replaced some were sent already, and skipped by the robot.
         unsent = np.maximum(replaced - np.maximum(sent - applied - stale, 0.0), 0.0)
-        wait = stands * unsent / np.maximum(sent + unsent, 1.0)
+        wait = in_force * unsent / np.maximum(sent + unsent, 1.0)
     before = part.grid("delay_pattern_s") if part.has("delay_pattern_s") else 0.0
-    found |= {"delay_period_s": stands - wait, "delay_wait_s": wait + before}
+    found |= {"delay_period_s": in_force - wait, "delay_wait_s": wait + before}
     return {name: found[name] for name in _NAMES if name in found}
 
 

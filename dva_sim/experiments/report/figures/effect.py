@@ -70,7 +70,7 @@ class Differences(style.ReportFigure):
 
 def _few_words(reading: Reading) -> str:
     """Warn that overlapping bars show no equality when there are too few persons."""
-    found = getattr(reading, "told", None)
+    found = getattr(reading, "worded_finding", None)
     if found is None or not found.has_too_few:
         return ""
     few = capital(too_few(found.persons, found.cluster))

@@ -77,7 +77,7 @@ def _unit_of(trace: Trace) -> LengthUnit:
 def _title(scenario: TaskScenario, row: Row) -> str:
     link, kind = scenario.link, capital(scenario.task.kind)
     count = len(list(scenario.task.conditions())) * scenario.trials
-    conditions = ", ".join(_told(key, row[key]) for key in list(row)[2:4])
+    conditions = ", ".join(_condition_text(key, row[key]) for key in list(row)[2:4])
     done = "done" if row["completed"] else "not done"
     late = f"delay {link.up.delay_s:g} s up and {link.down.delay_s:g} s down"
     return (
@@ -93,7 +93,7 @@ def name_and_unit(key: str) -> tuple[str, str]:
     return name, unit.replace("_", "/")
 
 
-def _told(key: str, value: float) -> str:
+def _condition_text(key: str, value: float) -> str:
     """A condition in words: `width 6.8 mm`."""
     name, unit = name_and_unit(key)
     if unit == "m" and value < 1.0:
