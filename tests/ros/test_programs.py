@@ -8,7 +8,7 @@ from helpers.foxglove.viewer import Viewer
 from helpers.processes.patience import becomes
 from helpers.processes.programs import all_gone_after
 from helpers.ros.ros_machine import RosMachine
-from helpers.ros.served_world import Stranger
+from helpers.ros.served_world import ScriptedRosClient
 from helpers.wording import unnamed
 
 from dva_sim.console.robots.robot_station import two_free_ports
@@ -66,7 +66,7 @@ def test_clients_of_ros_and_foxglove_see_what_runs(programs, command):
     pytest.importorskip("foxglove", reason="needs Foxglove's SDK: pip install 'dva-sim[foxglove]'")
     more = ("--for", "300") if command == "live" else ("--no-open", "--port", "0")
     run = programs.start(*(command, "fire-drill", "--rosbridge", "0", "--foxglove", "0"), *more)
-    client = Stranger(address(run, "rosbridge"))
+    client = ScriptedRosClient(address(run, "rosbridge"))
     viewer = Viewer(address(run, "Foxglove"))
     assert becomes(lambda: client.is_open)
     topics = "/robot_1/odom", "/robot_1/image/compressed", "/clock"

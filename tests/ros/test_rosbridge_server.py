@@ -8,7 +8,7 @@ import socket
 import threading
 
 import pytest
-from helpers.ros.served_world import ServedWorld, Stranger
+from helpers.ros.served_world import ScriptedRosClient, ServedWorld
 from helpers.wording import unnamed
 from websockets.exceptions import ConnectionClosed
 
@@ -183,12 +183,12 @@ def test_without_its_token_or_from_a_page_of_another_site_nobody_is_let_in(world
     assert world.client(f"{bare}?token=x{token[1:]}").refused == 401
     port = bare.rpartition(":")[2]
     for page in ({"Origin": "http://evil.example"}, {"Origin": "null"}):
-        strange = Stranger(world.url, **page)
+        strange = ScriptedRosClient(world.url, **page)
         world.until(lambda asked=strange: asked.refused)
         assert strange.refused == 403
-    own = Stranger(world.url, Origin=f"http://localhost:{port}")
+    own = ScriptedRosClient(world.url, Origin=f"http://localhost:{port}")
     world.until(lambda: own.is_open)
-    shown = Stranger(bare, Authorization=f"Bearer {token}")
+    shown = ScriptedRosClient(bare, Authorization=f"Bearer {token}")
     world.until(lambda: shown.is_open)
 
 

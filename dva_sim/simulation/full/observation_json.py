@@ -115,18 +115,18 @@ def _read_places(time: float, content: Mapping[str, Any]) -> o.PlaceNews:
     )
 
 
-def _write_book(fact: o.BookNews) -> Plain:
+def _write_events(fact: o.BookNews) -> Plain:
     rights = None if fact.rights is None else [right._asdict() for right in fact.rights]
-    return _BOOK.write(fact) | {"rights": rights}
+    return _EVENTS.write(fact) | {"rights": rights}
 
 
-def _read_book(time: float, content: Mapping[str, Any]) -> o.BookNews:
+def _read_events(time: float, content: Mapping[str, Any]) -> o.BookNews:
     rights = content["rights"] and [o.Right(**right) for right in content["rights"]]
-    news: o.BookNews = _BOOK.read(time, content)
+    news: o.BookNews = _EVENTS.read(time, content)
     return news._replace(rights=rights)
 
 
-_BOOK: Final = _as_named(o.BookNews)
+_EVENTS: Final = _as_named(o.BookNews)
 
 FORMS: Final[dict[str, _Form]] = {
     "arrived": _Form(o.Arrived, _write_arrived, _read_arrived),
@@ -135,7 +135,7 @@ FORMS: Final[dict[str, _Form]] = {
     "by_hand": _as_named(ByHand),
     "moves": _Form(o.MotionNews, _write_moves, _read_moves),
     "places": _Form(o.PlaceNews, _write_places, _read_places),
-    "book": _Form(o.BookNews, _write_book, _read_book),
+    "book": _Form(o.BookNews, _write_events, _read_events),
     "deafened": _as_named(o.Deafened),
     "slowed": _as_named(o.Slowed, processing="processing_s"),
     "gap": _as_named(o.FactGap),

@@ -60,8 +60,8 @@ class ServedWorld:
         robots = self.world.run.field.robots.values()
         return next(robot for robot in robots if robot.device.label == label)
 
-    def client(self, url: str = "") -> "Stranger":
-        client = Stranger(url or self.url)
+    def client(self, url: str = "") -> "ScriptedRosClient":
+        client = ScriptedRosClient(url or self.url)
         self.until(lambda: client.is_open or client.refused)
         return client
 
@@ -70,7 +70,7 @@ class ServedWorld:
         self.world.phones.close()
 
 
-class Stranger:
+class ScriptedRosClient:
     """A client of rosbridge that knows the protocol and nothing of us.
 
     Attributes:
