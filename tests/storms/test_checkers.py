@@ -211,12 +211,12 @@ def test_a_robot_that_its_holder_keeps_for_long_is_probed_as_long_as_any_other()
     """It is given back 5 s before the storm would end; its operator is silent, and no rival."""
 
     def keeps(storm: Storm):
-        desk, robot = storm.run.dva.desk, storm.robots[0].id
+        core, robot = storm.run.dva.core, storm.robots[0].id
         for device in storm.run.stage.devices:
             device.silent |= device.id_tag in storm.operators
-        enter(desk, robot, m.PermissionGrant(OTHER, "both", 1 << 33))
+        enter(core, robot, m.PermissionGrant(OTHER, "both", 1 << 33))
         given_back = storm.plan.horizon_s - 5.0
-        storm.run.clock.call_at(given_back, desk.sessions.permissions.end, 1 << 33)
+        storm.run.clock.call_at(given_back, core.sessions.permissions.end, 1 << 33)
 
     plan = replace(StormPlan(1, SMALL, (), 0.0), calm_s=60.0)
     outcome = play(plan, lambda storm: storm.run.clock.call_at(90.0, keeps, storm))

@@ -166,7 +166,7 @@ class Office:
     def finds(
         self, who: str, finding: str, now: float = 0.0, event: int = 1
     ) -> tuple[m.Reply, list[Send]]:
-        known = self.desk.book.get(event)
+        known = self.core.events.get(event)
         kind, place = ("fire", east(12)) if known is None else (known.kind, known.position)
         return self.say(who, m.EventReport(event, kind, place, 0.5, 0.9, finding), now)
 

@@ -401,7 +401,7 @@ class Walk:
         for state in ("departed", "arrived"):
             self._take(self.say(who, m.OrderProgress(event, state)))
         finding = "contained" if task == "contain" else "confirmed"
-        known = self.desk.book.get(event)
+        known = self.core.events.get(event)
         kind, place = ("fire", east(0)) if known is None else (known.kind, known.position)
         self._take(self.say(who, m.EventReport(event, kind, place, 0.5, 1.0, finding)))
         self._take(self.say(who, m.OrderProgress(event, "done")))
