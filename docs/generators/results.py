@@ -12,7 +12,7 @@ from typing import Any
 from dva_sim.cli.names import everything
 from dva_sim.experiments.report.kept_answers import HISTORY, KeptAnswer, all_kept
 from dva_sim.kernel.units import unit_of
-from dva_sim.kernel.wording import capital, number, quantity
+from dva_sim.kernel.wording import capital, first_and_rest, number
 from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
 from generators.markdown import ROOT, code, prose, shell, table
@@ -113,16 +113,8 @@ def _found(answer: KeptAnswer | None) -> list[str]:
 
 
 def _headline(answer: KeptAnswer) -> str:
-    """Return the contrast at its last level if levels are quantities; else the first sentence."""
-    if answer.contrast is None or not answer.rows or isinstance(answer.rows[-1].level, str):
-        return prose(answer.answer.partition(". ")[0].removesuffix("."))
-    row, unit = answer.rows[-1], unit_of(answer.measure)
-    first, second = answer.contrast
-    where = f" ({_level(answer, -1)})" if answer.over else ""
-    return prose(
-        f"{first} minus {second} in {measure_name(answer.measure)}{where}: "
-        f"{quantity(row.mean, unit)} ({number(row.low)} to {number(row.high)})"
-    )
+    """Return the first sentence of the answer, as its report begins."""
+    return prose(first_and_rest(answer.answer)[0])
 
 
 def _status(answer: KeptAnswer) -> str:

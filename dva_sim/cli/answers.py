@@ -12,6 +12,7 @@ from dva_sim import __version__
 from dva_sim.cli.options import Jobs, argument, asks, flag, several
 from dva_sim.kernel.errors import ConfigError, ExitCode
 from dva_sim.kernel.suggestions import hint
+from dva_sim.kernel.wording import first_and_rest
 
 if TYPE_CHECKING:
     from dva_sim.experiments.report.kept_answers import KeptAnswer
@@ -68,7 +69,7 @@ def _compare(folder: Path, studies: list[str], mark: bool, jobs: int | None) -> 
     code = ExitCode.OK
     for answer in kept:
         lines, is_stale = _described(answer, now.get(answer.study, {}))
-        print(f"{answer.study}: {lines}")
+        print(f"{answer.study}: {lines}. {first_and_rest(answer.answer)[0]}")
         if is_stale and not answer.stale_since:
             if mark:
                 _mark(answer, folder)

@@ -1,8 +1,9 @@
-"""Numbers and lists in words, as reports, tables and the terminal print them."""
+"""Numbers, lists and sentences in words, as reports, tables and the terminal print them."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 
 from dva_sim.kernel.units import ending_of
@@ -45,6 +46,12 @@ def percent(share: float) -> str:
         return "–"
     text = f"{100 * share:.0f}" if share == 0 or 0.01 <= share <= 0.99 else f"{100 * share:.1f}"
     return f"{text.removesuffix('.0')}\N{NO-BREAK SPACE}%"
+
+
+def first_and_rest(text: str) -> tuple[str, str]:
+    """The first sentence, and the rest, which begins with a capital letter; empty without one."""
+    first, *rest = re.split(r"(?<=[.]) (?=[A-Z])", text, maxsplit=1)
+    return first, "".join(rest)
 
 
 def listing(words: Sequence[str], last: str = "and") -> str:

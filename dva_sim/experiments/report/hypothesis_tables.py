@@ -96,7 +96,7 @@ def _counted(ranked: Sequence[Tested]) -> str:
     verdict, count = ranked[0].verdict, len(ranked)
     same = sum(t.verdict == verdict for t in ranked)
     if count == 1:
-        return f"The registered hypothesis {_SETTLED[verdict]}"
+        return f"Registered hypothesis {ranked[0].name} {_SETTLED[verdict]}"
     settled = _SETTLED[verdict]
     if same > 1:
         settled = settled.replace("was ", "were ").replace("is ", "are ")

@@ -44,7 +44,7 @@ class KeptAnswer:
     Attributes:
         study: Name of the study.
         question: Question of the study.
-        answer: The answer in words.
+        answer: The answer in words, as its report begins; never compared.
         measure: Column that was compared; empty without a contrast.
         contrast: Its two levels in words.
         over: Factor that the rows run over.
@@ -139,7 +139,7 @@ def _rows(reading: Reading) -> tuple[AnswerRow, ...]:
 
 
 def keep(answer: KeptAnswer, manifest: Mapping[str, Any], folder: Path) -> Path:
-    """Write an answer and its manifest; the one that was kept before becomes history.
+    """Write an answer and its manifest; one with other numbers that was there becomes history.
 
     Args:
         answer: The answer.
@@ -151,11 +151,16 @@ def keep(answer: KeptAnswer, manifest: Mapping[str, Any], folder: Path) -> Path:
     """
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / f"{answer.study}.json"
-    if file.exists() and (before := read(file)) != answer:
+    if file.exists() and not _is_same(before := read(file), answer):
         _append(before, folder / HISTORY)
     write_whole(folder / f"{answer.study}{_MANIFEST}", _text(manifest))
     write_whole(file, _text(asdict(answer)))
     return file
+
+
+def _is_same(before: KeptAnswer, answer: KeptAnswer) -> bool:
+    """True if two answers differ in their wording at most."""
+    return replace(before, answer=answer.answer) == answer
 
 
 def _text(data: Mapping[str, Any]) -> str:

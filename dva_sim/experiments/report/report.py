@@ -57,7 +57,7 @@ from dva_sim.experiments.study.parts import POINT
 from dva_sim.experiments.study.study import Status
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.whole_files import whole, write_whole
-from dva_sim.kernel.wording import capital, listing, number
+from dva_sim.kernel.wording import capital, first_and_rest, listing, number
 from dva_sim.simulation.labels import factor_name, is_in_file, level_name, setting, with_unit
 
 if TYPE_CHECKING:
@@ -426,7 +426,7 @@ def _template(marker: Marker) -> jinja2.Template:
         "kind": lambda block: type(block).__name__,
         "key": _key,
     }
-    environment.filters["sentences"] = _sentences
+    environment.filters["sentences"] = first_and_rest
     return environment.get_template("report.html.j2")
 
 
@@ -440,12 +440,6 @@ def _explained(text: str, marker: Marker) -> Markup:
         for piece, term in marker.split(text)
     ]
     return Markup("").join(pieces)
-
-
-def _sentences(lead: str) -> tuple[str, str]:
-    """The first sentence of an answer, and the rest; the rest begins with a capital letter."""
-    first, *rest = re.split(r"(?<=[.]) (?=[A-Z])", lead, maxsplit=1)
-    return first, "".join(rest)
 
 
 def _key(text: str) -> str:

@@ -57,6 +57,7 @@ def test_an_answer_that_is_replaced_becomes_history(kept):
     kept_answers.keep(replace(answer, version="0.1.0"), manifest, folder)
     kept_answers.keep(answer, manifest, folder)
     kept_answers.keep(answer, manifest, folder)  # the same again is no history
+    kept_answers.keep(replace(answer, answer="In other words."), manifest, folder)
     lines = (folder / kept_answers.HISTORY).read_text().splitlines()
     assert len(lines) == 1 + len(answer.rows)
     assert all(

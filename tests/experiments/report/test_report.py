@@ -180,7 +180,7 @@ def test_a_registered_study_is_called_confirmatory_and_its_hypotheses_stand_besi
     assert unnamed(rest, "waits above 2.0 s", "✓ held: ") == []
     assert "waits: It waits." in text
     beside = text.index("Not registered, over all levels")
-    assert text.index("hypothesis held: it waits (+") < beside
+    assert text.index("hypothesis waits held: it waits (+") < beside
     assert text.index("The answer in numbers") < beside
 
 
