@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from dva_sim.experiments.analysis.answer_sentences import EXTRAPOLATED
@@ -30,7 +32,7 @@ def choice_table(found: ChoiceMap, part: str) -> CellTable:
         cells = [regret_text(found, g, c) for c in range(len(choices))]
         notes = [found.notes.get(str(situation), "")] if found.notes else []
         rows.append([name, _best(found, g), *cells, *notes])
-    text = note("map", found=found)
+    text = note("map", **facts_of(found))
     return CellTable(part, heads, 2, rows, note=text)
 
 
@@ -51,7 +53,19 @@ def beside_table(found: ChoiceMap, part: str) -> CellTable:
         waits = [] if found.waiting is None else [regret_number(100.0 * float(found.waiting[g, c]))]
         choice = level_name(found.choice.name, found.choice.levels[c], short=True)
         rows.append([situation_name(found, g), choice, *map(_range, cells), *waits])
-    return CellTable(part, heads, 2, rows, note=note("beside", found=found))
+    return CellTable(part, heads, 2, rows, note=note("beside", **facts_of(found)))
+
+
+def facts_of(found: ChoiceMap) -> dict[str, Any]:
+    """What captions and notes about a map say of it."""
+    return {
+        "unit": found.unit or "no unit",
+        "models": len(found.models.levels),
+        "is_beyond": found.is_beyond,
+        "is_marked": bool(found.outside.any()) and not found.is_beyond,
+        "smallest": quantity(found.smallest, found.unit) if found.smallest else "",
+        "has_waiting": found.waiting is not None,
+    }
 
 
 def _range(values: Floats) -> str:

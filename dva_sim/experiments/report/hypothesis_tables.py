@@ -148,8 +148,9 @@ def comparison_table(found: Judgement, cluster: str = "person") -> CellTable:
     families.update(t.contrast.family for t in found.tested)
     persons = max((c.difference.n_persons for c in compared if c.difference), default=0)
     least = 2.0 ** (1 - persons) if persons else 0.0  # whatever the runs
-    facts = {"families": list(families.items()), "persons": persons}
-    text = note("comparisons", **facts, least_p=least if least > 1 - LEVEL else None)
+    counts = "; ".join(f"{name}: {count}" for name, count in families.items())
+    least_p = f"{least:.2g}" if least > 1 - LEVEL else ""
+    text = note("comparisons", families=counts, persons=persons, least_p=least_p)
     return CellTable("", heads, len(heads), rows, note=text)
 
 

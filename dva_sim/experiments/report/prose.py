@@ -13,15 +13,14 @@ if TYPE_CHECKING:
 
 
 def caption(name: str, **facts: Any) -> str:
-    """Render a macro of `captions.txt.j2`: a line that is shown, and one that is folded away."""
-    text = str(getattr(_template("captions").module, name)(**facts))
-    shown, _, folded = text.strip().partition("\n\n")
-    return "\n".join(filter(None, map(_in_a_line, (shown, folded))))
+    """Render a section of `captions.txt.j2`: a line that is shown, and one that is folded away."""
+    shown, _, folded = _sections("captions")[name].partition("\n\n")
+    return "\n".join(filter(None, (_rendered(text, facts) for text in (shown, folded))))
 
 
 def note(name: str, **facts: Any) -> str:
-    """Render a macro of `notes.txt.j2`."""
-    return _in_a_line(str(getattr(_template("notes").module, name)(**facts)))
+    """Render a section of `notes.txt.j2`."""
+    return _rendered(_sections("notes")[name], facts)
 
 
 def paragraphs(name: str, **facts: Any) -> list[str]:
@@ -35,15 +34,36 @@ def _in_a_line(text: str) -> str:
     return re.sub(r"[ \n]+", " ", text).strip(" ")
 
 
+def _rendered(text: str, facts: dict[str, Any]) -> str:
+    return _in_a_line(_environment().from_string(text).render(facts))
+
+
+_HEAD = re.compile(r"^== (\w+) ==\n", re.MULTILINE)
+
+
 @cache
+def _sections(name: str) -> dict[str, str]:
+    """The texts of a template by the names above them."""
+    environment = _environment()
+    assert environment.loader is not None
+    source, _, _ = environment.loader.get_source(environment, f"{name}.txt.j2")
+    _, *parts = _HEAD.split(source)
+    return {head: text.strip() for head, text in zip(parts[::2], parts[1::2], strict=True)}
+
+
 def _template(name: str) -> jinja2.Template:
+    return _environment(trim=True).get_template(f"{name}.txt.j2")  # empty lines part paragraphs
+
+
+@cache
+def _environment(trim: bool = False) -> jinja2.Environment:
     import jinja2
 
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("dva_sim.experiments.report"),
-        trim_blocks=True,
+        trim_blocks=trim,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
     environment.filters |= {f.__name__: f for f in (capital, number, percent, quantity)}
-    return environment.get_template(f"{name}.txt.j2")
+    return environment

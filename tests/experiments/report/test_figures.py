@@ -221,7 +221,7 @@ def test_nobody_who_never_came_has_a_panel_and_one_fate_needs_no_picture(view):
     reading = SimpleNamespace(table={"events": rows}.get)
     assert StoryOutcomes().draw(view, reading) is None
     drawn = StoryTimes().draw(view, reading)
-    assert f"all {len(events):,} were confirmed" in drawn.caption
+    assert f"All {len(events):,} were confirmed" in drawn.caption
 
 
 @blank

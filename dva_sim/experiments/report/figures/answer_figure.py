@@ -80,7 +80,15 @@ class AnswerFigure(style.ReportFigure):
         within = condition(finding)
         title = f"{title}, {within}" if within else title
         few = too_few(finding.persons, finding.cluster) if finding.has_too_few else ""
-        words = caption("answer", finding=finding, first=first, grey=grey, few=few)
+        words = caption(
+            "answer",
+            first=first,
+            is_more="takes longer" if finding.unit == "s" else "is larger",
+            persons=f"{finding.persons} {finding.cluster}{'s' * (finding.persons != 1)}",
+            is_band=len(finding.levels) > 1,
+            grey=bool(grey),
+            few=capital(few),
+        )
         return self.finish(figure, words, _table(finding), title=title, reads=(cut,))
 
 

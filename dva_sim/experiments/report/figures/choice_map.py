@@ -9,6 +9,7 @@ import numpy as np
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.choice_table import (
     NEVER,
+    facts_of,
     regret_number,
     regret_text,
     situation_name,
@@ -58,7 +59,7 @@ class ChoiceMapFigure(style.ReportFigure):
         ax.grid(False)
         ax.tick_params(length=0)
         unit = f" [{found.unit}]" if found.unit else ""
-        words = caption("map", found=found)
+        words = caption("map", **facts_of(found))
         title = (
             f"{capital(measure_name(found.measure))} beyond the best choice{unit}, by "
             f"{factor_name(found.given.name)}"

@@ -66,7 +66,7 @@ class Trade(ShiftFigure):
             return None
         label = "Exposure of people in finding out what it is [s per event]"
         figure = _scatter(shifts, "exposure_look_s", label)
-        words = caption("trade", shifts=shifts, act=_act(shifts))
+        words = caption("trade", **_facts(shifts), act=f"{_act(shifts):.0f}")
         return self.finish(figure, words, _scatter_numbers(shifts, "exposure_look_s"))
 
 
@@ -79,7 +79,11 @@ class Stages(ShiftFigure):
         """Draw it."""
         figure = _scatter(shifts, "containment_mean_s", "Restricted mean time to containment [s]")
         numbers = _scatter_numbers(shifts, "containment_mean_s")
-        return self.finish(figure, caption("stages", shifts=shifts), numbers)
+        return self.finish(figure, caption("stages", **_facts(shifts)), numbers)
+
+
+def _facts(shifts: Shifts) -> dict[str, str]:
+    return {"follow": f"{shifts.follow:g}", "baseline": shifts.baseline}
 
 
 def _scatter(shifts: Shifts, column: str, label: str) -> Figure:
@@ -179,7 +183,7 @@ class FatesOfEvents(ShiftFigure):
         for ax in axes[-1]:
             ax.set_xlabel("Time since the report [s]")
         key(figure, [box(FILLS[fate]) for fate in _FATES], [_NAMES.get(f, f) for f in _FATES])
-        return self.finish(figure, caption("fates", follow=shifts.follow), numbers)
+        return self.finish(figure, caption("fates", follow=f"{shifts.follow:g}"), numbers)
 
 
 def chosen_policies(shifts: Shifts) -> list[str]:
@@ -216,7 +220,13 @@ class WayToBest(ShiftFigure):
         axes[len(axes) // 2].set_xlabel(f"Share of the way from {FLOOR} to {target} [%]")
         is_oracle = shifts.target == BEST
         beats = np.zeros(1) if is_oracle else 100 * shifts.means("beats_bound_share")
-        words = caption("way", is_oracle=is_oracle, low=np.nanmin(beats), high=np.nanmax(beats))
+        words = caption(
+            "way",
+            is_oracle=is_oracle,
+            target="oracle" if is_oracle else "bound",
+            low=f"{np.nanmin(beats):.0f}",
+            high=f"{np.nanmax(beats):.0f}",
+        )
         title = f"{self.title}: 0 is {FLOOR}, 100 {target}"
         return self.finish(figure, words, numbers, title=title)
 
@@ -255,7 +265,7 @@ class Percentiles(ShiftFigure):
         axes[len(axes) // 2].set_xlabel(
             "Time to response by 50 % (filled), 90 % and 95 % of all events [s]"
         )
-        words = caption("percentiles", follow=shifts.follow, missing=missing)
+        words = caption("percentiles", follow=f"{shifts.follow:g}", missing=missing)
         return self.finish(figure, words, numbers)
 
 
@@ -295,7 +305,7 @@ class Burden(ShiftFigure):
             if column.startswith("use"):
                 ax.set_xlim(0, 1.02)
         fewest = FEWEST_IN_ZONE
-        words = caption("burden", loads=shifts.titles, fewest=fewest)
+        words = caption("burden", loads=", ".join(shifts.titles), fewest=fewest)
         return self.finish(figure, words, numbers)
 
 

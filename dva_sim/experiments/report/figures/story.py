@@ -169,7 +169,7 @@ class StoryTimes(_Story):
         axes[0][0].set_ylim(bottom=0)
         style.outer_labels(axes, shown, "Since detection [s]")
         legend(figure, view.line)
-        words = caption("story_times", events=len(events), fate=_NAMES.get(fate, fate))
+        words = caption("story_times", events=f"{len(events):,}", fate=_NAMES.get(fate, fate))
         title = f"Part {events.part}: response, by who responded"
         return self.finish(figure, words, numbers, title=title)
 
@@ -197,8 +197,9 @@ class StoryOutcomes(_Story):
         stacks.axes[0].set_xlim(0, 1)
         stacks.axes[0].set_xticks([0, 0.5, 1])
         stacks.axes[0].xaxis.set_major_formatter(lambda share, _: f"{100 * share:.0f} %")
-        few = (min(counts), max(counts))
-        words = caption("story_outcomes", events=len(events), part=events.part, few=few)
+        few = min(counts)
+        facts = {"events": f"{len(events):,}", "share": f"{100 / few:.3g}"}
+        words = caption("story_outcomes", part=events.part, few=few, **facts)
         title = f"Part {events.part}: what became of the events"
         return self.finish(stacks.figure, words, numbers, title=title)
 

@@ -31,7 +31,7 @@ from dva_sim.experiments.report.figures.palette import HAZARD, INK, PAPER, Look,
 from dva_sim.experiments.report.figures.style import ASIDE, Drawn, ReportFigure, panels
 from dva_sim.experiments.report.prose import caption
 from dva_sim.kernel.units import unit_of
-from dva_sim.kernel.wording import capital, number, quantity
+from dva_sim.kernel.wording import capital, number, percent, quantity
 from dva_sim.simulation.labels import measure_name, setting
 
 if TYPE_CHECKING:
@@ -122,7 +122,14 @@ class _TimeLapse(ReportFigure):
         scale_bar(rows[-1][0], low)
         _key(figure, list(moved), any(not i.room for i in episode.incidents))
         title = f"{capital(self.which)} run {_OF_ALL[self.which]}: {_what(view, episode)}"
-        words = caption("time_lapse", episode=episode, which=self.which, runs=len(view.part))
+        words = caption(
+            "time_lapse",
+            episode=episode,
+            is_typical=self.which == "typical",
+            kept=f"{episode.kept:,}",
+            smaller=percent(episode.rank),
+            runs=f"{len(view.part):,}",
+        )
         return self.finish(figure, words, numbers, title=title, reads=(_READS,))
 
 
