@@ -93,7 +93,7 @@ def _too_small(f: Finding) -> str:
         left = f"{f.persons} {f.cluster}s exclude nothing"
     else:
         most = quantity(bound, f.unit)
-        left = f"with {f.persons} {f.cluster}s, up to {most} either way is possible"
+        left = f"with {f.persons} {f.cluster}s, differences up to {most} are not excluded"
     there = _after(places(f, np.flatnonzero(f.is_open)))
     return (
         f"the study is too small to tell whether {_sides(f)}: {left}{there}{_settings(f)} "
@@ -220,7 +220,7 @@ def _left_open(f: Finding, bound: float) -> str:
     """Say how large an effect could still be, or that the data exclude nothing."""
     if bound >= f.widest:
         return f"it is undecided ({f.persons} {f.cluster}s exclude nothing)"
-    return f"it is undecided (up to {quantity(bound, f.unit)} either way is possible)"
+    return f"it is undecided (differences up to {quantity(bound, f.unit)} are not excluded)"
 
 
 def _declared(f: Finding) -> str:

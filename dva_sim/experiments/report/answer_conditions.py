@@ -90,7 +90,7 @@ def _assumptions(reading: ResultsReading, finding: Finding) -> str:
         return f"{text} Which of them move such an answer: dva-sim screen {MAIN}."
     clear = [effect.key for effect in effects if effect.is_clear]
     moved = f"{listing(clear)} moved" if clear else "none of them moved"
-    return f"{text} In the screening of {MAIN} {moved} the answer by more than chance."
+    return f"{text} Their effect was screened for {MAIN} only: {moved} its answer beyond chance."
 
 
 def _how(view: StudyView, finding: Finding) -> str:
@@ -193,8 +193,8 @@ def _beyond(view: StudyView, finding: Finding) -> str:
     if not outside or view.over is None:
         return ""
     is_everywhere = len(outside) == len(view.stops)
-    where = "Throughout" if is_everywhere else capital(places(finding, np.array(outside)))
+    where = "at any level" if is_everywhere else places(finding, np.array(outside))
     return (
-        f"{where}, on one side or both, no published experiment covers the delay from picture "
-        "to effect: extrapolated."
+        f"Extrapolated: no published experiment covers the delay from picture to effect {where}, "
+        "on one side or both."
     )

@@ -57,7 +57,7 @@ def beside_table(found: ChoiceMap, part: str) -> CellTable:
 
 
 def facts_of(found: ChoiceMap) -> dict[str, Any]:
-    """What captions and notes about a map say of it."""
+    """Facts about a map for captions and notes."""
     return {
         "unit": found.unit or "no unit",
         "models": len(found.models.levels),
@@ -109,8 +109,9 @@ def lead_of(found: ChoiceMap) -> str:
     )
     where = named(found.given.name, found.given.levels[_hardest(found, first)])
     return (
-        f"No {factor_name(found.choice.name)} is best on every {given} tried; nearest to it: "
-        f"{names[first]}, at most {_cost(found, first)} behind the best one, with {where}, {over}. "
+        f"No single {factor_name(found.choice.name)} is best on every {given} tried; the smallest "
+        f"worst loss is that of {names[first]}: {_cost(found, first)} behind the best one, with "
+        f"{where}, {over}. "
         f"The others are behind by up to: {others}."
     )
 

@@ -64,6 +64,13 @@ _SETTLED: dict[Verdict, str] = {
     "open": "is undecided",
     "not run": "was not run",
 }
+_NOT_SAID: dict[Verdict, str] = {
+    "held": "",
+    "did not hold": "it is not so that ",
+    "open": "whether ",
+    "not run": "whether ",
+}
+"""What keeps a claim that did not hold from being read as the result."""
 _ORDER: tuple[Verdict, ...] = ("did not hold", "open", "not run", "held")
 _MOST_TOLD = 2  # hypotheses, before the rest are only counted
 
@@ -112,7 +119,7 @@ def _inside(text: str) -> str:
 
 def _told(tested: Tested, cluster: str) -> str:
     """`Waiting costs (4.0 s, 95 % interval 3.0 to 5.0 s, claimed above 2.0 s)`."""
-    text = _inside(tested.hypothesis.text or _claim(tested))
+    text = _NOT_SAID[tested.verdict] + _inside(tested.hypothesis.text or _claim(tested))
     if tested.difference is None:
         return text
     found, unit = tested.difference, unit_of(tested.contrast.measure)

@@ -69,7 +69,7 @@ WORDS = "Words"
 MOST_FIGURES = 7  # design: that are not folded away, the answering one among them
 _KINDS = {
     "confirmatory": "Confirmatory: registered before the run",
-    "declared": "Declared: not registered before the run",
+    "declared": "Declared in the study's file, not registered before the run",
     "exploratory": "Exploratory: not a test of what it found",
 }
 

@@ -93,7 +93,7 @@ def test_the_choice_that_costs_least_where_it_costs_most_is_advised():
     found = read()
     assert found.advised == "pace"
     lead = lead_of(found)
-    assert lead.index("pace, at most 8") < lead.index("ask 70") < lead.index("tell never done")
+    assert lead.index("pace: 8") < lead.index("ask 70") < lead.index("tell never done")
     assert "2 models" in lead
 
 
