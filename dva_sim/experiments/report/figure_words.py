@@ -7,6 +7,7 @@ from typing import Final
 
 WORDS: Final = {
     "map": "The cost of each choice in each situation, beyond the best one, over all persons.",
+    "claims": "Registered hypotheses: what was found, beside what was claimed.",
     "answer": "The difference that answers the question.",
     "distributions": "Every run as a dot, with median and middle half.",
     "differences": (

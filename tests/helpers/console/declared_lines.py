@@ -50,11 +50,11 @@ def checked(line: Mapping[str, Any], declared: Any = lines.WorldLine) -> dict[st
     return arrived
 
 
-def at_page(lines: Iterable[Mapping[str, Any]], client: str) -> list[dict[str, Any]]:
+def at_page(sent: Iterable[Mapping[str, Any]], client: str) -> list[dict[str, Any]]:
     """Messages of the web process to one page that looks at everything."""
     state, messages = RunState(), []
     feed = PageFeed(state, client)
-    for line in lines:
+    for line in sent:
         if line["k"] in ("done", "bye"):
             continue
         if state.take(line) == "scene":
