@@ -18,7 +18,7 @@ from dva_sim.testing.results import SHAPES
 
 FEW = {name: SHAPES[name] for name in ("two words", "no value at all")}
 COMPUTED = {"distributions"}  # its boxes are quartiles of the runs, which its CSV holds
-OF_OTHER_DESIGNS = {"scatter", "sobol", "robustness"}  # of points in ranges, of repeats
+OF_OTHER_DESIGNS = {"claims", "scatter", "sobol", "robustness"}  # registered; in ranges; repeated
 
 
 class Plain(ReportFigure):

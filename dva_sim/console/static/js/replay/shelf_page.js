@@ -24,9 +24,17 @@ export function ShelfPage() {
   </main>`;
 }
 
-/** @param {string} name */
+let isOpening = false;
+
+/**
+ * Open a recording and go to the map, once: a second answer would lead away from another page.
+ * @param {string} name
+ */
 async function open(name) {
+  if (isOpening) return;
+  isOpening = true;
   const answer = await act('open_recording', { name });
+  isOpening = false;
   if (answer.ok) location.hash = '#/map';
 }
 
