@@ -26,7 +26,7 @@ def lists(page: AttachedPage) -> list[list[str]]:
     """All lists that the page was told, as their texts and states."""
     return [
         [f"{row['text']}: {row['state']}" for row in entry["alarms"]]
-        for entry in page.state("alarms")
+        for entry in page.lines_of("alarms")
     ]
 
 
@@ -35,7 +35,7 @@ def test_an_open_event_is_an_alarm_and_seen_by_a_message_to_the_dva(page):
     assert page.ask("alarm_acknowledge", alarm="event 1")["ok"]
     page.let(1.0)
 
-    (row,) = page.state("alarms")[-1]["alarms"]
+    (row,) = page.lines_of("alarms")[-1]["alarms"]
     assert row["state"] == "acknowledged"
     assert page.events()[0]["acknowledged"]["label"] == "control room"
     rows = {(row.action, row.author) for row in page.written()}
@@ -46,7 +46,7 @@ def test_an_alarm_is_shelved_by_name_and_comes_back(page):
     page.alarms()
     assert page.ask("alarm_shelve", alarm="event 1", for_s=60.0)["ok"]
     assert page.alarms() == []
-    (shelved,) = page.state("alarms")[-1]["shelved"]
+    (shelved,) = page.lines_of("alarms")[-1]["shelved"]
     assert shelved["shelved_by"] == "ana"
     page.let(60.0)
     assert page.alarms() == [FIRE]
@@ -77,7 +77,7 @@ def test_after_a_restart_of_the_dva_alarms_neither_vanish_nor_come_back(page):
     page.let(2.0)
 
     assert {tuple(each) for each in lists(page)[reported:]} <= {(f"{FIRE}: unacknowledged",)}
-    assert all(line["events"] for line in page.state("events")[1:])
+    assert all(line["events"] for line in page.lines_of("events")[1:])
 
 
 def test_a_robot_of_which_nothing_is_heard_since_it_was_driven_is_lost(page):

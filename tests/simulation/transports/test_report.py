@@ -59,7 +59,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_report_finds_what_was_put_in(report):
-    assert unnamed(words(report), "TCP takes 40.0 s", "8 TCP flows") == []
+    assert unnamed(words(report), "TCP is slower", "+40.0 s", "8 TCP flows") == []
 
 
 def test_its_figures_show_what_a_transport_brings_and_what_it_takes(report):
