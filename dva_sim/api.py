@@ -161,7 +161,7 @@ def run(
         seed: Random seed of the whole study. In place of its own.
         jobs: Number of processes; default: one for each core.
         scheduler: Use a dask.distributed cluster instead. Its address; recordings are made here.
-        limit_s: A run that takes longer has failed. By the wall clock [s].
+        limit_s: Treat a run that takes longer as failed. By the wall clock [s].
         quick: The study's small version.
         full: The study's larger version.
         pilot: Run only this many persons, with a random seed of their own. The study never uses it.
@@ -348,8 +348,8 @@ def export(
     Args:
         folder: A results folder.
         out: `X.csv` or `X.parquet` for one table, or a folder.
-        table: Only this one. Or these.
-        format: In a folder; default: csv. Or `parquet`.
+        table: Export only this table. Or these.
+        format: Format of tables in a folder; default: csv. Or `parquet`.
         overwrite: Overwrite existing files.
 
     Raises:

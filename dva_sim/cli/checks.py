@@ -56,7 +56,7 @@ def _check_link(names: Sequence[str], options: Sequence[str]) -> ExitCode:
     from dva_sim.validation.network.real_side import cell, self_check  # late: start-up
 
     if names or options:
-        raise ConfigError("check link: there is one link, without names and options")
+        raise ConfigError("check link takes no names or options")
     if why := cell.why_no_packets():
         raise EmulatorError(f"{why}; {OFFER}")
     findings = self_check.check_link()
@@ -64,7 +64,7 @@ def _check_link(names: Sequence[str], options: Sequence[str]) -> ExitCode:
         print(finding)
     if all(finding.passed for finding in findings):
         return ExitCode.OK
-    print(f"What is late only now and then waited for the processor: {QUIET}.")
+    print(f"Occasional lateness comes from a busy processor: {QUIET}.")
     return ExitCode.DOES_NOT_HOLD
 
 

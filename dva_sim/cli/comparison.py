@@ -144,7 +144,7 @@ def _cells(comparison: Comparison) -> list[str]:
 def _random_numbers(comparison: Comparison) -> str:
     pairs, runs = comparison.paired
     if not pairs:
-        return "No run of both has the same random seed: persons are compared with other persons"
+        return "A and B share no random seed, so different persons are compared"
     share = "all" if pairs == runs else f"{pairs} of {runs}"
     return f"Compared in pairs of the same person, trial and seed: {share} runs of A"
 
@@ -159,7 +159,7 @@ def _differences(name: str, found: Sequence[Difference], console: Console) -> No
     clear = sum(row.differs_from_zero for row in found)
     if clear:
         console.print(
-            f"{_MARK} leaves out zero, each interval for itself: {clear} of {len(found)}; of "
+            f"{_MARK} excludes zero, each interval on its own: {clear} of {len(found)}; of "
             "those that did not change, one in 20 would by chance",
             style="dim",
             soft_wrap=True,

@@ -30,13 +30,13 @@ from dva_sim.testing.promises import TRIALS
 
 _FILES = (
     "Messages, studies, scenarios, sites, plans, maps, agents, recordings, traces, audit logs; "
-    f"- reads a message. Or {either(TRIALS)}, and names of such or mine.py:Mine. "
-    "Or link: the emulated one."
+    f"or - for a message from stdin. Or {either(TRIALS)}, then names or mine.py:Mine. "
+    "Or link, to test the emulated link."
 )
 _SCHEMAS = "message", "study", "scenario", "cases", "site", "agent"
 _EVIDENCE = "dispatch", "operators", "network"
 _RATE = "Of these commands."
-_UNIT = "Of the log of another app whose head does not say it."
+_UNIT = "Unit of acceleration, if the log's header does not give it."
 
 
 def _listed(incomplete: str) -> list[str]:
@@ -66,7 +66,7 @@ def list_(kind: str | None, as_json: Json = False) -> None:
 
 
 def plugins(as_json: Json = False) -> None:
-    """Show what can be added to the program, and how.
+    """List the kinds of plug-ins, and how to add your own.
 
     Policies, operators, filters and other plug-ins are classes in your own files or in installed
     packages. Shows the kinds, what is available, and how to name one.
@@ -124,7 +124,7 @@ def check(files: list[str], set_: list[str]) -> None:
 
 
 @asks(
-    file=(argument("Of a phone's motion.", "FILE", of=Path), REQUIRED),
+    file=(argument("A log of a phone's motion sensor.", "FILE", of=Path), REQUIRED),
     commands=(flag("--commands", "Print the commands that the app would send."), False),
     rate=(Annotated[float, Option(metavar="HZ", min=0.1, max=100.0, help=_RATE)], 10.0),
     part=(

@@ -169,11 +169,11 @@ OPTIONS: dict[str, Any] = {
     "file": argument("A recording: .mcap, or the .mcap.part that a killed run left.", "FILE"),
     "first": argument("A results folder.", "A"),
     "folder": argument("A results folder.", "FOLDER"),
-    "format": text("In a folder; default: csv.", metavar="csv|parquet"),
+    "format": text("Format of tables in a folder; default: csv.", metavar="csv|parquet"),
     "full": flag("--full", "The study's larger version."),
     "inset": flag("--inset", "Show in the film what a robot's camera sees."),
     "jobs": Jobs,
-    "limit_s": seconds("A run that takes longer has failed.", "--limit", of=float),
+    "limit_s": seconds("Treat a run that takes longer as failed.", "--limit", of=float),
     "mcap": text("Turn an .mcap.part into a complete recording in a new file.", metavar="FILE"),
     "name": argument("Name or path of the new study.", "NAME"),
     "overwrite": Overwrite,
@@ -202,7 +202,7 @@ OPTIONS: dict[str, Any] = {
             "-o", "--out", metavar="PATH", help="X.csv or X.parquet for one table, or a folder."
         ),
     ],
-    "export.table": several("Only this one; may be given again."),
+    "export.table": several("Export only this table; may be given again."),
     "run.out": text("Results folder; default: results/STUDY.", "-o", "--out", metavar="FOLDER"),
     "run.seed": count("Random seed of the whole study.", of=int | None),
     "tune.out": text(

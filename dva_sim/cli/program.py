@@ -106,7 +106,7 @@ class DvaSimProgram(PanelGroup):
             **_named(runs.episode, runs.replay, runs.live, runs.console),
             **_named(runs.robot, link.link, runs.keys),
         },
-        "Names, files and evidence": {
+        "Listing, checking and validation": {
             **_named(files.list_, files.plugins, files.assumed, files.check),
             **_named(files.phone_log, files.schema, files.validate, storm.storm),
             "site": typer_of(SiteGroup, help="Draw a site, or write it as files to edit."),

@@ -16,7 +16,7 @@ from dva_sim.cli.verbosity import WRITTEN, loudness, print_json, tell_files
 def report(
     folder: str, pdf: bool, quiet: Quiet = False, verbose: Verbose = False, **asked: Any
 ) -> None:
-    """Make the report of a results folder again.
+    """Rebuild the report of a results folder.
 
     A report is a page, its figures and the numbers behind them. While a study is running, the page
     shows the results so far. Your own figures, named in the study's file, are drawn when the study

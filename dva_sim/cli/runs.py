@@ -158,7 +158,7 @@ def _show_replay(**asked: Any) -> None:
     transport=_TRANSPORT,
     rosbridge=_ROSBRIDGE,
     foxglove=_FOXGLOVE,
-    no_token=(flag("--no-token", "Let in all clients of --rosbridge."), False),
+    no_token=(flag("--no-token", "Let any client use --rosbridge without a token."), False),
     **RUN,
 )
 def live(
@@ -315,7 +315,7 @@ def console(
         attach(where, _say_at_once)
         return
     if keys is not None:
-        raise ConfigError("--keys is for --dva: devices of a console encrypt nothing")
+        raise ConfigError("--keys needs --dva: a console's own devices do not encrypt")
     options = ConsoleOptions(
         scenario=scenario or DEFAULT,
         changes=changes,

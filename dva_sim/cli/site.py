@@ -21,7 +21,7 @@ _CHANGES = several("An option of a generated site.", "KEY=VALUE", "--set"), ()
     out=(file("Picture; default: NAME.png.", "-o", "--out"), None),
     set_=_CHANGES,
     coverage=(flag("--coverage", "Shade areas with weak Wi-Fi."), False),
-    width=(count("Of the picture.", metavar="PIXELS", least=200, most=8000), 1650),
+    width=(count("Width of the picture.", metavar="PIXELS", least=200, most=8000), 1650),
 )
 def show(name: str, out: Path | None, set_: list[str], coverage: bool, width: int) -> None:
     """Draw a site and describe it in one line.

@@ -41,9 +41,9 @@ Row = Mapping[str, Any]
 
 STYLES = {"safety": "bold red", "mode": "dim", "order": "cyan", "drive": "cyan", "link": "yellow"}
 DRIVES = {
-    "lost link": "given up, the link was taken for lost",
+    "lost link": "given up, the link was presumed lost",
     "gave up": "given up",
-    "refused": "ended, the robot obeyed no more",
+    "refused": "ended, the robot no longer obeyed",
 }
 EVENTS = 30  # of a shift in its table; the lines below it count them all
 TRIALS = 20  # of a task in its table; likewise
@@ -131,7 +131,7 @@ def _failed(row: Row) -> list[str]:
     """List failures of the user's classes, if there were any."""
     times = row.get("plugin_failures", row.get("policy_failed"))
     whose = "a class of yours (policy, operator, filter, ...)"
-    return [f"{times} times {whose} gave no answer, or none that is allowed"] if times else []
+    return [f"{whose} gave no answer, or an invalid one, {times} times"] if times else []
 
 
 def tell_full(run: Played, console: Console) -> None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 OUT = Path("results/storms")
 AROUND = 20.0  # of a breach, in its story [s]
-_PLAN = "Plan of one storm, as a failure leaves it: play that alone."
+_PLAN = "Saved plan of one storm, such as a failure, to replay alone."
 _HOURS = "Continue with further seeds until this many fleet-hours are reached in total."
 
 
@@ -172,13 +172,13 @@ def _keep_failure(plan: StormPlan, outcome: StormOutcome, folder: Path, profile:
 
 def _progress(tally: StormTally, hours: float | None) -> None:
     of = f" of {hours:g}" if hours else ""
-    typer.echo(f"{tally.storms} storms, {tally.hours:.1f}{of} hours of a team", err=True)
+    typer.echo(f"{tally.storms} storms, {tally.hours:.1f}{of} fleet-hours", err=True)
 
 
 def _tell(tally: StormTally, known: int) -> None:
     faults, touched = sum(tally.faults.values()), sum(tally.messages.values())
     typer.echo(
-        f"{tally.storms} storms ({known} played before), {tally.hours:.1f} hours of a team, "
+        f"{tally.storms} storms ({known} played before), {tally.hours:.1f} fleet-hours, "
         f"{faults} faults, {touched} messages touched; {tally.cpu_s:.0f} s of CPU time"
     )
     for kind, times in sorted(tally.faults.items()):

@@ -187,7 +187,7 @@ def _report_failures(results: Results) -> int:
         say(f"[red]failed:[/red] {where}: {escape(str(f['error']).splitlines()[-1])}")
     if failures:
         failed = _counted(len(failures), "run")
-        problem = f"{failed} failed; the same command tries again"
+        problem = f"{failed} failed; repeat the same command to retry"
         print(error_line(problem), file=sys.stderr)
     return len(failures)
 

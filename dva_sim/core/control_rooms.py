@@ -270,9 +270,9 @@ class ControlRooms:
 
     def _may_act(self, body: m.Assign, event: Event, device: m.Device, task: str) -> None:
         if not event.needs_containment:
-            raise _Refused(m.NOT_SUPPORTED, "nobody deals with events here: they are looked at")
+            raise _Refused(m.NOT_SUPPORTED, "events here are only looked at, not contained")
         if device.device_type == ROBOT:
-            raise _Refused(m.NOT_SUPPORTED, "a robot can look, and nothing else")
+            raise _Refused(m.NOT_SUPPORTED, "a robot can only look")
         if (task == "contain") != (event.state is State.CONFIRMED):
             asked = "stand_by until it is" if task == "contain" else "contain, as it is confirmed"
             raise _Refused(m.WRONG_MODE, f"event {event.number} is {event.state}: {asked}")

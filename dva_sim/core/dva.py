@@ -494,7 +494,7 @@ class Dva:
         if event is None:
             event, sends = self._corrected(message.source, body, now)
         if event is None and self.events.full:
-            return self._refuse(message, m.BUSY, "so many events are open that no more fit")
+            return self._refuse(message, m.BUSY, "too many events are open; no more are accepted")
         if event is None:
             contain = self._rules.containment
             event = self.events.add(body.kind, body.position, body.severity, now, contain)

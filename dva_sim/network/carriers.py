@@ -104,7 +104,7 @@ class RunCarrier:
         if not self.is_mqtt:
             return
         if has_keys:
-            raise ConfigError(f"--keys are ZeroMQ's: leave them out with {OPTION} {MQTT}")
+            raise ConfigError(f"--keys works only with ZeroMQ: leave it out with {OPTION} {MQTT}")
         if beyond := [host for host in hosts if not host.startswith("127.")]:
             raise ConfigError(
                 f"{OPTION} {MQTT}: the broker, which has no keys, listens on {LOCALHOST} or on an "

@@ -102,4 +102,4 @@ class Refusals:
     def _over(self, code: int | None, why: str = "") -> str:
         self.last = code
         name = "no answer that can be read" if code is None else m.CODE_NAMES.get(code, str(code))
-        return f"the robot obeys no more: {why or name}"
+        return f"the robot no longer obeys: {why or name}"

@@ -103,9 +103,7 @@ class AttachedActions:
     @does("fake_add")
     def _add_fake(self, _: str, line: FakeAsked, on_result: OnResult) -> None:
         if self._system.options.keys is not None:
-            raise Refused(
-                "with keys nobody can pretend to be a device: it would need one of its own"
-            )
+            raise Refused("with --keys, a fake device would need a key of its own")
         self._system.fakes.add(line, on_result)
 
     @does("fake_remove")

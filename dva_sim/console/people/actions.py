@@ -306,7 +306,7 @@ class Actions:
         label = world.run.stage.labels[robot]
 
         def changed(ok: bool, text: str = "") -> None:
-            on_result(ok, f"{label} is driven by {name} next" if ok else text)
+            on_result(ok, f"{label} will use {name} for its next drive" if ok else text)
 
         change_pattern(world.run, world.persons, robot, str(name), changed)
 

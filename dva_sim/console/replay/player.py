@@ -34,7 +34,7 @@ from dva_sim.recordings.writing import pack
 
 # From one line to the next, real time [s].
 POSITIONS, ROWS, HAZARDS, FRAMES, LOGS = 0.1, 0.25, 1.0, 0.1, 0.2
-NOBODY = "this is a recording: there is nobody who could be told to do anything"
+NOBODY = "this is a recording: nothing in it can be controlled"
 
 
 class Player:

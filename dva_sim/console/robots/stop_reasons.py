@@ -37,7 +37,7 @@ def stop_reason(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
     if held_by_lag:
         return LAG
     if controller.by_hand is not None:
-        return "it is in somebody's hand, who asks it to stand"
+        return "its manual driver asks it to stand"
     if controller.mode is Mode.MISSION:
         return controller.mission_status.reason or "its mission has it wait"
     if controller.emergency_at > 0.0 and now - controller.emergency_at < RECENT:

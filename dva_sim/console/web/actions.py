@@ -43,7 +43,7 @@ def check_role(role: Role, name: Any) -> None:
         NotAllowed: not by this address.
     """
     if not role.acts:
-        raise NotAllowed("this address may only look")
+        raise NotAllowed("this address is view-only")
     least = ACTIONS[name].role if isinstance(name, str) and name in ACTIONS else Role.PHONE
     if role < least:
         own = "a phone's address" if role is Role.PHONE else "this address"

@@ -63,7 +63,7 @@ def _why_so_many(reading: Reading) -> str:
             "one stops hold their 95 % in the long run, and a little less with few persons)"
         )
     if why == "budget":
-        return f" (stopped {batches}: the time by the clock was spent, so it cannot be made again)"
+        return f" (stopped {batches}: the time limit was reached, so it cannot be reproduced)"
     return f" (all {stopped.get('of')} batches, the most that was allowed)"
 
 

@@ -380,7 +380,7 @@ def write_report(folder: Path, pdf: bool = False, *, figures: Sequence[ReportFig
     except OSError as error:
         raise DvaSimError(
             f"the report cannot be written in {folder}: {error.strerror}; "
-            f"mend that, then 'dva-sim report {folder}' makes it"
+            f"fix that, then run 'dva-sim report {folder}'"
         ) from None
     if problems:
         raise ConfigError(f"{'; '.join(problems)}; {page} is made without")

@@ -47,7 +47,7 @@ class Reading(ResultsReading):
         if self.view is None:
             return Answer("No run was completed, so there is nothing to answer with.")
         if why := self.distrusted.get(self.view.part.name):
-            return Answer(f"The answer is withheld: {why}. Mend it, and run the study again.")
+            return Answer(f"The answer is withheld: {why}. Fix this, and run the study again.")
         found = self.page.answer(in_context(self))
         tested = self.judgement.tested if self._confirms else []
         if tested:

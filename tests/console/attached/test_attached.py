@@ -190,7 +190,7 @@ def test_with_keys_it_attaches_as_the_control_room_of_its_key_and_decides(progra
     assert becomes(lambda: console.state()["events"] != [])
     number = console.state()["events"][0]["number"]
     assert console.act("event_note", event=number, text="seen from elsewhere")["ok"]
-    assert "pretend" in console.act("fake_add", label="ghost", type="Robot")["text"]
+    assert "key of its own" in console.act("fake_add", label="ghost", type="Robot")["text"]
     assert becomes(lambda: any(e["kind"] == "fire" for e in console.state()["events"]))
     assert console.act("event_acknowledge", event=1)["ok"]
     done = console.act("event_assign", event=1, device="guard-1", reason="is near")

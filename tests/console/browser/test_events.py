@@ -190,7 +190,7 @@ def test_only_what_is_new_stands_out(both):
     expect(page.locator(".alarm")).not_to_have_count(0)
     expect(new).to_have_count(0)  # they are for 5 s
     page.get_by_role("button", name="Pause").click()
-    expect(page.get_by_role("button", name="Go on")).to_be_visible()
+    expect(page.get_by_role("button", name="Resume", exact=True)).to_be_visible()
     page.get_by_role("button", name="Raise event").click()
 
     expect(new).to_have_count(1)
@@ -198,4 +198,4 @@ def test_only_what_is_new_stands_out(both):
         r"new-alarm",
         page.evaluate("getComputedStyle(document.querySelector('.alarm.new')).animationName"),
     )
-    page.get_by_role("button", name="Go on").click()
+    page.get_by_role("button", name="Resume", exact=True).click()

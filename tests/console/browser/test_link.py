@@ -50,7 +50,7 @@ def test_time_stands_still_while_it_is_paused(page):
     page.wait_for_timeout(1100)  # the time is shown in seconds
     assert page.locator(".time .figure").inner_text() == shown
 
-    page.get_by_role("button", name="Go on").click()
+    page.get_by_role("button", name="Resume", exact=True).click()
     assert becomes(lambda: page.locator(".time .figure").inner_text() != shown)
 
 

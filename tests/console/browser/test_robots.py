@@ -123,7 +123,7 @@ def test_a_hand_turns_the_wheels_by_speed_and_turn_rate_and_letting_go_stops(ope
             assert becomes(lambda: spokes(page) != before)
             expect(page.get_by_role("status", name="Reason")).to_contain_text("moves")
         expect(page.get_by_role("region", name="Side view")).to_contain_text("0.00 m/s")
-        expect(page.get_by_role("status", name="Reason")).to_contain_text("hand")
+        expect(page.get_by_role("status", name="Reason")).to_contain_text("manual driver")
     expect(page.get_by_role("status", name="Mode")).to_contain_text("Idle")
 
 
@@ -235,7 +235,7 @@ def test_who_may_look_only_sees_all_and_changes_nothing(visit, addresses):
     page = windows_of(visit.open(addresses[1], "robots/robot-1"))
     expect(page.get_by_role("button", name="Take manual control")).to_be_disabled()
     expect(page.get_by_label("Freeze")).to_be_disabled()
-    expect(page.get_by_text("This address may only look.")).to_be_visible()
+    expect(page.get_by_text("This address is view-only.")).to_be_visible()
 
 
 def test_over_real_links_all_windows_are_the_same(programs, visit):

@@ -207,7 +207,7 @@ def test_samples_wait_in_their_order_and_the_oldest_of_too_many_are_lost():
 def test_a_phone_may_do_what_a_phone_does_and_who_looks_nothing():
     for name in ("start", "stop", "emergency", "samples", "guard_say", "phone_register"):
         check_role(Role.PHONE, name)
-        with pytest.raises(BadMessage, match="only look"):
+        with pytest.raises(BadMessage, match="view-only"):
             check_role(Role.LOOK, name)
     for name, action in ACTIONS.items():
         check_role(action.role, name)

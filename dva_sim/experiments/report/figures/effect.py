@@ -74,7 +74,7 @@ def _few_words(reading: Reading) -> str:
     if found is None or not found.has_too_few:
         return ""
     few = capital(too_few(found.persons, found.cluster))
-    return f"{few}: where bars overlap or hold zero, nothing is shown to be equal."
+    return f"{few}: bars that overlap or include zero do not show equality."
 
 
 def _curves(

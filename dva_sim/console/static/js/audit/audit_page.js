@@ -96,7 +96,7 @@ function State({ check, problem, look }) {
     <p role="status" aria-label="Verification">${text}</p>
     ${check && !wrong && html`<p class="soft">The last hash is <code>${check.hash}</code>.</p>`}
     ${check?.doubts.map((doubt) => html`<p class="soft">Odd: ${doubt}.</p>`)}
-    ${writing && html`<p class="warning" role="alert">${writing}. Nothing new is done until it can be written.</p>`}
+    ${writing && html`<p class="warning" role="alert">${writing}. No actions are accepted until it can be written.</p>`}
     <p class="soft">${audit.value?.lasting ? `Saved in ${audit.value.file}.` : 'It is lost when the console ends. Start the console with --audit FILE.sqlite to keep it.'}</p>
     <button type="button" onClick=${look}>Verify</button></section>`;
 }

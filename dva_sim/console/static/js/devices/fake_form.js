@@ -21,7 +21,7 @@ export function FakeForm({ onDone }) {
   return html`<form class="fake-form" aria-label="Fake device" onSubmit=${add} noValidate>
     <${Field} name="Label" value=${device.label} wrong=${wrong.label} onInput=${(/** @type {string} */ label) => set({ label })} />
     <${Choice} name="Type" value=${device.type} options=${TYPES} onInput=${(/** @type {string} */ type) => set({ type })} />
-    <${Field} name="Address" value=${device.address} hint="left empty: one at which nobody is" onInput=${(/** @type {string} */ address) => set({ address })} />
+    <${Field} name="Address" value=${device.address} hint="if empty: an address that nobody uses" onInput=${(/** @type {string} */ address) => set({ address })} />
     <${Field} name="Id" value=${device.id_tag} wrong=${wrong.id} most=${17} hint="left empty: the next free one" onInput=${(/** @type {string} */ id) => set({ id_tag: id })} />
     <div class="buttons"><button type="submit" class="go">Add</button>
       <button type="button" onClick=${onDone}>Cancel</button></div>

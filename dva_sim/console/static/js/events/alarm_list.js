@@ -18,7 +18,7 @@ export function AlarmList() {
   const unseen = alarms.filter((alarm) => alarm.state !== 'acknowledged').length;
   return html`<section class="alarms-panel" aria-label="Alarms">
     <h2>Alarms <span class="count">${unseen ? `${unseen} not seen` : 'all seen'}</span></h2>
-    ${flood && html`<p class="flood" role="status">${rate} alarms in 10 minutes: alike ones are folded.</p>`}
+    ${flood && html`<p class="flood" role="status">${rate} alarms in 10 minutes: similar ones are grouped.</p>`}
     ${!alarms.length && html`<p class="none">No alarms.</p>`}
     <ul class="rows">${alarms.map((alarm) => html`<${Row} key=${alarm.key} alarm=${alarm} />`)}</ul>
     ${shelved.length > 0 &&

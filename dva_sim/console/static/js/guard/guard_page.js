@@ -51,7 +51,7 @@ function Alerts() {
 
 /** Whom one stands for. */
 function Join() {
-  if (!mayDrive.value) return html`<p>This address may only look. Scan the code for phones.</p>`;
+  if (!mayDrive.value) return html`<p>This address is view-only. Scan the code for phones.</p>`;
   const free = playedGuards.value;
   if (!free.length) return html`<p>${NO_PLAYED_GUARD}</p>`;
   return html`<h2>Who are you?</h2>

@@ -20,7 +20,7 @@ const HOST = /^[A-Za-z0-9._:-]{1,64}$/;
 export function AuthenticationScreen() {
   const [devices, know] = useState(/** @type {import('../lines.js').Device[] | null} */ (null));
   if (!mayDrive.value) {
-    return html`<p>This address may only look. Scan the code that the console shows for phones.</p>`;
+    return html`<p>This address is view-only. Scan the code that the console shows for phones.</p>`;
   }
   const registered = Boolean(phone.value?.registered);
   const own = isOperator.value && !registered;

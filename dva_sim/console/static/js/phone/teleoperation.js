@@ -99,7 +99,7 @@ function Hint({ one }) {
   const how = tilts.value ? 'tilt to drive' : 'hold the stick, a key or the gamepad';
   if (phase.value !== 'driving') {
     if (sensor.value === 'tap') return WORDS.tap;
-    const warn = choices.value.calibrated ? '' : ' This phone is not calibrated: it will drive by nonsense.';
+    const warn = choices.value.calibrated ? '' : ' This phone is not calibrated: steering will be wrong.';
     return `Swipe up or press Start, then ${how}.${warn}`;
   }
   if (choices.value.hold && tilts.value && !thumb.value) return 'Hold your thumb on the picture and tilt.';

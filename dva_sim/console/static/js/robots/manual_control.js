@@ -58,7 +58,7 @@ function steering() {
 function hint(robot) {
   const shown = windowOf(robot.i);
   if (connection.value !== 'open') return 'Not connected to the simulation. You cannot drive.';
-  if (!mayDrive.value) return 'This address may only look.';
+  if (!mayDrive.value) return 'This address is view-only.';
   if (!shown) return '';
   if (isInHand(robot.i)) return interrupted.value ? `${interrupted.value} The robot was stopped. Hold again to drive.` : 'You control it manually. Hold to drive; everyone else gets the reply Busy.';
   if (shown.station.state !== 'listening') return 'The robot must be registered and listening first.';

@@ -12,8 +12,8 @@ const SAMPLE_MS = 250;
 /** @typedef {import('../lines.js').RobotWindow} RobotWindow */
 
 const KINDS = /** @type {[keyof RobotWindow, string, string][]} */ ([
-  ['one_way', 'Client to robot', 'one way, of whoever drives from this program; of others no two clocks agree'],
-  ['loop', 'Robot, client, robot', 'by the robot’s own clock: from a picture to the command that was given by it'],
+  ['one_way', 'Client to robot', 'one way, only for drivers in this program; other clocks differ'],
+  ['loop', 'Robot, client, robot', 'by the robot’s own clock: from a picture to the command it led to'],
   ['replies', 'Request to reply', 'in the robot'],
 ]);
 const FIGURES = /** @type {[string, string][]} */ ([['last_ms', 'Last'], ['median_ms', 'Median'], ['p95_ms', 'p95'], ['largest_ms', 'Largest']]);

@@ -7,7 +7,7 @@ import { percentText } from '../ui/words.js';
 import { RobotPage } from './robot_page.js';
 import { shownMode } from './window.js';
 
-const HEADS = ['Robot', 'Mode', 'Holder', 'Speed', 'Battery', 'Why it stands'];
+const HEADS = ['Robot', 'Mode', 'Holder', 'Speed', 'Battery', 'Why it is stopped'];
 
 /** The page. */
 export function RobotsPage() {

@@ -34,7 +34,7 @@ export function Bar() {
 function Time() {
   useEvery(200);
   const { factor, paused } = clock.value;
-  const name = paused ? 'Go on' : 'Pause';
+  const name = paused ? 'Resume' : 'Pause';
   return html`<span class="item time" title="Simulation time and speed">
     <span class="figure">${clockText(worldNow())}</span>
     <span class="soft">${paused ? 'paused' : `×${Number(factor.toFixed(1))}`}</span>
