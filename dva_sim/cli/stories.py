@@ -62,7 +62,7 @@ COLUMNS = {
     "waits": "waits",
     "delay_felt_s": "delay\nfelt\n[s]",
 }
-"""Columns of the trials that are told, as far as the task has them, with their heads."""
+"""Columns of the printed trials with their heads; a task has some of them."""
 
 
 def tell_any(run: Played, console: Console) -> None:

@@ -29,8 +29,8 @@ LOST: Final = m.NOT_PERMITTED, m.BAD_SESSION
 LEVELS: Final = "teleoperation", "teleoperation", "both", "both", "missions"
 TAKEOVERS: Final[tuple[str | None, ...]] = (None, None, "ask", "force")
 INSISTS: Final = 2.0, 40.0, 40.0
-"""How long somebody insists on a robot that another has: longer than it is stopped and kept, or
-until something else comes to mind [s]."""
+"""Times for which a driver insists on a robot that another has [s]: shorter or longer than the
+robot is stopped and reserved."""
 
 
 class BusyDriver:

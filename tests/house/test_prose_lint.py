@@ -30,11 +30,23 @@ def test_each_fault_is_found(docstring, rules):
     assert [found.rule for found in prose_lint.findings_in(source, FILE)] == rules
 
 
-def test_a_room_may_only_get_better():
-    now = prose_lint.counted(
-        [prose_lint.Finding("dva_sim/network", "question", "", "")] * 3
-        + [prose_lint.Finding("dva_sim/kernel", "word", "", "")]
-    )
-    before = {"dva_sim/network": {"question": 2}, "dva_sim/kernel": {"word": 1}}
-    assert prose_lint.worse(now, before) == [("dva_sim/network", "question")]
-    assert prose_lint.worse(now, {}) != []
+@pytest.mark.parametrize(
+    ("docstring", "rules"), [("Robots of a scenario.", []), ("Whose turn it is.", ["question"])]
+)
+def test_docstrings_of_constants_are_read(docstring, rules):
+    source = f'TURN = 1\n"""{docstring}"""\n'
+    assert [found.rule for found in prose_lint.findings_in(source, FILE)] == rules
+
+
+@pytest.mark.parametrize(
+    ("comment", "rules"),
+    [
+        ("/** Age of a picture [ms]. */", []),
+        ("/** @param {number} i */", []),
+        ("/** Whether it holds. */", ["question"]),
+        ("  /**\n   * What is held.\n   */", ["question"]),
+    ],
+)
+def test_doc_comments_of_pages_are_read(comment, rules):
+    found = prose_lint.findings_in(f"{comment}\nconst a = 1;\n", Path("a.js"))
+    assert [each.rule for each in found] == rules

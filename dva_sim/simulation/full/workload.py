@@ -64,7 +64,7 @@ COLUMNS = (
     Measure("path_error_max_m", "greatest distance from the ways planned"),
     *_WRONG,
 )
-"""Of a run."""
+"""Columns and measures of a run."""
 OPERATOR_COLUMNS = (
     text("operator_name", "who"),
     Measure("orders", "orders received"),

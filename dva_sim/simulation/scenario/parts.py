@@ -92,7 +92,7 @@ class RobotConfig(Config):
 
 Kind = Literal["simulated", "person"]
 Kinds = Kind | dict[Annotated[int, Field(ge=1)], Kind]
-"""Of all, or of some by their numbers from 1; who is not named is simulated."""
+"""One kind for all, or kinds of some by their numbers from 1; the others are simulated."""
 
 
 def persons_of(kinds: Kinds, count: int) -> tuple[int, ...]:

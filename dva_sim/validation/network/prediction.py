@@ -208,7 +208,7 @@ Played = Literal["message", "segment", "datagram"]
 
 _PATIENCE_S = 120.0  # for a handshake; then nothing is ever sent
 LATE_S = 0.0001
-"""How late the emulated link lets a packet go, by its own account; half of them are later.
+"""Median lateness of packets at the emulated link, by its own account [s].
 
 It decides what comes first where delays and periods are round: acknowledgements do not return
 at the very moment of the next command.

@@ -75,7 +75,7 @@ def test_help_is_asked_for_and_an_event_reported_where_one_is(page):
     page.get_by_label("Kind").select_option("flood")
     page.get_by_label("Severity").select_option("critical")
     tap(page, "Report at my position")
-    expect(page.get_by_role("status", name="Report")).to_have_text("Told: flood reported")
+    expect(page.get_by_role("status", name="Report")).to_have_text("Sent: flood reported")
     asked = sent(page, "guard_report")[0]
     assert (asked["kind"], asked["severity"]) == ("flood", "critical")
     assert asked["x_m"] != 0

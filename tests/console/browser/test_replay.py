@@ -153,7 +153,7 @@ def test_two_people_see_the_same_moment(drilled):
 
 def test_a_line_of_the_story_leads_to_its_moment(drilled):
     page = drilled("story")
-    reported = page.get_by_role("list", name="Told so far")
+    reported = page.get_by_role("list", name="Story so far")
     expect(reported).to_have_count(0)  # the time in the bar may be ahead of the lists
     later = page.get_by_role("list", name="Still to come").get_by_role("button")
     text = later.nth(2).inner_text()

@@ -1,4 +1,4 @@
-/** Where the page begins. */
+/** Entry point of the console page. */
 import { connect, keepDriveSocket } from './net/sockets.js';
 import { keepSampling } from './network/samples.js';
 import { showApp } from './shell/app.js';

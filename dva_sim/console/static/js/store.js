@@ -1,4 +1,4 @@
-/** The newest state of the world, as signals: components read them, messages write them. */
+/** Latest state of the simulation, as signals: components read them, messages write them. */
 import { computed, signal } from '../vendor/preact.js';
 import { Tracks } from './map/tracks.js';
 
@@ -11,7 +11,7 @@ export const hazards = signal({ hazards: [], fields: [] });
 /** @type {import('../vendor/preact.js').Signal<import('./lines.js').SiteEvent[]>} */
 export const events = signal([]);
 /**
- * What the DVA knows of each device, while a page shows it.
+ * Devices as the DVA reports them, while a page shows them.
  * @type {import('../vendor/preact.js').Signal<import('./lines.js').DeviceRow[]>}
  */
 export const devices = signal([]);
@@ -20,24 +20,24 @@ export const story = signal([]);
 /** @type {import('../vendor/preact.js').Signal<import('./lines.js').Seat | null>} */
 export const seat = signal(null);
 /**
- * What the windows of robots show, of those that the page looks at.
+ * Detailed state of the robots that the page is showing.
  * @type {import('../vendor/preact.js').Signal<Map<number, import('./lines.js').RobotWindow>>}
  */
 export const windows = signal(new Map());
 /**
- * What the guard knows whom this page stands for.
+ * State of the guard whom this page plays; null if it plays none.
  * @type {import('../vendor/preact.js').Signal<import('./lines.js').Guard | null>}
  */
 export const guard = signal(null);
 /**
- * How orders are given, and who decides: what control rooms share.
+ * State shared by control rooms: how orders are given, and who decides.
  * @type {import('../vendor/preact.js').Signal<import('./lines.js').Control | null>}
  */
 export const control = signal(null);
 /** @type {import('../vendor/preact.js').Signal<Omit<import('./lines.js').Alarms, 'k' | 't'>>} */
 export const alarmList = signal({ alarms: [], shelved: [], flood: false, rate: 0, left_out: 0 });
 /**
- * How the audit log stands; its rows are asked for.
+ * State of the audit log; its rows are requested separately.
  * @type {import('../vendor/preact.js').Signal<import('./lines.js').Audit | null>}
  */
 export const audit = signal(null);
@@ -45,66 +45,66 @@ export const audit = signal(null);
 export const you = signal(null);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').Selection>} */
 export const selection = signal(null);
-/** Whether the world can be heard: 'connecting', 'open', 'lost', or why it has ended. */
+/** State of the connection: 'connecting', 'open', 'lost', or the reason why the simulation ended. */
 export const connection = signal('connecting');
-/** Whether the socket is open on which the person's hand reaches the world. */
+/** True while the driving socket is open. */
 export const reaches = signal(false);
-/** Why there are no camera pictures; empty while there are. */
+/** Reason why there are no camera pictures; empty while there are. */
 export const pictures = signal('');
-/** What went wrong last, or was refused; empty when there is nothing to tell. */
+/** Latest problem or refusal; empty if there is none. */
 export const notice = signal('');
 
 /**
- * The recordings that can be chosen, if any can.
+ * Recordings to choose from, if any.
  * @type {import('../vendor/preact.js').Signal<import('./lines.js').Shelf | null>}
  */
 export const shelf = signal(null);
 
-/** Where everything that moves is; not a signal, for it is drawn, not rendered. */
+/** Positions of everything that moves; not a signal, since they are drawn and not rendered. */
 export const tracks = new Tracks();
 
 /** @type {import('./lines.js').Clock} */
 const USUAL = { factor: 1, paused: false, lag_s: 0, given_up_s: 0, held_by_lag: false };
 export const clock = computed(() => rows.value?.clock ?? USUAL);
 export const link = computed(() => rows.value?.link ?? scene.value?.link ?? null);
-/** Whether the link is that of a study, with sliders, and not one of sockets. */
+/** True if the link is simulated and can be adjusted; false for real sockets. */
 export const isModelled = computed(() => (link.value?.kind ?? 'modelled') === 'modelled');
-/** Whether what is shown runs at a DVA elsewhere, of which only messages are known. */
+/** True if the console shows a DVA running elsewhere, known only from its messages. */
 export const isAttached = computed(() => Boolean(scene.value?.attached));
-/** How long a command takes at least [ms], as far as it is known. */
+/** Minimum latency of a command [ms], from the known delay and processing time. */
 export const floorMs = computed(
   () => 1000 * ((link.value?.delay_s ?? 0) + (link.value?.processing_s ?? 0)),
 );
-/** What is known of the recording that is shown; null where something runs. */
+/** Description of the recording being shown; null if there is none. */
 export const replay = computed(() => scene.value?.replay ?? null);
-/** Whether the past is shown, in which nobody can be told anything. */
+/** True if the page shows recordings, which accept no commands. */
 export const isPast = computed(() => Boolean(scene.value && 'replay' in scene.value));
 export const robots = computed(
   () => scene.value?.things.filter((thing) => thing.kind === 'robot') ?? [],
 );
-/** Whether this page's address is one for driving, or for a phone. */
+/** True if this page's address permits driving, from the console or from a phone. */
 export const mayDrive = computed(() => roleIsOneOf('phone', 'drive', 'dispatch', 'supervise'));
-/** Whether it is one of the console's own, and no phone's. */
+/** True if this page's address is one of the console's own, not a phone's. */
 export const isOperator = computed(() => roleIsOneOf('drive', 'dispatch', 'supervise'));
-/** What a DVA elsewhere lets this console do; where the world is the console's own: all. */
+/** Role that a remote DVA grants this console; all rights in the console's own simulation. */
 export const allowed = computed(() => (isAttached.value ? (rows.value?.server?.role ?? 'look') : 'supervise'));
-/** Whether this page's address is one for sending people and robots to events. */
+/** True if this page's address permits sending people and robots to events. */
 export const isDispatcher = computed(() => roleIsOneOf('dispatch', 'supervise'));
-/** Whether people and robots can be sent to events from here. */
+/** True if people and robots can be sent to events from this page. */
 export const mayDispatch = computed(
   () => !isPast.value && isDispatcher.value && ['dispatch', 'supervise'].includes(allowed.value),
 );
-/** Whether robots can be taken from their holders from here. */
+/** True if robots can be taken from their holders from this page. */
 export const maySupervise = computed(
   () => !isPast.value && roleIsOneOf('supervise') && allowed.value === 'supervise',
 );
 /** @param {string[]} roles */
 const roleIsOneOf = (...roles) => roles.includes(you.value?.role ?? '');
-/** Whether anything can be steered now. */
+/** True if commands can be sent now. */
 export const maySteer = computed(
   () => mayDrive.value && connection.value === 'open' && reaches.value && !isPast.value,
 );
-/** Whether this page may say which moment of a recording is shown. */
+/** True if this page may control which moment of a recording is shown. */
 export const maySteerReplay = computed(() => mayDrive.value && connection.value === 'open');
 
 const robotRows = computed(
@@ -125,7 +125,7 @@ export const doingOf = (i) => doings.value.get(i) ?? '';
 /** @param {number} i */
 export const driveOf = (i) => seat.value?.drives.find((drive) => drive.i === i);
 /**
- * The mode of a robot, as its driver hears it first, else as everybody does.
+ * Mode of a robot: as reported to this page as its driver, else as reported to all pages.
  * @param {number} i
  */
 export const modeOf = (i) => (rowOf(i)?.by_hand ? 'Manual' : driveOf(i)?.mode || rowOf(i)?.mode || 'Idle');

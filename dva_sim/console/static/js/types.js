@@ -1,5 +1,5 @@
 /**
- * What pages have beside what they are told, by name; the types of that are in `lines.js`.
+ * Named types that pages use besides those of the messages, which are in `lines.js`.
  *
  * @typedef {Omit<import('./lines.js').Done, 'k' | 'id'> & {id?: string | null}} Answer
  * @typedef {{x: number, y: number, radius: number, name: string}} Goal

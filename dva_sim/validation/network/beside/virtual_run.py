@@ -26,8 +26,8 @@ PROGRAM_S = 0.0005
 """From the arrival of a command's last packet to its application: assumed. It also decides what
 comes first where a round trip is a whole number of periods."""
 STARTS_S, ENDS_S = (0.3, 1.0), (0.0, 0.6)
-"""When the programs have started, after the link, and how long the operator's takes to end:
-assumed, equally likely in between."""
+"""Start of the programs after the link, and time the operator's takes to end: assumed ranges,
+uniform."""
 
 
 class ProgramTimes(NamedTuple):

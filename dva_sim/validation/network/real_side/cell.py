@@ -53,7 +53,7 @@ PROGRAM_PRIORITY = 10  # real-time, below the forwarder's
 _PATIENCE_S = 20.0  # for a node to be ready
 
 Program = Callable[[socket.socket, Notes], None]
-"""Runs in a node: with a connection to whoever started it, and a place for its notes."""
+"""Function that runs in a node, with a connection to its starter and a place for its notes."""
 
 
 @dataclass(frozen=True)

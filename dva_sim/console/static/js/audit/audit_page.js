@@ -1,4 +1,4 @@
-/** Who decided what? The audit log, whether it holds, and what it says of how one works. */
+/** Audit page: the log of decisions, its verification, and the measures derived from it. */
 import { html, useEffect, useState } from '../../vendor/preact.js';
 import { audit } from '../store.js';
 import { Field } from '../ui/fields.js';
@@ -49,7 +49,7 @@ export function AuditPage() {
 }
 
 /**
- * What the server tells, or why it does not.
+ * Fetch JSON from the server; return the body, or the problem.
  * @param {string} path
  * @returns {Promise<{body: any, problem: string}>}
  */
@@ -64,7 +64,7 @@ async function ask(path) {
 }
 
 /**
- * The newest rows: those that are there, and what has come since.
+ * Newest rows: those already loaded, and those added since.
  * @param {AuditRow[]} rows
  * @param {number} number
  */

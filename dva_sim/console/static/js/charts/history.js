@@ -1,9 +1,9 @@
-/** The last values of some numbers, for charts and for what is said of them. */
+/** Recent values of some numbers, for charts and the figures beside them. */
 
-/** Times [s] with as many values each; what is older than the span is forgotten. */
+/** Times [s] with their values; those older than the span are discarded. */
 export class History {
   /**
-   * @param {number} width how many values at a time
+   * @param {number} width number of values per time
    * @param {number} [span] [s]
    */
   constructor(width, span = 40) {
@@ -27,7 +27,7 @@ export class History {
     this.columns.forEach((column) => (column.length = 0));
   }
 
-  /** As charts read it. */
+  /** Return the columns in the format of the charts. */
   read() {
     return this.columns.map((column) => column.slice());
   }
@@ -38,7 +38,7 @@ export class History {
   }
 
   /**
-   * What 95 of 100 values stay below.
+   * 95th percentile of a column; null without values.
    * @param {number} n
    */
   p95(n) {

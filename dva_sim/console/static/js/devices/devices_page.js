@@ -1,4 +1,4 @@
-/** Who is connected, and who holds what? Devices that are not there are added here, too. */
+/** Devices page: connected devices and their holders; fake devices can be added. */
 import { html, useState } from '../../vendor/preact.js';
 import { devices, isAttached, isPast, maySteer, maySupervise, rows } from '../store.js';
 import { act } from '../net/actions.js';

@@ -1,4 +1,4 @@
-/** A device that is not there: on the list like all others, and nobody answers. */
+/** Form for a fake device: listed like all others, but it never replies. */
 import { html, useState } from '../../vendor/preact.js';
 import { act } from '../net/actions.js';
 import { Choice, Field } from '../ui/fields.js';

@@ -1,4 +1,4 @@
-/** A robot's picture with its true age; old looks old. */
+/** A robot's picture with its true age; an outdated picture is marked. */
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
 import { pictures, scene } from '../store.js';
 import { useEvery } from '../ui/every.js';
@@ -64,7 +64,7 @@ function draw(canvas, robot, frame) {
   drew(robot, frame.capturedMs);
 }
 
-/** Whether the page can be seen: no stream is read for nobody. */
+/** True while the page is visible; a hidden page reads no stream. */
 function usePageSeen() {
   const [seen, see] = useState(!document.hidden);
   useEffect(() => {

@@ -1,4 +1,4 @@
-/** Take, start, drive, stop, release; and what the robot is doing. */
+/** Controls to take, start, drive, stop and release; and the robot's current mode. */
 import { html, useEffect, useRef } from '../../vendor/preact.js';
 import { clock, connection, floorMs, mayDrive, maySteer, modeOf, rowOf, rows, seat } from '../store.js';
 import { act } from '../net/actions.js';
@@ -39,11 +39,11 @@ export function Controls({ robots }) {
   </section>`;
 }
 
-/** Which button comes next, by the phase; while something is asked for, none does yet. */
+/** Index of the next button for each phase; none while a request is pending. */
 const NEXT = /** @type {Record<string, number>} */ ({ free: 0, held: 1, driving: 2 });
 
 /**
- * Lead the focus on when the button that had it can be pressed no longer: keys alone suffice.
+ * Move the focus to the next button when the focused one is disabled, so that keys alone suffice.
  * @param {number | undefined} next
  */
 function useNextButton(next) {
@@ -79,7 +79,7 @@ const PHASES = /** @type {Record<string, string>} */ ({
   stopping: 'Stopping …',
 });
 
-/** What to do next, or why nothing moves. @param {{holds: boolean}} props */
+/** Next step, or the reason why nothing moves. @param {{holds: boolean}} props */
 function Hint({ holds }) {
   if (connection.value !== 'open') return 'Not connected to the simulation. You cannot drive.';
   if (!mayDrive.value) return 'This address is view-only. The address for driving is printed in the terminal where the console was started.';
@@ -96,7 +96,7 @@ function Hint({ holds }) {
   return PHASES[phase] ?? '';
 }
 
-/** Whether something is wanted that no robot does yet. */
+/** True while a speed is requested that no robot applies yet. */
 function isOnItsWay() {
   const drives = seat.value?.drives ?? [];
   const wanted = held.value && wish.value.speed > 0 && seat.value?.phase === 'driving';

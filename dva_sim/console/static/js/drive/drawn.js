@@ -1,24 +1,24 @@
-/** The pictures that this page has drawn last: what its person has seen of each robot. */
+/** Newest picture of each robot that this page has drawn, and so its user has seen. */
 import { worldNow } from '../net/world_time.js';
 
-/** When they were taken by robot, in the world's time [ms]. @type {Map<number, number>} */
+/** Capture times by robot, in simulation time [ms]. @type {Map<number, number>} */
 const drawn = new Map();
 
 /**
- * A picture has been drawn.
+ * Record that a picture has been drawn.
  * @param {number} robot
  * @param {number} capturedMs
  */
 export const drew = (robot, capturedMs) => void drawn.set(robot, capturedMs);
 
-/** No picture of a robot is on the page any more. @param {number} robot */
+/** Forget a robot whose pictures are no longer on the page. @param {number} robot */
 export const drawsNoMore = (robot) => void drawn.delete(robot);
 
-/** How old the newest picture of a robot is [ms]. @param {number} robot */
+/** Age of the newest picture of a robot [ms]. @param {number} robot */
 export function pictureAge(robot) {
   const at = drawn.get(robot);
   return at === undefined ? NaN : Math.max(0, worldNow() - at);
 }
 
-/** What goes with each input, so that a command is as old as the picture that it was given by. */
+/** Capture times sent with each input: the age of a command includes that of the picture behind it. */
 export const seenPictures = () => [...drawn].filter(([, at]) => Number.isFinite(at));

@@ -1,4 +1,4 @@
-/** One or two robots under a person's hands, their pictures, the map, and how late it all is. */
+/** Driving page: one or two robots with their pictures, the map and latencies. */
 import { html, useEffect } from '../../vendor/preact.js';
 import { connection, seat, scene } from '../store.js';
 import { driveLost } from '../net/actions.js';
@@ -47,7 +47,7 @@ export function DrivePage() {
   </main>`;
 }
 
-/** Keys, gamepad, and all that interrupts them. */
+/** Start steering by keys and gamepad; return a function that stops it. */
 function steering() {
   const ends = [driveByKeys(), driveByGamepad(), watchInterruptions()];
   return () => {
@@ -56,7 +56,7 @@ function steering() {
   };
 }
 
-/** What the app shows a driver at once: a lost link, a refusal. */
+/** Alert shown to the driver at once: a lost link, a refusal. */
 function Alert() {
   const text = scene.value && seat.value?.alert;
   return html`<div role="alert" class="seat-alert">${text && html`<p class="warning">${text}</p>`}</div>`;

@@ -16,7 +16,7 @@ function turnText(value) {
 }
 
 /**
- * Both, for robots with these limits.
+ * Sliders for speed and turn rate, scaled to the robots' limits.
  * @param {{limits: {max_speed_mps: number, max_turn_rate_radps: number}, disabled: boolean}} props
  */
 export function DriveSliders({ limits, disabled }) {
@@ -36,9 +36,9 @@ export function DriveSliders({ limits, disabled }) {
 }
 
 /**
- * A slider wants something while a pointer or a key holds it. A value that came otherwise, as from
- * assistive technology, counts while the slider has the focus and the page can be seen. After an
- * interruption the hand that is still on it counts for nothing: it is spent until it lets go.
+ * Handlers of a slider that is active while a pointer or a key holds it. A value set in another
+ * way, for instance by assistive technology, applies until the slider loses the focus. After an
+ * interruption a grip that continues is ignored until it is released.
  * @param {string} source
  */
 function useSpring(source) {

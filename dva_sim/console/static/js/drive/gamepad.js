@@ -1,4 +1,4 @@
-/** Driving by a gamepad: a shoulder button is the dead man, the left stick steers. */
+/** Driving by a gamepad: a shoulder button is the dead-man switch, the left stick steers. */
 import { signal } from '../../vendor/preact.js';
 import { hold, interrupt, letGo, onRelease } from './hold.js';
 
@@ -14,7 +14,7 @@ function beyondDeadZone(value) {
   return size < DEAD_ZONE ? 0 : (Math.sign(value) * (size - DEAD_ZONE)) / (1 - DEAD_ZONE);
 }
 
-/** From now on. @returns {() => void} how to end that */
+/** Start driving by gamepad. @returns {() => void} stops it */
 export function driveByGamepad() {
   let frame = 0;
   let spent = false;

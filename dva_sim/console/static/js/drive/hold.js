@@ -1,11 +1,11 @@
 /**
  * Hold to drive: the robot moves only while something is held.
  *
- * Keys, pointer, sliders and gamepad each say what they want for as long as they are held; the
- * newest that wants anything counts. Whatever interrupts (the window loses the focus, the page is
- * hidden, the connection breaks, the screen is turned) stops at once, and what was held then counts
- * for nothing until it has been let go: only a new gesture drives on. So it is after the end of a
- * drive, too: a hand that nobody has lifted does not move the robot at the next start.
+ * Keys, pointer, sliders and gamepad each request a motion for as long as they are held; the newest
+ * request applies. Any interruption (the window loses the focus, the page is hidden, the connection
+ * breaks, the screen is turned) stops the robot at once, and an input held at that moment is ignored
+ * until it is released: only a new gesture resumes driving. The same applies after the end of a
+ * drive: an input that was never released does not move the robot at the next start.
  */
 import { effect, signal } from '../../vendor/preact.js';
 import { seat, you } from '../store.js';
@@ -17,13 +17,13 @@ const LEAST_MS = 15;
 
 /** @typedef {{speed: number, turn: number}} Wish shares of the limits; turn to the left positive */
 
-/** What is wanted now. */
+/** Motion currently requested. */
 export const wish = signal(/** @type {Wish} */ ({ speed: 0, turn: 0 }));
-/** Whether anything is held. */
+/** True while any input is held. */
 export const held = signal(false);
-/** Whether a drive goes on without anything held: a phone is steered by the way it is tilted. */
+/** True while a drive continues without a held input: a phone is steered by tilting it. */
 export const engaged = signal(false);
-/** Why driving was interrupted; empty once somebody takes hold again. */
+/** Reason why driving was interrupted; empty once an input is held again. */
 export const interrupted = signal('');
 
 /** @type {Map<string, Wish>} */
@@ -37,7 +37,7 @@ let timer = 0;
 let soon = 0;
 
 /**
- * A source wants something, as long as it is held.
+ * Request a motion from a source until it is released.
  * @param {string} source
  * @param {Wish} wanted
  */
@@ -54,9 +54,9 @@ export function letGo(source) {
 }
 
 /**
- * Be told when everything held counts for nothing any more.
+ * Call a function whenever all held inputs are discarded.
  * @param {() => void} release
- * @returns {() => void} how to end that
+ * @returns {() => void} stops it
  */
 export function onRelease(release) {
   releases.add(release);
@@ -64,7 +64,7 @@ export function onRelease(release) {
 }
 
 /**
- * Stop at once, whatever is held.
+ * Stop at once, whatever is held, and show the reason.
  * @param {string} why
  */
 export function interrupt(why) {
@@ -76,7 +76,7 @@ export function interrupt(why) {
   interrupted.value = why;
 }
 
-/** Whatever is held counts for nothing until it has been let go and taken again. */
+/** Discard all held inputs until they are released and held again. */
 export function forget() {
   sources.clear();
   for (const release of releases) release();
@@ -84,9 +84,9 @@ export function forget() {
 }
 
 /**
- * Forget what is held when a drive ends, or does not come about, whoever ended it. What is taken
- * hold of later counts, also while the next drive is being started.
- * @returns {() => void} how to end that
+ * Discard held inputs when a drive ends or fails to start, for whatever reason. Inputs held later
+ * apply, also while the next drive is starting.
+ * @returns {() => void} stops it
  */
 function watchEnds() {
   let before = '';
@@ -131,9 +131,9 @@ function send() {
 }
 
 /**
- * What is held steers something else than the robots of the seat, until that is ended.
- * @param {string} name of the input, as the world knows it
- * @returns {() => void} how to end that
+ * Direct held inputs to a target other than the robots of the seat, until stopped.
+ * @param {string} name of the input in messages to the simulation
+ * @returns {() => void} stops it
  */
 export function steerWith(name) {
   forget();
@@ -144,13 +144,13 @@ export function steerWith(name) {
   };
 }
 
-/** A last word that outlives the page, should the socket not carry it any more. */
+/** Report that the page is closing by a beacon, in case the socket can no longer send. */
 function sayGone() {
   const body = JSON.stringify({ action: 'gone', key: you.peek()?.key });
   navigator.sendBeacon?.('/api/actions', new Blob([body], { type: 'application/json' }));
 }
 
-/** Whatever interrupts. @returns {() => void} how to end that */
+/** Start watching for interruptions. @returns {() => void} stops it */
 export function watchInterruptions() {
   const blur = () => interrupt('The window lost focus.');
   const hide = () => document.hidden && interrupt('The page was hidden.');

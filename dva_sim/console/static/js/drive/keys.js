@@ -1,4 +1,4 @@
-/** Driving by keys: arrows or W A S D while they are held; with Shift slowly. */
+/** Driving by keys: arrows or W A S D while they are held; Shift slows down. */
 import { hold, letGo, onRelease } from './hold.js';
 import { isWriting } from '../shell/keys.js';
 
@@ -14,12 +14,12 @@ const WAYS = /** @type {Record<string, [number, number]>} */ ({
 });
 const SLOW = 0.4;
 
-/** @param {EventTarget | null} target whether a key means something else there */
+/** @param {EventTarget | null} target element that may use the arrow keys itself */
 function hasOwnArrows(target) {
   return target instanceof Element && target.matches('input, select, [role=application]');
 }
 
-/** From now on. @returns {() => void} how to end that */
+/** Start driving by keys. @returns {() => void} stops it */
 export function driveByKeys() {
   /** @type {Set<string>} */
   const down = new Set();

@@ -1,4 +1,4 @@
-/** How late everything is: commands, answers, pictures; for each robot that is driven. */
+/** Latency panel: ages of commands, replies and pictures of each driven robot. */
 import { html, useEffect, useMemo } from '../../vendor/preact.js';
 import { driveOf, floorMs, isModelled, rowOf } from '../store.js';
 import { worldNow } from '../net/world_time.js';
@@ -13,7 +13,7 @@ const DASHES = [undefined, [6, 3]];
 
 /** @typedef {import('../lines.js').Thing} Thing */
 
-/** Patterns by which a robot answers no command. */
+/** Patterns under which a robot does not reply to commands. */
 const UNANSWERED = ['pub-sub', 'latest-wins'];
 
 const KINDS = /** @type {{title: string, hint: string, none: (i: number) => string, read: (i: number) => number | null}[]} */ ([
@@ -72,7 +72,7 @@ function sample(histories, robots) {
   KINDS.forEach((kind, n) => histories[n].add(time, robots.map((robot) => kind.read(robot.i))));
 }
 
-/** What no pattern can be faster than. */
+/** Lower bound on the latency of a command, whatever the pattern. */
 function Floor() {
   const how = isModelled.value ? 'takes' : 'is processed for';
   return html`<span class="count">a command ${how} at least ${msText(floorMs.value)}</span>`;
@@ -81,7 +81,7 @@ function Floor() {
 /**
  * @param {History} history
  * @param {number} n
- * @param {string} none what it means that there is no value
+ * @param {string} none text shown when there is no value
  */
 function value(history, n, none) {
   const last = history.last(n);

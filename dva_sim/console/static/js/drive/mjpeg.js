@@ -1,4 +1,4 @@
-/** A camera's stream, part by part, with the times that an `<img>` would hide. */
+/** Reads a camera's stream part by part, for the times that an `<img>` would hide. */
 
 const HEAD_END = [13, 10, 13, 10];
 const WAIT_MS = 1000;
@@ -8,10 +8,10 @@ const WAIT_MS = 1000;
  */
 
 /**
- * Read a stream until `signal` says to stop; begin again when it ends.
+ * Read a stream until `signal` aborts; reconnect when it ends.
  * @param {string} url
  * @param {(frame: Frame) => void} show
- * @param {(text: string) => void} tell what is wrong, or nothing
+ * @param {(text: string) => void} tell reports a problem; an empty text clears it
  * @param {AbortSignal} signal
  */
 export async function play(url, show, tell, signal) {
@@ -58,7 +58,7 @@ async function decoded({ head, body }) {
   };
 }
 
-/** Bytes that have come, until a part of them is whole. */
+/** Bytes received so far, cut into complete parts. */
 export class Buffer {
   constructor() {
     this.bytes = new Uint8Array(0);
@@ -72,7 +72,7 @@ export class Buffer {
     this.bytes = all;
   }
 
-  /** The next whole part, or null. */
+  /** Remove and return the next complete part, or null. */
   take() {
     const end = indexOf(this.bytes, HEAD_END);
     if (end < 0) return null;

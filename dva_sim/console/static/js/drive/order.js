@@ -1,4 +1,4 @@
-/** The order in hand: drive there, look, and say what is true. */
+/** Current order: drive there, look, and report whether the event is real. */
 import { html } from '../../vendor/preact.js';
 import { maySteer, rows, seat, thingAt } from '../store.js';
 import { act } from '../net/actions.js';
@@ -6,7 +6,7 @@ import { placeOf } from '../map/shown.js';
 import { chooseRobots, driven } from '../shell/route.js';
 import { capital, plain } from '../ui/words.js';
 
-/** The newest order: of one's own seat, else the one that waits for somebody. */
+/** Newest order: that of this seat, else the one waiting for an operator. */
 export function OrderInHand() {
   const mine = seat.value?.order ?? null;
   const order = mine ?? rows.value?.order ?? null;

@@ -1,4 +1,4 @@
-/** Above each picture: which robot, under which pattern, and what became of its commands. */
+/** Header above each picture: the robot, its pattern, and counts of its commands. */
 import { html } from '../../vendor/preact.js';
 import { driveOf, modeOf, robots, rowOf, rows, seat } from '../store.js';
 import { PatternSelect } from '../network/pattern_select.js';
@@ -21,7 +21,7 @@ export function RobotHead({ robot, place }) {
   </div>`;
 }
 
-/** Whether the person sits: other robots only after the release. */
+/** True while this page holds a robot; others can be chosen only after its release. */
 const isHeld = () => Boolean(seat.value?.drives.length);
 
 /** @param {{robot: import('../lines.js').Thing, place: number}} props */
@@ -53,7 +53,10 @@ let heardAt = 0;
 /** @type {unknown} */
 let heardRows = null;
 
-/** How long it would go on without a word. @param {{robot: import('../lines.js').Thing}} props */
+/**
+ * Time until the watchdog stops the robot without a command.
+ * @param {{robot: import('../lines.js').Thing}} props
+ */
 function Watchdog({ robot }) {
   useEvery(100);
   if (rows.value !== heardRows) [heardRows, heardAt] = [rows.value, performance.now()];

@@ -1,4 +1,4 @@
-/** A stick to hold with a pointer: up is forward, there is no reverse. */
+/** Virtual stick for a pointer: up drives forward, and nothing drives in reverse. */
 import { html, useEffect, useRef } from '../../vendor/preact.js';
 import { hold, letGo, onRelease, wish } from './hold.js';
 

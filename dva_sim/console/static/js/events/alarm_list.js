@@ -1,4 +1,4 @@
-/** Alarms: one list, the gravest on top; only what is new stands out, and only for 5 seconds. */
+/** Alarm list, most severe first; only new alarms are highlighted, for 5 seconds. */
 import { html, useState } from '../../vendor/preact.js';
 import { alarmList, mayDispatch, selection } from '../store.js';
 import { act } from '../net/actions.js';
@@ -11,7 +11,7 @@ const SHELF_S = 900;
 
 /** @typedef {import('../lines.js').AlarmRow} AlarmRow */
 
-/** The list, and what is shelved. */
+/** Active and shelved alarms. */
 export function AlarmList() {
   useEvery(1000);
   const { alarms, shelved, flood, rate } = alarmList.value;

@@ -1,4 +1,4 @@
-/** One event: how it stands, whom the policy would send, and all that can be done about it. */
+/** Event panel: the state of one event, the policy's proposal, and all available actions. */
 import { html, useRef, useState } from '../../vendor/preact.js';
 import { isAttached, mayDispatch, maySteer, maySupervise, modeOf, robots, rowOf, selection, thingNamed } from '../store.js';
 import { act } from '../net/actions.js';
@@ -85,11 +85,11 @@ function Doing({ event }) {
     <p role="status" aria-label="Done">${result}</p></div>`;
 }
 
-/** Who is on the way or there; not who drives a robot. @param {SiteEvent} event */
+/** Robots and guards assigned to an event; drivers are left out. @param {SiteEvent} event */
 const sentTo = (event) =>
   event.assigned.filter((who) => ['robot', 'guard'].includes(thingNamed(who)?.kind ?? ''));
 
-/** A robot that could go though the policy would not send it, as it needs nobody who drives. */
+/** Idle robot for a mission; the policy may not propose it, but a mission needs no driver. */
 const idleRobot = () =>
   robots.value.find((robot) => modeOf(robot.i) === 'Idle' && !rowOf(robot.i)?.holder)?.label ?? '';
 

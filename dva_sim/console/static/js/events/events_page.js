@@ -1,4 +1,4 @@
-/** What waits for me? Alarms, events, one of them with what can be done, and how orders are given. */
+/** Events page: alarms, events, the current one with its actions, and how orders are given. */
 import { html, useEffect } from '../../vendor/preact.js';
 import { allowed, connection, control, isDispatcher, isPast, mayDispatch, maySupervise, you } from '../store.js';
 import { act, ask } from '../net/actions.js';
@@ -26,10 +26,10 @@ export function EventsPage() {
 
 const AGAIN_MS = 1000;
 
-/** Have a device of one's own at the DVA, by which one decides. */
+/** Register this console as a device at the DVA; its decisions are made in that name. */
 const join = () => act('room_join', { name: ownName.peek() });
 
-/** The same, again and again until it is so; the address and the connection allowing. */
+/** Join, retrying until it succeeds, where the address and the connection permit it. */
 function keepJoining() {
   if (!mayDispatch.peek() || connection.peek() !== 'open') return undefined;
   let over = false;

@@ -1,4 +1,4 @@
-/** All events as a table; the one in hand has its first two steps beside it. */
+/** All events as a table; the current one has buttons for its first two steps. */
 import { html } from '../../vendor/preact.js';
 import { events, mayDispatch, maySteer, selection } from '../store.js';
 import { act } from '../net/actions.js';

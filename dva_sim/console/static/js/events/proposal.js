@@ -1,4 +1,4 @@
-/** Whom the policy would send and why, beside everybody else who could go. */
+/** Proposal panel: the policy's choice with its reason, beside all other candidates. */
 import { computed, html, signal, useEffect } from '../../vendor/preact.js';
 import { connection, mayDispatch } from '../store.js';
 import { act, ask as askQuietly } from '../net/actions.js';
@@ -15,7 +15,7 @@ const SOON_MS = 500; // where it could not be asked, as while the page connects
 const known = signal(/** @type {Proposal | null} */ (null));
 const wanted = signal('');
 
-/** Whom Assign sends: who was picked, else who is proposed, else the first who is free. */
+/** Responder that Assign sends: the one picked, else the one proposed, else the first free one. */
 export const chosen = computed(() => {
   const proposal = known.value;
   if (!proposal) return '';
@@ -24,16 +24,16 @@ export const chosen = computed(() => {
   return proposal.label || able.find((who) => who.free)?.label || '';
 });
 
-/** The guard who would be there first. */
+/** Free guard who would arrive first. */
 export const nearestGuard = computed(() => first((who) => !who.robot));
-/** The robot that would be there first. */
+/** Free robot that would arrive first. */
 export const nearestRobot = computed(() => first((who) => who.robot));
 
 /** @param {(who: import('../lines.js').Candidate) => boolean} fits */
 const first = (fits) => known.value?.candidates.find((who) => who.free && fits(who))?.label ?? '';
 
 /**
- * Send somebody; an event that somebody else has decided on meanwhile is left as it is.
+ * Assign a responder; an event decided on by somebody else in the meantime is left unchanged.
  * @param {SiteEvent} event
  * @param {string} whom
  * @param {string} [task]
@@ -80,7 +80,7 @@ function Candidate({ who }) {
 /** @param {number | null} seconds */
 const timeText = (seconds) => (seconds === null ? '–' : secondsText(seconds));
 
-/** Ask now, and again now and then, as long as the event is looked at. @param {SiteEvent} event */
+/** Request a proposal now, and periodically while the event is shown. @param {SiteEvent} event */
 function keepAsking(event) {
   if (known.peek()?.event !== event.number) {
     known.value = null;

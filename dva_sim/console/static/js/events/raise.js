@@ -23,13 +23,13 @@ export function Raise() {
     <${Form} /></section>`;
 }
 
-/** The place that is chosen, as the map marks goals. */
+/** Chosen place, as a goal on the map. */
 const goals = () => {
   const at = place.peek();
   return at ? [{ x: at[0], y: at[1], radius: 0.6, name: 'here' }] : [];
 };
 
-/** Where an event would be raised: what was chosen, else the middle of the first room. */
+/** Place of the new event [m]: the chosen one, else the middle of the first room. */
 function where() {
   return place.value ?? middle(rooms()[0]?.polygon_m ?? [extent()]);
 }

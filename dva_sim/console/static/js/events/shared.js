@@ -1,15 +1,15 @@
-/** What the page Events keeps: which event is looked at, who one is, what is typed as a reason. */
+/** State of the Events page: the current event, the person's name, and the reason being typed. */
 import { computed, signal } from '../../vendor/preact.js';
 import { control, events, selection } from '../store.js';
 import { eventsInOrder, isOpen } from '../map/shown.js';
 
 const NAME_KEY = 'dva-sim-name';
 
-/** What stands in the field for a reason or a note. */
+/** Text of the field for a reason or a note. */
 export const reason = signal('');
-/** The place at which an event would be raised [m]. */
+/** Place chosen for a new event [m]. */
 export const place = signal(/** @type {[number, number] | null} */ (null));
-/** What one is called in the log; kept in this browser. */
+/** Person's name in the log; kept in this browser. */
 export const ownName = signal(localStorage.getItem(NAME_KEY) ?? '');
 
 /** @param {string} name */
@@ -18,7 +18,7 @@ export function rename(name) {
   localStorage.setItem(NAME_KEY, name);
 }
 
-/** The event in hand: the one that is chosen, else the gravest that nobody has acknowledged. */
+/** Current event: the selected one, else the most severe unacknowledged one. */
 export const inHand = computed(() => {
   const chosen = selection.value;
   const found = chosen?.kind === 'event' && events.value.find((e) => e.number === chosen.key);
@@ -27,5 +27,5 @@ export const inHand = computed(() => {
   return open.find((event) => !event.acknowledged) ?? open[0] ?? eventsInOrder()[0] ?? null;
 });
 
-/** How orders are given: `automatic` or `ask_first`; nothing if the DVA has not said so. */
+/** Dispatch mode, `automatic` or `ask_first`; empty until the DVA reports it. */
 export const mode = computed(() => control.value?.dispatch?.mode ?? '');

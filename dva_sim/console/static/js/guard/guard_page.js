@@ -1,4 +1,4 @@
-/** A guard in the field: the order with its way, what is said of it, and where one is. */
+/** Guard page: the current order with its route, reports on it, and the guard's position. */
 import { html, render, useEffect, useState } from '../../vendor/preact.js';
 import { connection, guard, mayDrive, maySteer, notice, scene, tracks } from '../store.js';
 import { act } from '../net/actions.js';
@@ -49,7 +49,7 @@ function Alerts() {
   </div>`;
 }
 
-/** Whom one stands for. */
+/** Selection of the guard to play. */
 function Join() {
   if (!mayDrive.value) return html`<p>This address is view-only. Scan the code for phones.</p>`;
   const free = playedGuards.value;
@@ -87,14 +87,14 @@ function Field({ me }) {
   </main>`;
 }
 
-/** Where the order is, on the map. */
+/** Place of the order, as a goal on the map. */
 function goals() {
   const order = guard.peek()?.order;
   if (!order) return [];
   return [{ x: order.x_m, y: order.y_m, radius: 0.8, name: capital(plain(order.kind)) }];
 }
 
-/** The way there, on the map. */
+/** Route to the order, for the map. */
 const ways = () => (guard.peek()?.order?.way_m ? [/** @type {any} */ (guard.peek()?.order).way_m] : []);
 
 /** @param {{me: import('../lines.js').Guard}} props */
@@ -104,7 +104,7 @@ function Own({ me }) {
   return html`<p>${at ? `You are ${placeOf({ x_m: at.x, y_m: at.y })}.` : 'Your position is unknown.'}</p>`;
 }
 
-/** Beyond this an arrival is asked about once more: the event can hardly be seen from there [m]. */
+/** Distance beyond which an arrival has to be confirmed [m]: the event is hardly visible from there. */
 const FAR_M = 10;
 const SAYINGS = /** @type {[string, string][]} */ ([
   ['departed', 'Departed'],
@@ -114,7 +114,10 @@ const SAYINGS = /** @type {[string, string][]} */ ([
   ['contained', 'Contained'],
 ]);
 
-/** The order in hand, and what can be said of it. @param {{me: import('../lines.js').Guard}} props */
+/**
+ * Current order, with buttons for the guard's reports on it.
+ * @param {{me: import('../lines.js').Guard}} props
+ */
 function OrderCard({ me }) {
   const [why, write] = useState('');
   const [declining, decline] = useState(false);
@@ -161,7 +164,10 @@ function OrderCard({ me }) {
   </section>`;
 }
 
-/** For oneself; pressed once more, it is over. @param {{me: import('../lines.js').Guard}} props */
+/**
+ * Button to request help for the guard; pressing it again withdraws the request.
+ * @param {{me: import('../lines.js').Guard}} props
+ */
 function Help({ me }) {
   const asked = me.doing === 'needs help';
   return html`<button type="button" class="big help-me" disabled=${!maySteer.value} aria-pressed=${asked}

@@ -1,4 +1,4 @@
-/** Where the guard's page begins. */
+/** Entry point of the guard page. */
 import { connect, keepDriveSocket } from '../net/sockets.js';
 import { showGuard } from './guard_page.js';
 

@@ -1,4 +1,4 @@
-/** Whether people can play guards here, and how a scenario allows it. */
+/** Guards that people can play, and the setting that allows it. */
 import { computed } from '../../vendor/preact.js';
 import { scene } from '../store.js';
 

@@ -1,4 +1,4 @@
-/** Where the guard is, by satellite: where the site lies there, and only then. */
+/** Position of the guard by satellite; only for sites with geographic coordinates. */
 import { effect, signal } from '../../vendor/preact.js';
 import { guard, notice, scene } from '../store.js';
 import { act } from '../net/actions.js';
@@ -8,15 +8,15 @@ const RADIANS = Math.PI / 180;
 const ROOM_M = 50; // around the site
 const EVERY_MS = 2000;
 
-/** Whether the browser is asked where it is. */
+/** True while the browser's position is used. */
 export const locating = signal(false);
 
-/** Whether there is anything to ask. */
+/** True if both the browser and the site support positioning. */
 export const canLocate = () =>
   window.isSecureContext && 'geolocation' in navigator && Boolean(scene.peek()?.site.origin);
 
 /**
- * A place on earth in the site's metres, as on a small plane that touches it at its origin.
+ * Convert a geographic position to site coordinates [m], on the plane tangent at the origin.
  * @param {{latitude: number, longitude: number}} place [degrees]
  * @param {{latitude_deg: number, longitude_deg: number}} origin
  */
@@ -26,7 +26,7 @@ export function metres({ latitude, longitude }, origin) {
   return [east * Math.cos(origin.latitude_deg * RADIANS), north];
 }
 
-/** Tell where one is for as long as it is wanted. @returns {() => void} how to end that */
+/** Send the guard's position while `locating` is set. @returns {() => void} stops it */
 export function follow() {
   let lastSent = -Infinity;
   const take = (/** @type {GeolocationPosition} */ found) => {

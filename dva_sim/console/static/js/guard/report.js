@@ -1,4 +1,4 @@
-/** An event that the guard has seen: kind, severity, and the place where the guard is. */
+/** Report of an event that the guard has seen: kind, severity, and the guard's position. */
 import { html, useState } from '../../vendor/preact.js';
 import { maySteer, tracks } from '../store.js';
 import { act } from '../net/actions.js';
@@ -20,7 +20,7 @@ export function Report({ me }) {
     const at = tracks.last(me.guard);
     if (!at) return;
     const done = await act('guard_report', { kind, severity, x_m: at.x, y_m: at.y });
-    setResult(done.ok ? `Told: ${done.text}` : '');
+    setResult(done.ok ? `Sent: ${done.text}` : '');
   };
   return html`<section class="panel" aria-label="Report"><details><summary>Report an event</summary>
     <div class="report"><${Choice} name="Kind" value=${kind} options=${KINDS} onInput=${setKind} />

@@ -1,14 +1,14 @@
-/** Help as a dialog. */
+/** Help dialog. */
 import { html, signal, useEffect, useRef } from '../../vendor/preact.js';
 import { Icon } from '../ui/icon.js';
 import { KEYS, TEXTS } from './texts.js';
 
 const open = signal(false);
 
-/** Show it. */
+/** Open the help dialog. */
 export const openHelp = () => (open.value = true);
 
-/** The dialog, closed until it is asked for. */
+/** The dialog, closed until somebody opens it. */
 export function Help() {
   const dialog = useRef(/** @type {HTMLDialogElement | null} */ (null));
   useEffect(() => {

@@ -1,4 +1,4 @@
-/** What the pages are for, in words. */
+/** Help texts: the purpose of each page, and the keys. */
 
 /** @type {{title: string, lines: string[]}[]} */
 export const TEXTS = [

@@ -1,4 +1,4 @@
-/** Rows of the logs of messages, as they are told: the newest 1,000 of each. */
+/** Rows of the message logs as received: the newest 1,000 of each. */
 import { signal } from '../../vendor/preact.js';
 
 const KEPT = 1000;
@@ -7,8 +7,8 @@ const KEPT = 1000;
 const logs = new Map();
 
 /**
- * Rows of a log, the oldest first: what `brief` in `web/log_entries.py` tells, and `{gap: 1204}`
- * where so many were left out.
+ * Rows of a log, oldest first: entries made by `brief` in `web/log_entries.py`, and `{gap: 1204}`
+ * where 1,204 were left out.
  * @param {string} name
  */
 export function rowsOf(name) {
@@ -18,7 +18,7 @@ export function rowsOf(name) {
 }
 
 /**
- * A line of a log has come.
+ * Add a received line to its log.
  * @param {import('../lines.js').Log} line
  */
 export function hearLog(line) {

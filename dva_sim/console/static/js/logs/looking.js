@@ -1,8 +1,8 @@
 /**
- * Logs and tables that this page looks at: what nobody looks at is not told.
+ * Logs and tables shown by this page; the server sends no others.
  *
- * `useLog('robot-1', {kind: 'SetTeleOp', publications: true})` gives the rows of a log for as long
- * as a component shows it: the newest, then what comes, up to five times a second. See `rowsOf`.
+ * `useLog('robot-1', {kind: 'SetTeleOp', publications: true})` returns the rows of a log (`rowsOf`)
+ * for as long as a component shows it: the newest, then additions, up to five times a second.
  */
 import { useEffect } from '../../vendor/preact.js';
 import { look } from '../net/sockets.js';
@@ -42,7 +42,7 @@ export function useLog(name, filter = {}) {
 }
 
 /**
- * Look at a table that only such pages get, for as long as a component shows it.
+ * Subscribe to a table, sent only to pages that show it, while a component is mounted.
  * @param {string} name
  */
 export function useTable(name) {
@@ -58,7 +58,7 @@ export function useTable(name) {
 
 let waits = false;
 
-/** Once, after all components have said what they show. */
+/** Send the subscriptions once, after all components have registered theirs. */
 function tell() {
   if (waits) return;
   waits = true;

@@ -1,4 +1,4 @@
-/** Robots and people from above: where they are and head for, and what they do. */
+/** Robots and people from above, with position, heading and mode. */
 import { modeOf, rowOf } from '../store.js';
 import { lettersOn } from './lettering.js';
 import { MODES, PERSON, ROBOT } from './marks.js';
@@ -96,7 +96,7 @@ function place(ctx, affine, { left, top, heading, size }) {
 }
 
 /**
- * How much is left, under the robot; of many only where it is low.
+ * Draw the battery charge below the robot; without `always` only if it is low.
  * @param {Pen} pen
  * @param {Body} body
  * @param {boolean} always
@@ -119,7 +119,7 @@ export function drawBattery({ ctx, colours }, body, always) {
 /** @typedef {{left: number, top: number, width: number}} Place of a name that is written */
 
 /**
- * The name above a body, or below it where another name stands already; else none.
+ * Draw the name above a body, or below it if another name is in the way; else not at all.
  * @param {Pen} pen
  * @param {Body} body
  * @param {boolean} strong
@@ -160,7 +160,7 @@ function isFree(written, { left, top, width }, letters) {
 }
 
 /**
- * Whether all names can be read.
+ * True if all names can be read: few robots, or a large scale.
  * @param {number} count
  * @param {number} scale
  */

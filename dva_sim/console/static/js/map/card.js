@@ -1,4 +1,4 @@
-/** More about what is chosen. */
+/** Card with details of the selection. */
 import { html, useEffect } from '../../vendor/preact.js';
 import { doingOf, isAttached, modeOf, rowOf, rows, selection, thingAt, tracks } from '../store.js';
 import { watch } from '../net/sockets.js';
@@ -10,7 +10,7 @@ import { ageText, capital, percentText, plain } from '../ui/words.js';
 import { eventNumbered } from './lists.js';
 import { roomOf } from './shown.js';
 
-/** The card, if anything is chosen. */
+/** The card, if anything is selected. */
 export function Card() {
   useEvery(500);
   const chosen = selection.value;
@@ -57,7 +57,7 @@ function thingCard(key) {
       <${Icon} name="gamepad-2" />Look through its camera</button>`}`;
 }
 
-/** As long as it is shown, its sensors are listened to. @param {{i: number}} props */
+/** Subscribe to a robot's sensors while the card shows it. @param {{i: number}} props */
 function Watched({ i }) {
   useEffect(() => {
     watch([i]);
@@ -76,5 +76,5 @@ function robotLines(key) {
     <dt>Held by</dt><dd>${row?.holder_label || row?.holder || 'nobody'}</dd>
     ${isAttached.value && html`<dt>Camera</dt><dd>${row?.camera ?? 'unknown'}</dd>
       <dt>Sensors</dt><dd>${row?.sensors?.join(', ') || 'unknown'}</dd>`}
-    ${row?.stop_reason && html`<dt>Stands</dt><dd>${row.stop_reason}</dd>`}`;
+    ${row?.stop_reason && html`<dt>Stopped</dt><dd>${row.stop_reason}</dd>`}`;
 }

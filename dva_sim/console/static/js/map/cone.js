@@ -1,10 +1,10 @@
-/** What a robot's camera can see of the plan: a cone that walls cut. */
+/** Field of view of a robot's camera on the plan: a cone clipped by walls. */
 
 const RAYS = 48;
 const LONGEST_M = 12;
 
 /**
- * Walls near a robot, so that rays need not meet all; of a robot that stands, what was found.
+ * Computes fields of view from nearby walls only; reuses the outline of a robot that stands still.
  *
  * @typedef {{path: Path2D, reach: number}} Outline
  */
@@ -66,7 +66,7 @@ function isNear([x1, y1, x2, y2], { x, y }, reach) {
 }
 
 /**
- * How far a ray goes before it meets a wall.
+ * Length of a ray up to a wall.
  * @param {{x: number, y: number}} eye
  * @param {number} dx
  * @param {number} dy

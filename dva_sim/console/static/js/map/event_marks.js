@@ -1,4 +1,4 @@
-/** Events on the map: shape and number for how grave, colour and word for how far. */
+/** Events on the map: shape and colour show the severity, a number and a label the event and its state. */
 import { selection } from '../store.js';
 import { worldNow } from '../net/world_time.js';
 import { ageText } from '../ui/words.js';
@@ -7,7 +7,7 @@ import { SEVERITIES } from './marks.js';
 import { isOpen } from './shown.js';
 
 export const EVENT_PX = 18;
-/** So high above its place stands an event's mark. */
+/** Height of an event's mark above its place [px]. */
 export const EVENT_UP_PX = 22;
 
 /** @typedef {import('./bodies.js').Pen} Pen */

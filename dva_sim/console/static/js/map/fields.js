@@ -1,7 +1,7 @@
 /** Hazards as fields over the floor: a veil of smoke, gas, water, heat; below all symbols. */
 import { rgb } from './plan.js';
 
-/** How much of the floor is covered at the fullest, and in whose colour. */
+/** Colour and largest opacity of each kind of field. */
 const LOOKS = /** @type {Record<string, {colour: string, most: number}>} */ ({
   smoke: { colour: 'smoke', most: 0.6 },
   gas: { colour: 'gas', most: 0.55 },
@@ -26,7 +26,7 @@ export class Fields {
       .map((field) => ({ field, picture: paint(field, colours) }));
   }
 
-  /** Only when they are told again. */
+  /** Return false: fields change only with a new message. */
   isMoving() {
     return false;
   }

@@ -1,4 +1,4 @@
-/** What the marks of the map mean. */
+/** Legend of the map's marks and colours. */
 import { html } from '../../vendor/preact.js';
 import { hazards } from '../store.js';
 import { HAZARDS } from '../palette.js';
@@ -9,7 +9,7 @@ const MODES = ['Idle', 'Mission', 'Teleoperation'];
 const STATES = ['pending', 'assigned', 'on scene', 'confirmed', 'contained', 'refuted',
   'escalated', 'expired']; // prettier-ignore
 
-/** Folded until somebody wants it. */
+/** The legend, folded until somebody opens it. */
 export function Legend() {
   return html`<details class="legend">
     <summary>Legend</summary>
@@ -43,7 +43,7 @@ export function Legend() {
   </details>`;
 }
 
-/** What the strongest tint stands for. */
+/** Values that the strongest tint stands for. */
 function Fullest() {
   const fields = hazards.value.fields.filter((field) => field.full);
   if (!fields.length) return null;

@@ -1,4 +1,4 @@
-/** Size of what is written on a map: it grows with the map, so that it is read on a wall as well. */
+/** Size of the lettering on a map: it grows with the map, to be readable on a wall display. */
 
 const SMALLEST_PX = 11;
 const LARGEST_PX = 24;

@@ -1,4 +1,4 @@
-/** Events, robots and people as lists: the map for those who do not see it, and for keys. */
+/** Events, robots and people as lists: the map for screen readers and keyboards. */
 import { html } from '../../vendor/preact.js';
 import { doingOf, events, modeOf, rowOf, rows, scene, selection } from '../store.js';
 import { worldNow } from '../net/world_time.js';
@@ -39,7 +39,7 @@ function Events() {
 /** @param {SiteEvent} event */
 const ageOf = (event) => (isOpen(event) ? ageText(worldNow() - event.since_ms) : '');
 
-/** @param {{event: SiteEvent, age: string}} props a row is drawn again when one of them changes */
+/** @param {{event: SiteEvent, age: string}} props a change in any of them redraws the row */
 function EventRow({ event, age }) {
   const open = isOpen(event);
   return html`<li><button type="button" class=${open ? 'row' : 'row over'}

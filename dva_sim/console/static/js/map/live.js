@@ -1,4 +1,4 @@
-/** What moves or changes on the map: hazards, events, trails, robots, people. */
+/** Moving and changing parts of the map: hazards, events, trails, robots, people. */
 import { events, hazards, modeOf, robots, scene, selection, tracks } from '../store.js';
 import { HAZARDS } from '../palette.js';
 import { colours } from '../shell/theme.js';
@@ -18,7 +18,7 @@ export class Live {
   /**
    * @param {() => number[]} cones robots whose cone of sight is drawn
    * @param {() => import('../types.js').Goal[]} goals
-   * @param {() => number[][][]} ways that somebody is to go [m]
+   * @param {() => number[][][]} ways routes to follow [m]
    */
   constructor(cones, goals, ways) {
     this.cones = cones;
@@ -125,7 +125,7 @@ export class Live {
   }
 
   /**
-   * Who is sent where.
+   * Draw a line from each assigned responder to its event.
    * @param {Pen} pen
    */
   drawOrders({ ctx, affine, colours: palette }) {
@@ -188,7 +188,7 @@ export class Live {
   }
 
   /**
-   * What stands at a place of the map [px], the nearest within reach.
+   * Find the nearest thing or event within reach of a point of the map [px].
    * @param {number} left
    * @param {number} top
    * @param {import('./view.js').Affine} affine

@@ -1,4 +1,4 @@
-/** The map as a component: the plan, what moves over it, and its buttons. */
+/** The map as a component: the plan, the moving parts, and the buttons. */
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
 import { effect } from '../../vendor/preact.js';
 import { events, guard, hazards, rows, scene, selection, thingAt, tracks } from '../store.js';
@@ -18,7 +18,7 @@ const TAP_PX = 5;
 /**
  * @param {{cones: () => number[], follows?: () => number | null, keyboard?: boolean,
  *   legend?: boolean, goals?: () => import('../types.js').Goal[], ways?: () => number[][][],
- *   onPlace?: (x: number, y: number) => void}} props `onPlace` gets what is tapped [m]
+ *   onPlace?: (x: number, y: number) => void}} props `onPlace` gets the tapped position [m]
  */
 export function MapBox(props) {
   const { cones, follows, keyboard = true, legend = true, goals = () => [], ways = () => [] } = props;
@@ -88,7 +88,7 @@ function show(element, plan, options, view, letGo) {
 }
 
 /**
- * Choose what a click or tap means; a drag means none.
+ * Select what is clicked or tapped; ignore drags.
  * @param {HTMLElement} element
  * @param {MapView} map
  * @param {Live} live
@@ -119,7 +119,7 @@ function pointing(element, map, live, onPlace) {
 }
 
 /**
- * Whom to go along with: whoever is chosen, else whom the page names.
+ * Return a function that gives the position to follow: the selection, else the thing the page names.
  * @param {(() => number | null) | undefined} follows
  */
 function placeOf(follows) {
@@ -152,7 +152,7 @@ function Buttons({ view, following, follow }) {
   </div>`;
 }
 
-/** Old looks old. */
+/** Note over a map whose data is outdated. */
 function Stale() {
   useEvery(500);
   const age = pageAge();

@@ -1,4 +1,4 @@
-/** What happens where? The map, and the same as lists. */
+/** Map page: the map, and the same as lists. */
 import { html } from '../../vendor/preact.js';
 import { robots, selection } from '../store.js';
 import { Card } from './card.js';
@@ -7,7 +7,7 @@ import { MapBox } from './map_box.js';
 
 const FEW = 12;
 
-/** Cones of all while they are few, else of the one that is chosen. */
+/** Robots whose field of view is drawn: all while they are few, else the selected one. */
 function cones() {
   const all = robots.peek().map((robot) => robot.i);
   if (all.length <= FEW) return all;

@@ -1,4 +1,4 @@
-/** Shapes that say what something is without any colour. Of size 1, around zero, y down. */
+/** Shapes that identify things without colour: size 1, centred on zero, y down. */
 
 /** @param {number} corners @param {number} [turn] */
 function polygon(corners, turn = 0) {
@@ -25,7 +25,7 @@ export const SEVERITIES = {
   low: circle,
 };
 
-/** What a robot does, written into its box, bow to the right. */
+/** Glyph of each mode, drawn into the robot's box, bow to the right. */
 export const MODES = /** @type {Record<string, Path2D>} */ ({
   Mission: path('M-.24 -.24L.06 0L-.24 .24'),
   Teleoperation: path('M.14 0A.2 .2 0 1 1 -.26 0A.2 .2 0 1 1 .14 0'),
@@ -35,7 +35,7 @@ export const MODES = /** @type {Record<string, Path2D>} */ ({
 
 export const ROBOT = path('M.8 0L.32 .48L-.5 .48L-.5 -.48L.32 -.48Z');
 
-/** A disc with a beak. */
+/** Person: a disc with a beak. */
 export const PERSON = (() => {
   const body = new Path2D();
   body.moveTo(0.82, 0);
@@ -44,7 +44,7 @@ export const PERSON = (() => {
   return body;
 })();
 
-/** Of the kinds of hazards, by their mark in films. */
+/** Shapes of hazard sources, by their marks in films. */
 export const SOURCE_SHAPES = /** @type {Record<string, string>} */ ({
   '*': 'M0 -.6L.15 -.2L.57 -.19L.24 .08L.35 .49L0 .25L-.35 .49L-.24 .08L-.57 -.19L-.15 -.2Z',
   v: 'M0 .5L.5 -.4H-.5Z',
@@ -55,7 +55,7 @@ export const SOURCES = Object.fromEntries(
   Object.entries(SOURCE_SHAPES).map(([mark, shape]) => [mark, path(shape)]),
 );
 
-/** The state of an event, in a box of 24. */
+/** Glyph of each event state, in a box of 24 by 24. */
 export const STATES = /** @type {Record<string, string>} */ ({
   pending: 'M12 4a8 8 0 1 0 .01 0',
   assigned: 'M4 12H19M13 6l6 6-6 6',

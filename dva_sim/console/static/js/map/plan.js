@@ -1,4 +1,4 @@
-/** The ground that does not move: floors, walls, doors, exits and names; in metres, y up. */
+/** Static parts of the map: floors, walls, doors, exits and names; in metres, y up. */
 import { DARK, LIGHT } from '../palette.js';
 import { lettersOn } from './lettering.js';
 
@@ -8,7 +8,7 @@ const LEAST_PX = 30;
 /** @typedef {{path: Path2D, colour: string}} Floor */
 
 /**
- * The plan as paths, to be made once for each scene.
+ * The plan as paths, built once per scene.
  */
 export class Plan {
   /** @param {import('../lines.js').Site} site */
@@ -82,7 +82,7 @@ export class Plan {
   }
 
   /**
-   * Where they fit; the others show when one comes nearer.
+   * Draw room names where they fit; zooming in shows the others.
    * @param {CanvasRenderingContext2D} ctx
    * @param {import('./view.js').Affine} affine
    * @param {Record<string, string>} colours
@@ -165,7 +165,7 @@ const DARKER = new Map(
 );
 
 /**
- * The dark floor that stands for a light one.
+ * Dark counterpart of a light floor colour.
  * @param {string} colour
  */
 function darker(colour) {

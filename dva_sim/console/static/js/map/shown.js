@@ -1,4 +1,4 @@
-/** Who and what is shown, in which order. */
+/** Selection and order of the events, things and rooms that pages show. */
 import { events, scene, tracks } from '../store.js';
 
 const CLOSED = new Set(['contained', 'refuted', 'expired']);
@@ -7,7 +7,7 @@ const RANKS = ['critical', 'high', 'medium', 'low'];
 /** @param {import('../lines.js').SiteEvent} event */
 export const isOpen = (event) => !(event.over ?? CLOSED.has(event.state));
 
-/** Open ones first, then the most severe, then the oldest. */
+/** Events in display order: open first, then the most severe, then the oldest. */
 export function eventsInOrder() {
   return [...events.value].sort(
     (a, b) =>
@@ -17,13 +17,13 @@ export function eventsInOrder() {
   );
 }
 
-/** What is said where no event is open. */
+/** Text for a list without open events. */
 export const noEventText = () =>
   events.value.length === 0
     ? 'Nothing has been reported.'
     : `No event is open; ${events.value.length} ${events.value.length === 1 ? 'is' : 'are'} closed.`;
 
-/** How many events of each severity are open. */
+/** Number of open events of each severity. */
 export function alarms() {
   const counts = /** @type {Record<string, number>} */ ({});
   for (const rank of RANKS) counts[rank] = 0;
@@ -52,7 +52,7 @@ export function roomAt(x, y) {
 }
 
 /**
- * Where something is, in words.
+ * Location of something in words: its room, else its coordinates.
  * @param {{x_m: number, y_m: number, room?: string | null}} what
  */
 export function placeOf(what) {

@@ -1,4 +1,4 @@
-/** Where things are and were: between two messages they glide, beyond the last one they stand. */
+/** Positions and trails of things: interpolated between messages, held after the last one. */
 
 const GLIDE_MS = 100;
 const POINTS = 40;
@@ -38,7 +38,7 @@ export class Tracks {
     for (const i of this.all.keys()) if (!there.has(i)) this.all.delete(i);
   }
 
-  /** Time has jumped: nobody went from where they were to where they are told to be next. */
+  /** Reset all tracks after a jump in time: nothing glides from its old position to the next one. */
   jump() {
     for (const track of this.all.values()) track.begin();
   }
@@ -49,7 +49,7 @@ export class Tracks {
   }
 
   /**
-   * Whether a picture drawn now would differ from one drawn later.
+   * True while things still glide, so that a later picture would differ.
    * @param {number} now
    */
   isMoving(now) {
@@ -66,7 +66,7 @@ export class Tracks {
   }
 
   /**
-   * The last place heard of.
+   * Track of a thing, with its last reported place.
    * @param {number | null} i
    */
   last(i) {
@@ -84,7 +84,7 @@ export class Track {
     this.marked = 0;
   }
 
-  /** Leave no trail behind, and glide from nowhere. */
+  /** Clear the trail, and do not glide to the next place. */
   begin() {
     this.since = -1;
     this.length = this.next = 0;
@@ -146,7 +146,7 @@ export class Track {
 }
 
 /**
- * The shorter way from one heading to another.
+ * Smaller turn from one heading to another [rad].
  * @param {number} from
  * @param {number} to
  */

@@ -1,8 +1,8 @@
 /**
- * A map that Leaflet pans and zooms, and that canvases over it draw.
+ * Map view: Leaflet pans and zooms, and canvases over it draw.
  *
- * One affine per view; what stands is drawn when the view changes, what moves when something has
- * moved. Nothing that moves is an object of Leaflet.
+ * Each view has one affine transform. Static layers are redrawn when the view changes, moving ones
+ * when something has moved. No moving thing is a Leaflet object.
  */
 import '../../vendor/leaflet.js';
 
@@ -11,7 +11,7 @@ const MOST_PIXELS = 2;
 const MOVING_MS = 30; // what moves less than a pixel meanwhile is drawn every second frame
 const ROOM = 0.03;
 
-/** From metres to pixels of the map's box. */
+/** Transform from metres to pixels of the map's box. */
 export class Affine {
   constructor() {
     this.scale = 1;

@@ -1,4 +1,4 @@
-/** What the person asks of the world, with the answer to each. */
+/** Requests from the person to the simulation, with their replies. */
 import { signal } from '../../vendor/preact.js';
 import { forget } from '../drive/hold.js';
 import { PATIENCE_MS } from '../declared.js';
@@ -7,22 +7,22 @@ import { steer } from './wire.js';
 
 const ENDS = ['stop', 'release'];
 
-/** @typedef {keyof typeof PATIENCE_MS} Action what may be asked for */
+/** @typedef {keyof typeof PATIENCE_MS} Action request that may be sent */
 
 /** @type {Map<string, (done: {ok: boolean, text: string}) => void>} */
 const waiting = new Map();
 
-/** Counts how often the socket for driving was lost: who drives has to begin again. */
+/** Number of times the driving socket was lost; each time a driver has to start again. */
 export const driveLost = signal(0);
 
-/** An id that nobody else makes. */
+/** Random unique ID. */
 export function newId() {
   const bytes = crypto.getRandomValues(new Uint8Array(12));
   return Array.from(bytes, (byte) => byte.toString(16).padStart(2, '0')).join('');
 }
 
 /**
- * Ask for something; what is refused is told to the person.
+ * Send a request; show a refusal to the person.
  * @param {Action} what
  * @param {object} [more]
  */
@@ -31,11 +31,11 @@ export async function act(what, more = {}) {
 }
 
 /**
- * Ask for something, as a page does by itself: a refusal is not shown.
+ * Send a request that the page makes by itself: a refusal is not shown.
  * @param {Action} what
  * @param {object} [more]
- * @param {string} [id] by which the world knows a repeated request
- * @returns {Promise<import('../types.js').Answer>} without an id if no answer came
+ * @param {string} [id] by which the simulation recognizes a repeated request
+ * @returns {Promise<import('../types.js').Answer>} without an ID if no reply arrived
  */
 export async function ask(what, more = {}, id = newId()) {
   if (ENDS.includes(what)) forget();
@@ -60,7 +60,7 @@ function showRefusal(done) {
 }
 
 /**
- * End the waiting for an answer.
+ * Resolve a pending request with its reply.
  * @param {string} id
  * @param {import('../types.js').Answer} done
  */

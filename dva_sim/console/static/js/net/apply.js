@@ -1,4 +1,4 @@
-/** What each line from the world changes in the page's state. */
+/** Applies lines from the simulation to the page's state. */
 import { batch } from '../../vendor/preact.js';
 import { hearLog } from '../logs/log_rows.js';
 import {
@@ -53,7 +53,7 @@ const LINES = {
 };
 
 /**
- * Take note of a line.
+ * Apply a line.
  * @param {ToPage} line
  */
 export function apply(line) {

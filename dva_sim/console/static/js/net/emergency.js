@@ -1,4 +1,4 @@
-/** The emergency stop: on each path there is, again and again, until it is confirmed. */
+/** Emergency stop: sent on every available path, and repeated until it is confirmed. */
 import { signal } from '../../vendor/preact.js';
 import { forget } from '../drive/hold.js';
 import { notice, robots, you } from '../store.js';
@@ -8,7 +8,7 @@ const AGAIN_MS = 1000; // from one attempt to the next
 const REQUEST_MS = 60000; // after which a request is given up, so that none piles up
 const KEPT = 'dva-sim-unconfirmed-stops';
 
-/** Why a stop is not confirmed yet; empty if none is open. */
+/** Reason why a stop is not confirmed yet; empty if none is pending. */
 export const unconfirmed = signal('');
 
 /** @typedef {'all' | number[]} Robots */
@@ -19,10 +19,10 @@ export const unconfirmed = signal('');
  */
 const open = new Map();
 
-/** Stop all robots. What is held then drives no robot at the next start. */
+/** Stop all robots. Inputs held at that moment do not drive a robot at the next start. */
 export const emergencyStop = () => stopRobots('all');
 
-/** The person has seen that a stop is not confirmed, and ends the attempts. */
+/** Stop retrying, once the person has seen that a stop is not confirmed. */
 export function giveUp() {
   const all = [...open.values()];
   open.clear();
@@ -32,8 +32,8 @@ export function giveUp() {
 }
 
 /**
- * Stop robots at once. The socket for driving is open already, a request needs nothing of it: the
- * first that brings a confirmation counts.
+ * Stop robots at once, over the driving socket, which is already open, and by an HTTP request, which
+ * does not depend on it. The first confirmation counts.
  * @param {Robots} which
  */
 export async function stopRobots(which) {
@@ -92,7 +92,7 @@ function confirmed(key) {
 }
 
 /**
- * What the world has answered to some questions by the same id, as soon as it has.
+ * Resolve with the first reply from the simulation to requests with the same ID.
  * @param {Promise<Outcome>[]} asked
  * @returns {Promise<Outcome>}
  */

@@ -1,4 +1,4 @@
-/** How far away the server is: the best of the last pings, and how far its clock may be off. */
+/** Round trip to the server: the best of the last pings, and the error of its clock. */
 import { signal } from '../../vendor/preact.js';
 
 const KEPT_MS = 30000;
@@ -12,9 +12,9 @@ let asked = 0;
 export const roundTrip = signal({ ms: NaN, offset: 0, error: NaN });
 
 /**
- * Ask now and then.
+ * Ping the server periodically.
  * @param {(message: object) => void} send
- * @returns {() => void} how to stop
+ * @returns {() => void} stops it
  */
 export function keepAsking(send) {
   let timer = 0;

@@ -3,8 +3,8 @@
 const KEY = 'dva-sim-seat-key';
 
 /**
- * This page, until it is loaded again: by it the server knows one that comes back before its old
- * connection is known to be dead, from a copy of the tab, which has the same key in its storage.
+ * ID of this page until it is reloaded. A page may reconnect before its old connection is found to be
+ * dead; the ID distinguishes it from a copy of the tab, which has the same key in its storage.
  */
 export const PAGE = Array.from(crypto.getRandomValues(new Uint8Array(8)), (byte) =>
   byte.toString(16).padStart(2, '0'),

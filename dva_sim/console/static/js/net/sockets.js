@@ -1,4 +1,4 @@
-/** The two sockets: one tells what is, the other carries what the person does. */
+/** The two sockets: one receives the state, the other sends the person's input. */
 import { effect } from '../../vendor/preact.js';
 import { connection, mayDrive, reaches, you } from '../store.js';
 import { settle, socketLost } from './actions.js';
@@ -29,7 +29,7 @@ function address(path) {
   return `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}${path}`;
 }
 
-/** Begin to listen, for as long as the page lives. */
+/** Start listening, for the lifetime of the page. */
 export function connect() {
   const old = you.value?.key ?? rememberedKey();
   const query = new URLSearchParams({ page: PAGE, ...(old && { key: old }) });
@@ -69,7 +69,7 @@ export function connect() {
   socket.onclose = end;
 }
 
-/** Whether nobody has said yet that the world has ended. */
+/** True unless the simulation is known to have ended. */
 const isAlive = () => ['open', 'connecting', 'lost'].includes(connection.value);
 
 /** @param {import('../lines.js').ToPage} line */
@@ -81,7 +81,7 @@ function receive(line) {
   apply(line);
 }
 
-/** Ask for everything again; not more often than it helps. */
+/** Request the whole state again, at most once per `RESYNC_EVERY_MS`. */
 export function resync() {
   const now = performance.now();
   if (now - asked < RESYNC_EVERY_MS) return;
@@ -95,7 +95,7 @@ function tell(message) {
 }
 
 /**
- * Say whose pictures are being looked at.
+ * Report which robots the page is showing.
  * @param {number[]} robots
  */
 export function watch(robots) {
@@ -104,7 +104,7 @@ export function watch(robots) {
 }
 
 /**
- * Say which logs are looked at, each with its filter, and which tables.
+ * Report which logs the page is showing, each with its filter, and which tables.
  * @param {Record<string, object>} logs
  * @param {string[]} tables
  */
@@ -145,7 +145,7 @@ function open(key) {
 }
 
 /**
- * Unless another one has taken its place meanwhile.
+ * Reopen the driving socket, unless another one has replaced it in the meantime.
  * @param {WebSocket} old
  * @param {string} key
  */

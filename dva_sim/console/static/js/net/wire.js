@@ -1,4 +1,4 @@
-/** The way on which the person's hand reaches the world. */
+/** Socket that carries the person's input to the simulation. */
 
 /** @type {WebSocket | null} */
 let drive = null;
@@ -10,7 +10,7 @@ export function replaceDriveSocket(socket) {
   old?.close();
 }
 
-/** What waits in the browser and has not been sent yet [B]. */
+/** Bytes queued in the browser and not sent yet [B]. */
 export const backlog = () => drive?.bufferedAmount ?? 0;
 
 /** @param {WebSocket} socket */
@@ -19,7 +19,7 @@ export const isDriveSocket = (socket) => socket === drive;
 /**
  * Send on the socket for driving.
  * @param {object} message
- * @returns {boolean} whether it went out
+ * @returns {boolean} true if it was sent
  */
 export function steer(message) {
   if (drive?.readyState !== WebSocket.OPEN) return false;

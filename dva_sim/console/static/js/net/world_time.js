@@ -1,8 +1,8 @@
 /**
- * The world's clock, as it runs on between two messages.
+ * Simulation clock, extrapolated between messages.
  *
- * The message that took the shortest way tells best: later ones pull the estimate back only slowly,
- * so that a late one does not make a picture look younger than it is.
+ * The message with the shortest delay gives the best estimate: others pull the estimate back only
+ * slowly, so that a late one does not make a picture look younger than it is.
  */
 import { effect } from '../../vendor/preact.js';
 import { clock } from '../store.js';
@@ -25,7 +25,7 @@ effect(() => {
 });
 
 /**
- * Note the time that a message bears.
+ * Record the simulation time of a message.
  * @param {number} t
  */
 export function hear(t) {
@@ -36,12 +36,12 @@ export function hear(t) {
   offset = Number.isNaN(offset) || latest > offset ? latest : offset + PULL * (latest - offset);
 }
 
-/** A message without a time of the world. */
+/** Record the arrival of a message without a simulation time. */
 export function hearAnything() {
   heard = performance.now();
 }
 
-/** What the world's clock shows now [ms]. */
+/** Current simulation time [ms]. */
 export function worldNow() {
   return Number.isNaN(offset) ? newest : offset + pace * performance.now();
 }

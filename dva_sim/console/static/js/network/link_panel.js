@@ -1,4 +1,4 @@
-/** The link that one chooses, and how fast the world runs. */
+/** Link panel: settings of the link, and the speed of the simulation. */
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
 import { FASTEST } from '../declared.js';
 import { clock, isModelled, link, maySteer, scene } from '../store.js';
@@ -45,7 +45,7 @@ export function LinkPanel({ heading = 'The link you choose' }) {
   </section>`;
 }
 
-/** Of sockets nothing can be chosen; the robots' computers are models all the same. */
+/** Panel for real sockets: only the robots' processing time can be set, as it is still simulated. */
 function RealLink() {
   const knob = KNOBS[KNOBS.length - 1];
   return html`<section class="panel link-panel" aria-label="Link settings">
@@ -56,7 +56,7 @@ function RealLink() {
 }
 
 /**
- * What the slider shows: the world's value, unless the person has just moved it.
+ * Value of a slider: the reported one, unless the person has just moved it.
  * @param {number} reported
  * @param {(value: number) => void} send
  * @returns {[number, (value: number) => void]}
@@ -87,14 +87,14 @@ function LinkSlider({ knob }) {
     disabled=${!maySteer.value} onInput=${set} />`;
 }
 
-/** Why the slider of the jitter stands lower than it was put. */
+/** Note that explains why the jitter is lower than requested. */
 function JitterNote() {
   const { jitter_s: is = 0, jitter_wanted_s: wanted = 0 } = link.value ?? {};
   const text = wanted > is + 1e-6 ? `${ms(1000 * wanted)} of jitter are wanted; it is kept within the delay.` : '';
   return html`<p class="jitter-note soft" role="status">${text}</p>`;
 }
 
-/** From 10 kbit/s to 1 Gbit/s, each step a share more; a recorded trace gives the rate by itself. */
+/** Logarithmic slider from 10 kbit/s to 1 Gbit/s; disabled while a recorded trace sets the rate. */
 function Bandwidth() {
   const [least, most] = scene.value?.link_limits?.rate_bps ?? [1e4, 1e9];
   const decades = Math.log10(most / least);

@@ -1,4 +1,4 @@
-/** A mark in the story, such as what a participant just said: a recording can be wound to it. */
+/** Marks a moment in the story, such as a participant's remark, so that a replay can jump to it. */
 import { html, useState } from '../../vendor/preact.js';
 import { isOperator, maySteer } from '../store.js';
 import { act } from '../net/actions.js';

@@ -1,4 +1,4 @@
-/** How late is it all? The link one chooses, and what becomes of each robot's commands. */
+/** Network page: the settings of the link, and their effect on each robot's commands. */
 import { html } from '../../vendor/preact.js';
 import { driveOf, modeOf, robots, rowOf, rows } from '../store.js';
 import { Chart } from '../charts/chart.js';

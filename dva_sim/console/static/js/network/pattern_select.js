@@ -1,4 +1,4 @@
-/** Which messaging pattern carries a robot's commands. */
+/** Selection of the messaging pattern that carries a robot's commands. */
 import { html } from '../../vendor/preact.js';
 import { maySteer, rowOf, rows, scene } from '../store.js';
 import { act } from '../net/actions.js';

@@ -1,4 +1,4 @@
-/** What became of each robot's commands in the last minute, noted whatever page is shown. */
+/** Figures on each robot's commands in the last minute, recorded whatever page is shown. */
 import { driveOf, robots, rowOf } from '../store.js';
 import { worldNow } from '../net/world_time.js';
 import { History } from '../charts/history.js';
@@ -22,7 +22,7 @@ let histories = [];
 /** @type {number[]} */
 let known = [];
 
-/** From now on. */
+/** Start sampling. */
 export function keepSampling() {
   window.setInterval(sample, EVERY_MS);
 }

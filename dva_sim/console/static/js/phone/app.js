@@ -1,4 +1,4 @@
-/** The frame of the five screens: where one is, how the link is, what is wrong, emergency stop. */
+/** Frame of the five screens: heading, link status, alerts, emergency stop. */
 import { html, render, useEffect, useRef } from '../../vendor/preact.js';
 import { connection, notice, scene, seat } from '../store.js';
 import { resumeStops, stopRobots } from '../net/emergency.js';
@@ -49,7 +49,7 @@ function App() {
 }
 
 /**
- * Who moves on by keys or by ear begins at the heading of the next screen.
+ * Focus the heading of the next screen, for users of keyboards and screen readers.
  * @param {string} name
  */
 function useFocusAfterMove(name) {
@@ -68,7 +68,7 @@ function Waiting() {
   return html`<p class="soft">${lost ? 'The console cannot be reached. Retrying …' : 'Waiting for the console …'}</p>`;
 }
 
-/** What is wrong, and what follows from it. */
+/** Current problems, each with its consequence. */
 function Alerts() {
   const ended = !['open', 'connecting', 'lost'].includes(connection.value);
   const texts = [
@@ -88,7 +88,7 @@ function Alerts() {
   </div>`;
 }
 
-/** On every screen, by a request of its own; before a robot is chosen it says why it cannot. */
+/** Emergency stop, on every screen and by its own request; shows the reason while it is unavailable. */
 function Emergency() {
   const why = whyNoEmergency.value;
   const one = robot.value;

@@ -1,4 +1,4 @@
-/** Register, list, choose, ask for permission: each step opens the next. */
+/** Authentication screen: register, list, choose, request permission; each step unlocks the next. */
 import { html, useEffect, useState } from '../../vendor/preact.js';
 import { isOperator, mayDrive, maySteer, notice, robots, scene, seat, thingAt } from '../store.js';
 import { act } from '../net/actions.js';
@@ -36,7 +36,7 @@ export function AuthenticationScreen() {
       Go on: ${phone.value?.calibrated ? 'Teleoperation' : 'Calibration'}</a></div>`}`;
 }
 
-/** Fields that are empty yet are filled with what the console knows. */
+/** Fill empty fields with what the console knows. */
 function useDefaults() {
   const address = scene.value?.dva_address ?? '';
   useEffect(() => {
@@ -56,7 +56,7 @@ function splitAddress(address) {
   return at < 0 ? ['', ''] : [address.slice(0, at), address.slice(at + 1)];
 }
 
-/** What the browser says of the device, in a word. */
+/** Default label: the kind of device as the browser reports it, and a random number. */
 function defaultLabel() {
   const kind = /iPhone|iPad|Android/.exec(navigator.userAgent)?.[0] ?? 'Browser';
   return `${kind} ${Math.floor(100 + 900 * Math.random())}`;
@@ -110,7 +110,7 @@ function Register() {
 /** @param {string} text */
 const isPort = (text) => /^\d{1,5}$/.test(text) && Number(text) >= 1 && Number(text) <= 65535;
 
-/** Who came by the console's address is its operator, and needs no registration. */
+/** Driving as the console's operator: its own address needs no registration. */
 function AsOperator() {
   const held = seat.value?.drives[0]?.i;
   const [chosen, take] = useState(String(held ?? robots.value[0]?.i ?? ''));
@@ -155,7 +155,7 @@ function robotsFirst(devices) {
   );
 }
 
-/** As the founding document writes it. @param {import('../lines.js').Device} device */
+/** Device entry in the notation of the founding document. @param {import('../lines.js').Device} device */
 const entry = ({ type, label, address, id }) => `${type} = ${label}@${address}(${id})`;
 
 /** @param {{devices: import('../lines.js').Device[] | null, off: boolean}} props */

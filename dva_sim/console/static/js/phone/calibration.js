@@ -1,4 +1,4 @@
-/** How the phone is held, how far it has to be tilted, and by which pipeline it drives. */
+/** Calibration screen: reference pose, tilt per step, and processing pipeline. */
 import { html, useEffect, useState } from '../../vendor/preact.js';
 import { maySteer, scene } from '../store.js';
 import { choices, choose } from './choices.js';
@@ -75,7 +75,7 @@ function useDefaults() {
   }, [offer]);
 }
 
-/** What the sensor does, or why it does not. */
+/** State of the sensor, or the reason why it does not work. */
 function Sensor() {
   const now = state.value;
   const bad = !['live', 'looking', 'tap'].includes(now);
@@ -85,7 +85,7 @@ function Sensor() {
   </div>`;
 }
 
-/** What it measures now, and what that would make the robot do. */
+/** Current sensor values, and the command that they would give. */
 function Live() {
   const values = shown.value?.xyz ?? [];
   const [level, turn] = phone.value?.reading ?? [NaN, NaN];
@@ -121,7 +121,7 @@ function Pipeline() {
       onInput=${(/** @type {string} */ value) => choose({ mapping: value })} />`;
 }
 
-/** What concerns this phone alone. */
+/** Settings for this phone alone. */
 function Habits() {
   const { by, hand, hold, keep } = choices.value;
   return html`<section class="panel" aria-label="This phone"><h2>This phone</h2>

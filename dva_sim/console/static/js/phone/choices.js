@@ -1,4 +1,4 @@
-/** What a person has chosen, kept on the phone and loaded again. */
+/** A person's choices, saved on the phone and restored on loading. */
 import { signal } from '../../vendor/preact.js';
 
 const KEY = 'dva-sim-phone';
@@ -45,7 +45,7 @@ export function choose(changed) {
   }
 }
 
-/** What was kept, as far as it is of the right kind. */
+/** Saved choices; values of the wrong type are ignored. */
 function remembered() {
   const found = { ...FIRST };
   try {
@@ -60,6 +60,6 @@ function remembered() {
   return found;
 }
 
-/** @param {any} value whether it is three numbers */
+/** @param {any} value true for an array of three numbers */
 const isPlace = (value) =>
   Array.isArray(value) && value.length === 3 && value.every((one) => Number.isFinite(one));

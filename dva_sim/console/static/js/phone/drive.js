@@ -1,9 +1,9 @@
 /**
- * A drive by phone: what may begin it, and everything that ends it.
+ * A drive by phone: the conditions for starting it, and everything that ends it.
  *
- * Whatever takes the phone out of the person's hand ends the drive for good (hidden, turned, the
- * sensor silent, the thumb lifted, the connection gone). The world ends it by itself, too, when no
- * samples come; the robot's watchdog has the last word.
+ * Any interruption ends the drive for good (page hidden, screen turned, sensor silent, thumb lifted,
+ * connection lost). The simulation also ends it when no samples arrive; the robot's watchdog is the
+ * last resort.
  */
 import { computed, effect, signal } from '../../vendor/preact.js';
 import { connection, notice, robots, rowOf, rows, seat } from '../store.js';
@@ -18,42 +18,42 @@ const SILENT_MS = 300;
 const LOOK_MS = 50;
 const CONTACT = ['it is stuck against something', 'something is in its way'];
 
-/** Whether a thumb is on the picture. */
+/** True while a thumb is on the picture. */
 export const thumb = signal(false);
-/** Whether a start has been asked for and not been answered. */
+/** True while a start request is pending. */
 const asking = signal(false);
 
 export const phone = computed(() => seat.value?.phone ?? null);
 export const phase = computed(() => seat.value?.phase ?? 'free');
-/** Whether a robot is in this page's hands: by the phone's permission, or by the console. */
+/** True while this page holds a robot, by the phone's permission or as the console's operator. */
 export const holds = computed(
   () => (seat.value?.drives.length ?? 0) > 0 && !['asking', 'free'].includes(phase.value),
 );
-/** Whether who drives is known to the DVA: as a phone, or as the console's operator. */
+/** True if the driver is registered with the DVA, as a phone or as the console's operator. */
 export const isKnown = computed(() => Boolean(phone.value?.registered) || holds.value);
 export const isDriving = computed(() => ['starting', 'driving'].includes(phase.value));
-/** Whether the phone is steered by tilting it: without a sensor it is by the stick. */
+/** True if the phone steers by tilting; without a sensor it uses the stick. */
 export const tilts = computed(
   () => choices.value.by === 'tilt' && ['live', 'looking', 'tap'].includes(sensor.value),
 );
 
-/** The robot that is held, else the one that was chosen. */
+/** Robot currently held, else the chosen one. */
 export const robot = computed(() => {
   const held = seat.value?.drives[0]?.i;
   const chosen = phone.value?.device ?? choices.value.device;
   if (held === null) return { ...STRANGER, id: chosen, label: chosen };
   return robots.value.find((one) => (held === undefined ? one.id === chosen : one.i === held)) ?? null;
 });
-/** A device that the DVA knows, and that is no robot of this world: nobody draws what it sees. */
+/** Stand-in for a device of the DVA that is not a robot of this simulation: it has no camera picture. */
 const STRANGER = { i: -1, kind: 'robot', radius_m: 0, max_speed_mps: 0, max_turn_rate_radps: 0 };
-/** Why nothing can be stopped; empty if it can. */
+/** Reason why the emergency stop is unavailable; empty if it is available. */
 export const whyNoEmergency = computed(() => {
   if (!isKnown.value) return 'No robot yet: register first.';
   if (!robot.value) return 'No robot yet: choose one first.';
   return robot.value.i < 0 ? 'This device is not a robot of this simulation, so nothing will move.' : '';
 });
 
-/** Begin, if a robot is in hand. */
+/** Start driving, if this page holds a robot. */
 export async function start() {
   if (!holds.value || isDriving.value || asking.peek()) return;
   await askSensor(); // if it wants to be, which has to be from a tap
@@ -70,7 +70,7 @@ export async function start() {
   asking.value = false;
 }
 
-/** Why a tilted phone cannot begin; empty if it can. */
+/** Reason why a drive by tilting cannot start; empty if it can. */
 function whyNot() {
   if (!tilts.peek()) return '';
   if (sensor.peek() === 'tap') return 'Tap Start to allow access to the motion sensor.';
@@ -80,12 +80,12 @@ function whyNot() {
   return lifted ? 'Hold to drive is on: swipe up over the picture and keep your thumb there.' : '';
 }
 
-/** End. */
+/** Stop driving. */
 export function stop() {
   if (holds.value) act('stop');
 }
 
-/** What was chosen on this phone goes to the world; also again, where it has forgotten. */
+/** Send the settings of this phone to the simulation, unless it already has them. */
 export async function sendCalibration(force = false) {
   const kept = choices.peek();
   if (!isKnown.value || (phone.peek()?.calibrated && !force)) return null;
@@ -103,7 +103,7 @@ export async function sendCalibration(force = false) {
   });
 }
 
-/** From now on. */
+/** Start watching for everything that ends a drive. */
 export function keepDriveInHand() {
   watchInterruptions();
   effect(() => {
@@ -122,7 +122,7 @@ export function keepDriveInHand() {
   feelDrive();
 }
 
-/** Who tilts a phone whose sensor says nothing steers nothing. */
+/** Interrupt a drive by tilting when the sensor falls silent. */
 function watchSensor() {
   countSilence(LOOK_MS);
   if (engaged.peek() && tilts.peek() && isSilent()) interrupt('The motion sensor stopped sending.');
@@ -131,17 +131,17 @@ function watchSensor() {
 const isSilent = () => silentFor() > SILENT_MS;
 const silentText = () => `${(silentFor() / 1000).toFixed(1)} s`;
 
-/** Outside of the effect that notices it. @param {string} why */
+/** Interrupt the drive, outside the effect that detects the cause. @param {string} why */
 const end = (why) => queueMicrotask(() => interrupt(why));
 
-/** @param {boolean} down a thumb on the picture, or none any more */
+/** @param {boolean} down true when a thumb touches the picture, false when it is lifted */
 export function press(down) {
   const was = thumb.peek();
   thumb.value = down;
   if (was && !down && choices.peek().hold && tilts.peek()) interrupt('You lifted your thumb.');
 }
 
-/** A drive is felt: its start, its end, a contact, a lost link. */
+/** Vibrate at the start and end of a drive, at a contact and when the link is lost. */
 function feelDrive() {
   let before = '';
   let touched = false;
@@ -164,6 +164,6 @@ function feelDrive() {
   });
 }
 
-/** Whether the robot, or the console, cannot be reached. */
+/** True if the robot or the console cannot be reached. */
 export const isLinkLost = () =>
   connection.value === 'lost' || Boolean(seat.value?.alert.includes('link lost'));

@@ -1,4 +1,4 @@
-/** What the phone does with itself while somebody drives: it stays awake, and it shakes. */
+/** Keeps the phone's screen on during a drive, and vibrates. */
 
 const SHAKES = { start: [80], stop: [50, 60, 50], contact: [200], lost: [300, 100, 300] };
 
@@ -11,7 +11,7 @@ export function vibrate(what) {
 let lock = null;
 let wanted = false;
 
-/** @param {boolean} awake whether the screen must not go dark */
+/** @param {boolean} awake true to keep the screen on */
 export function keepAwake(awake) {
   wanted = awake;
   if (!awake) {
@@ -20,7 +20,7 @@ export function keepAwake(awake) {
   } else if (!lock) take();
 }
 
-/** A browser may refuse it, as with a battery that is nearly empty; then the person has to touch. */
+/** Request a wake lock. The browser may refuse it, for instance when the battery is low. */
 async function take() {
   try {
     const taken = await navigator.wakeLock?.request('screen');

@@ -1,4 +1,4 @@
-/** How the app is used: authentication, calibration, driving, in this order. */
+/** Instructions for the app: authentication, calibration, driving, in this order. */
 import { html } from '../../vendor/preact.js';
 import { scene } from '../store.js';
 

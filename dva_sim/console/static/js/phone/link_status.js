@@ -1,4 +1,4 @@
-/** How far the robot is: the round trip of the newest drive, or how the connection is. */
+/** Link status: the round trip of the newest drive, or the state of the connection. */
 import { html } from '../../vendor/preact.js';
 import { connection, link, seat } from '../store.js';
 import { msText } from '../ui/words.js';
@@ -7,7 +7,7 @@ import { isLinkLost } from './drive.js';
 const POOR_MS = 600;
 const FAIR_MS = 250;
 
-/** The status, with bars that tell the same as the words. */
+/** The status, with bars that match the text. */
 export function LinkStatus() {
   const trip = seat.value?.drives[0]?.round_trip_ms ?? null;
   const modelled = link.value?.delay_s === undefined ? null : 2 * 1000 * link.value.delay_s;

@@ -1,4 +1,4 @@
-/** Where the phone's pages begin. */
+/** Entry point of the phone pages. */
 import { connect, keepDriveSocket } from '../net/sockets.js';
 import { showPhone } from './app.js';
 import { keepDriveInHand } from './drive.js';

@@ -1,4 +1,4 @@
-/** The menu, and the events that wait for somebody. */
+/** Main screen: the menu, and the open events. */
 import { html } from '../../vendor/preact.js';
 import { worldNow } from '../net/world_time.js';
 import { hasPlayedGuards, NO_PLAYED_GUARD } from '../guard/played.js';

@@ -1,4 +1,4 @@
-/** Samples on their way to the world: as they are, in batches, with the phone's own times. */
+/** Sends raw sensor samples to the simulation in batches, with the phone's own timestamps. */
 import { seenPictures } from '../drive/drawn.js';
 import { backlog, steer } from '../net/wire.js';
 import { choices } from './choices.js';
@@ -17,7 +17,7 @@ let count = 0; // of the first that waits
 let sent = -Infinity;
 let timer = 0;
 
-/** From now on. */
+/** Start sampling. */
 export function keepSampling() {
   listen();
   onSample((sample) => {
@@ -28,19 +28,19 @@ export function keepSampling() {
   });
 }
 
-/** Now, or as soon as the last batch is old enough: a timer of its own would make samples wait. */
+/** Send now, or once the minimum interval has passed; a periodic timer would delay samples. */
 function sendSoon() {
   const wait = LEAST_MS - (performance.now() - sent);
   if (wait <= 0) send();
   else if (!timer) timer = window.setTimeout(send, wait);
 }
 
-/** Whether anybody would make something of them. */
+/** True if samples are needed: the phone steers by tilting, and the screen uses them. */
 function isWanted() {
   return tilts.peek() && NEEDED_ON.includes(screen.peek());
 }
 
-/** What nobody wants does not count as lost. */
+/** Discard samples that are not needed; they do not count as lost. */
 function drop() {
   waiting = [];
 }
@@ -70,7 +70,7 @@ function send() {
   waiting = [];
 }
 
-/** How far the screen is turned: 0, 90, 180 or 270 degrees. */
+/** Rotation of the screen: 0, 90, 180 or 270 degrees. */
 export function orientation() {
   const turned = window.screen?.orientation?.angle ?? /** @type {any} */ (window).orientation ?? 0;
   return (((Math.round(turned / 90) * 90) % 360) + 360) % 360;

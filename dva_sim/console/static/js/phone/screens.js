@@ -1,4 +1,4 @@
-/** Which of the five screens is shown, in the address: a reload shows the same. */
+/** Current one of the five screens, kept in the address so that a reload shows the same. */
 import { computed, signal } from '../../vendor/preact.js';
 
 /** Names of the screens with their headings, in the order of the menu. */

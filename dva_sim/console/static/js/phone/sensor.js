@@ -1,11 +1,11 @@
 /**
- * The motion sensor: the acceleration with gravity, in the axes of the device, as the browser has
- * it.
+ * The motion sensor: acceleration including gravity, in the axes of the device, as reported by the
+ * browser.
  *
- * Where `devicemotion` is missing, the angles of `deviceorientation` are turned into what gravity
- * alone would be (W3C Device Orientation: turns about z, then x, then y). The first event of a
- * phone without a sensor holds nothing but nulls; a phone that wants to be asked first sends none
- * at all until it has been, from a tap.
+ * If `devicemotion` is missing, gravity alone is computed from the angles of `deviceorientation`
+ * (W3C Device Orientation: turns about z, then x, then y). The first event of a phone without a
+ * sensor contains only nulls; a phone that requires permission sends no events until it is
+ * requested from a tap.
  */
 import { signal } from '../../vendor/preact.js';
 
@@ -15,15 +15,15 @@ const WAIT_MS = 1000;
 
 /** @typedef {{at: number, xyz: number[]}} Sample time [ms] and acceleration [m/s^2] */
 
-/** 'looking', 'live', 'tap' (it has to be asked for), 'denied', 'insecure', 'none'. */
+/** 'looking', 'live', 'tap' (permission has to be requested), 'denied', 'insecure', 'none'. */
 export const state = signal(window.isSecureContext ? 'looking' : 'insecure');
-/** The newest sample, for what is shown; it changes ten times a second. */
+/** Newest sample for display, updated ten times a second. */
 export const shown = signal(/** @type {Sample | null} */ (null));
 
 const SHOWN_MS = 100;
 const Motion = /** @type {any} */ (window.DeviceMotionEvent);
 const Orientation = /** @type {any} */ (window.DeviceOrientationEvent);
-/** Whether gravity's sign is the other one: so it is on iPhones and iPads. */
+/** True on iPhones and iPads, where gravity has the opposite sign. */
 export const isIos =
   /iP(hone|ad|od)/.test(navigator.userAgent) ||
   (navigator.userAgent.includes('Macintosh') && navigator.maxTouchPoints > 1);
@@ -37,13 +37,13 @@ let looked = 0;
 let motion = false;
 let answered = false;
 
-/** How long the sensor has been silent [ms], as counted by `countSilence`. */
+/** Time without a sample [ms], as counted by `countSilence`. */
 export const silentFor = () => silent;
 
 /**
- * Look again, every so many ms. A page that stood still in between could hear nothing, so a late
- * look counts as two of them: events that wait are delivered before the next one.
- * @param {number} every [ms]
+ * Count the time since the last call as silence. A frozen page receives no events, so a late call
+ * counts as at most two periods: pending events are delivered before the next one.
+ * @param {number} every period of the calls [ms]
  */
 export function countSilence(every) {
   const now = performance.now();
@@ -51,15 +51,15 @@ export function countSilence(every) {
   looked = now;
 }
 
-/** @param {(sample: Sample) => void} hear @returns {() => void} how to end that */
+/** @param {(sample: Sample) => void} hear @returns {() => void} stops it */
 export function onSample(hear) {
   hearers.add(hear);
   return () => hearers.delete(hear);
 }
 
 /**
- * How the phone is held: the mean of the last quarter of a second; null if it says nothing. Angles
- * are told only when they change: the newest ones hold.
+ * Pose of the phone: the mean acceleration of the last 250 ms; null without samples. Angles are
+ * reported only on change, so their newest sample stays valid.
  */
 export function pose() {
   const now = performance.now();
@@ -68,7 +68,7 @@ export function pose() {
   return [0, 1, 2].map((n) => some.reduce((sum, { xyz }) => sum + xyz[n], 0) / some.length);
 }
 
-/** Listen, from now on. */
+/** Start listening. */
 export function listen() {
   if (state.peek() === 'insecure') return;
   window.addEventListener('devicemotion', (event) => {
@@ -86,13 +86,13 @@ export function listen() {
   window.setTimeout(judge, WAIT_MS);
 }
 
-/** After a while without a value: what may be the reason. */
+/** Determine the likely reason for receiving no value after a while. */
 function judge() {
   if (state.peek() !== 'looking') return;
   state.value = !answered && Motion?.requestPermission ? 'tap' : 'none';
 }
 
-/** Ask the phone, which has to be from a tap, and wait a moment for what it then says. */
+/** Request permission, which has to be done from a tap, and wait briefly for the first sample. */
 export async function ask() {
   if (state.peek() !== 'tap' && state.peek() !== 'denied') return;
   try {
@@ -129,7 +129,7 @@ function take(sample) {
 }
 
 /**
- * What gravity alone would be measured as, with the sign of this phone.
+ * Acceleration measured from gravity alone, with the sign used by this phone.
  * @param {number} beta about x [degrees]
  * @param {number} gamma about y [degrees]
  */
@@ -139,7 +139,7 @@ export function gravity(beta, gamma) {
   return [-Math.cos(b) * Math.sin(c), Math.sin(b), Math.cos(b) * Math.cos(c)].map((v) => size * v);
 }
 
-/** Each state in words, with the way out. */
+/** Description of each state, with the remedy. */
 export const WORDS = /** @type {Record<string, string>} */ ({
   looking: 'Looking for the motion sensor …',
   live: 'The motion sensor works.',

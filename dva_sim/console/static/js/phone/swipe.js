@@ -1,4 +1,4 @@
-/** Swipes over the picture: up starts, down stops; and whether a thumb is on it. */
+/** Swipes over the picture: up starts, down stops; also tracks whether a thumb is on it. */
 import { press, start, stop } from './drive.js';
 
 const FAR_PX = 56;

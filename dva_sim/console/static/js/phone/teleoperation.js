@@ -1,4 +1,4 @@
-/** The robot's picture over the whole screen, and the robot in the hand. */
+/** Driving screen: the robot's picture over the whole screen, with the controls. */
 import { html, useEffect, useMemo, useState } from '../../vendor/preact.js';
 import { clock, maySteer, rowOf, rows, seat } from '../store.js';
 import { act } from '../net/actions.js';
@@ -59,7 +59,7 @@ function Cockpit({ one }) {
 }
 
 /**
- * Radius and speed as the app has them, and how late it all is.
+ * Radius and speed as in the app, and latencies.
  * @param {{one: import('../lines.js').Thing}} props
  */
 function Figures({ one }) {
@@ -82,7 +82,7 @@ const PHASES = /** @type {Record<string, string>} */ ({
 
 const TELLING_S = 3; // from then on it is said how long nothing has been heard
 
-/** What is waited for, and how long by now. @param {{what: string}} props */
+/** Pending request, with its waiting time if it is long. @param {{what: string}} props */
 function Waiting({ what }) {
   const [began] = useState(performance.now());
   useEvery(1000);
@@ -90,7 +90,7 @@ function Waiting({ what }) {
   return waited < TELLING_S ? what : `${what} No answer for ${waited} s.`;
 }
 
-/** What to do next, or why the robot stands. @param {{one: import('../lines.js').Thing}} props */
+/** Next step, or the reason why the robot stands still. @param {{one: import('../lines.js').Thing}} props */
 function Hint({ one }) {
   void rows.value;
   if (clock.value.paused) return 'The simulation is paused.';
@@ -109,7 +109,7 @@ function Hint({ one }) {
   return why ? `Stopped: ${why}.` : 'Driving. Swipe down to stop.';
 }
 
-/** The order in hand, and what the person saw there. */
+/** Current order, with buttons to report what the driver saw there. */
 function Order() {
   const order = seat.value?.order;
   if (!order) return null;

@@ -1,4 +1,4 @@
-/** The bar of a recording: play, pause, how fast, where in it, and jumps to what happened. */
+/** Replay bar: play, pause, speed, position, and jumps between events. */
 import { html } from '../../vendor/preact.js';
 import { clock, replay } from '../store.js';
 import { act } from '../net/actions.js';

@@ -1,4 +1,4 @@
-/** The recordings of a study, the worst first, and its report. */
+/** Recordings of a study, worst first, and its report. */
 import { html } from '../../vendor/preact.js';
 import { maySteerReplay, replay, shelf } from '../store.js';
 import { act } from '../net/actions.js';
@@ -27,7 +27,7 @@ export function ShelfPage() {
 let isOpening = false;
 
 /**
- * Open a recording and go to the map, once: a second answer would lead away from another page.
+ * Open a recording and go to the map, once: a second reply would navigate away from another page.
  * @param {string} name
  */
 async function open(name) {

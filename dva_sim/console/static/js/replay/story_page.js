@@ -1,4 +1,4 @@
-/** What was told in a recording, line by line; each leads to its moment. */
+/** Story page: reports and marks of a recording, one per line; each jumps to its moment. */
 import { html } from '../../vendor/preact.js';
 import { replay, story } from '../store.js';
 import { act } from '../net/actions.js';
@@ -12,8 +12,8 @@ export function StoryPage() {
   return html`<main class="page story-page" id="main" tabindex="-1">
     <h1>Story</h1>
     <p class="soft">Select a line to jump to that moment.</p>
-    <h2>Told so far</h2>
-    <${Lines} name="Told so far" lines=${lines} />
+    <h2>Story so far</h2>
+    <${Lines} name="Story so far" lines=${lines} />
     <h2>Still to come</h2>
     <${Lines} name="Still to come" lines=${later} />
   </main>`;

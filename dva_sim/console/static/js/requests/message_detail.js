@@ -1,4 +1,4 @@
-/** One request whole: its header, its XML with the place of what is wrong, and the reply. */
+/** Details of a request: its header, its XML with errors marked, and the reply. */
 import { html, useEffect, useState } from '../../vendor/preact.js';
 import { mayDrive } from '../store.js';
 import { serviceText, timeText } from './request_table.js';
@@ -61,7 +61,7 @@ function Whole({ found }) {
 }
 
 /**
- * Lines with their numbers; those with a mistake are marked.
+ * Lines with their numbers; those with an error are marked.
  * @param {{text: string, problems: {line: number, column: number}[], name: string}} props
  */
 function Source({ text, problems, name }) {

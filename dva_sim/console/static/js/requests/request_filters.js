@@ -1,4 +1,4 @@
-/** Which requests are shown: by device, kind, reply and words; and what is done with them. */
+/** Filters of the requests by device, kind, reply and text; and actions on the list. */
 import { html } from '../../vendor/preact.js';
 import { mayDrive } from '../store.js';
 import { Choice, Field, Tick } from '../ui/fields.js';

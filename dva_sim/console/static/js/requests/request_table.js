@@ -89,7 +89,7 @@ export function serviceText(us) {
 }
 
 /**
- * Arrow keys go from line to line.
+ * Move from line to line with the arrow keys.
  * @param {KeyboardEvent} event
  */
 function move(event) {

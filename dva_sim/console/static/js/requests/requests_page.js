@@ -1,4 +1,4 @@
-/** What did the DVA hear, and what did it answer? */
+/** Requests page: requests received by the DVA, and its replies. */
 import { html, useEffect, useState } from '../../vendor/preact.js';
 import { isPast, rows as worldRows } from '../store.js';
 import { useLog } from '../logs/looking.js';
@@ -48,7 +48,7 @@ export function RequestsPage() {
 }
 
 /**
- * A filter once nobody has typed for a moment.
+ * Filter, updated once typing has paused for a moment.
  * @param {LogFilter} filter
  */
 function useSettled(filter) {

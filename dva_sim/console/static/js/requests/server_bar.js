@@ -1,4 +1,4 @@
-/** The DVA's server: whether it listens and where, and how it is started and stopped. */
+/** Server bar: state and address of the DVA's server, and buttons to start and stop it. */
 import { html, useState } from '../../vendor/preact.js';
 import { MOST_PORT } from '../declared.js';
 import { maySteer, rows } from '../store.js';

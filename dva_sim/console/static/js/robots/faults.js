@@ -1,4 +1,4 @@
-/** Knobs that let things go wrong with a robot; all are undone when they are switched off. */
+/** Switches that inject faults into a robot; switching a fault off undoes it. */
 import { html, useEffect, useState } from '../../vendor/preact.js';
 import { MOST_PROCESSING_S } from '../declared.js';
 import { maySteer } from '../store.js';
@@ -39,7 +39,7 @@ function Knob({ name, hint, on, ask }) {
 }
 
 /**
- * What was asked for is shown until the world says the same, or refuses.
+ * State of a switch: the requested one until the simulation reports it or refuses, else the reported one.
  * @param {boolean} reported
  * @param {(wanted: boolean) => Promise<import('../types.js').Answer>} ask
  * @returns {[boolean, (wanted: boolean) => void]}

@@ -1,4 +1,4 @@
-/** Drive the robot at the robot itself: no message, no session, the same limits and watchdog. */
+/** Manual control at the robot itself: no messages, no session, the same limits and watchdog. */
 import { html, useEffect, useLayoutEffect } from '../../vendor/preact.js';
 import { connection, mayDrive, maySteer } from '../store.js';
 import { act, driveLost } from '../net/actions.js';
@@ -45,7 +45,7 @@ async function take(i) {
   if (done.ok && typeof done.hand === 'number') myHand.value = done.hand;
 }
 
-/** Keys and gamepad steer this robot for as long as it is in hand, and whatever interrupts stops. */
+/** Steer this robot by keys and gamepad during manual control; any interruption stops it. */
 function steering() {
   const ends = [steerWith('manual'), driveByKeys(), driveByGamepad(), watchInterruptions()];
   return () => {

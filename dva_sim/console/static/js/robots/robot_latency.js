@@ -1,4 +1,4 @@
-/** How late messages between a robot and its driver are. */
+/** Latency of the messages between a robot and its driver. */
 import { html, useEffect, useMemo, useRef } from '../../vendor/preact.js';
 import { rowOf } from '../store.js';
 import { worldNow } from '../net/world_time.js';
@@ -18,13 +18,13 @@ const KINDS = /** @type {[keyof RobotWindow, string, string][]} */ ([
 ]);
 const FIGURES = /** @type {[string, string][]} */ ([['last_ms', 'Last'], ['median_ms', 'Median'], ['p95_ms', 'p95'], ['largest_ms', 'Largest']]);
 
-/** The figures between both ends, else those that are known. @param {RobotWindow | undefined} shown */
+/** One-way figures if available, else the first available kind. @param {RobotWindow | undefined} shown */
 function best(shown) {
   const kind = KINDS.find(([key]) => shown?.[key]);
   return kind && { name: kind[1], figures: /** @type {any} */ (shown?.[kind[0]]) };
 }
 
-/** As the header of the log has it. @param {RobotWindow | undefined} shown */
+/** Latency text for the header of the log. @param {RobotWindow | undefined} shown */
 export function latencyText(shown) {
   const found = best(shown);
   if (!found) return 'latency: nothing heard yet';
@@ -58,7 +58,7 @@ function figureText(shown, key, figure) {
 }
 
 /**
- * Note the newest of each kind, where there is a newer one than last time.
+ * Record the newest value of each kind, if it is newer than the last one recorded.
  * @param {History} history @param {number[]} counts @param {RobotWindow | undefined} shown
  */
 function sample(history, counts, shown) {

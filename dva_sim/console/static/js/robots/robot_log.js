@@ -1,4 +1,4 @@
-/** All teleoperation messages that a robot hears, in their order, with what it answered. */
+/** All teleoperation messages that a robot receives, in order, with its replies. */
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
 import { useLog } from '../logs/looking.js';
 import { countText, replyText, serviceText, timeText } from '../requests/request_table.js';

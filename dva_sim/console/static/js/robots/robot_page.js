@@ -1,4 +1,4 @@
-/** The windows of one robot: what it hears, how its wheels turn, and hands on it. */
+/** Page of one robot: its messages, its wheels, and manual control. */
 import { html, useEffect } from '../../vendor/preact.js';
 import { isPast, mayDrive, modeOf } from '../store.js';
 import { stopRobots } from '../net/emergency.js';
@@ -53,7 +53,10 @@ function Head({ robot }) {
   </header>`;
 }
 
-/** Why it stands; an emergency and a lost link stand out. @param {{robot: Thing}} props */
+/**
+ * Reason why the robot is stopped; an emergency and a lost link are highlighted.
+ * @param {{robot: Thing}} props
+ */
 function Reasons({ robot }) {
   const shown = windowOf(robot.i);
   if (!shown) return html`<p class="reason" role="status" aria-label="Reason">Waiting for its status …</p>`;
@@ -63,7 +66,7 @@ function Reasons({ robot }) {
     ? `Emergency stop by ${emergency.by} at ${clockText(emergency.at_ms)}: the robot waits for a new order.`
     : lost
       ? `Link lost: ${stopReason}`
-      : stopReason && `Stands: ${stopReason}`;
+      : stopReason && `Stopped: ${stopReason}`;
   return html`<p class=${stop || lost ? 'reason warning' : 'reason'} role="status" aria-label="Reason">
     <span>${text || 'It moves.'}${notice && ` ${notice}.`}</span></p>`;
 }

@@ -1,4 +1,4 @@
-/** All robots, each with a link to its windows; or the windows of the one that is named. */
+/** All robots, each with a link to its page; or the page of the robot named in the address. */
 import { html } from '../../vendor/preact.js';
 import { robots, rowOf, rows, scene } from '../store.js';
 import { detail } from '../shell/route.js';

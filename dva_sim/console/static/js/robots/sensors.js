@@ -1,4 +1,4 @@
-/** What the robot's sensors show now. */
+/** Current values of a robot's sensors. */
 import { html } from '../../vendor/preact.js';
 import { plain } from '../ui/words.js';
 import { windowOf } from './window.js';

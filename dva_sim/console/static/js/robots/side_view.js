@@ -1,4 +1,4 @@
-/** The robot from the side: its wheels turn as fast as it is told to drive, and only ahead. */
+/** Side view of the robot: its wheels turn at the commanded speed, and only forward. */
 import { html, useEffect, useRef } from '../../vendor/preact.js';
 import { fixed, windowOf } from './window.js';
 
@@ -31,7 +31,7 @@ export function SideView({ robot }) {
 const SERVICE = 'M38 78V58q0-6 6-6h32l5-30q1-12 13-12h22q9 0 9 9v33h31q6 0 6 6v20z';
 const CAR = 'M24 76q-2-16 12-20l30-6 22-18h34l20 20 30 6q8 4 6 18z';
 
-/** Whether it steers left, straight and right alone. @param {Thing} robot */
+/** True for a model car, which steers only left, straight and right. @param {Thing} robot */
 export const isModelCar = (robot) => robot.steering === 'three_way';
 
 /** @param {Thing} robot */

@@ -1,4 +1,4 @@
-/** How far a robot has come: off, registered, listening, and what it does then. */
+/** Stages of a robot: off, registered, listening, and its mode from then on. */
 import { html, useState } from '../../vendor/preact.js';
 import { maySteer } from '../store.js';
 import { act } from '../net/actions.js';

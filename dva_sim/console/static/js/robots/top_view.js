@@ -1,4 +1,4 @@
-/** The robot from above, ahead to the right: its wheels turned by the turn rate that it is told. */
+/** Top view of the robot, facing right: its wheels are turned by the commanded turn rate. */
 import { html } from '../../vendor/preact.js';
 import { isModelCar } from './side_view.js';
 import { degrees, fixed, side, windowOf } from './window.js';
@@ -34,7 +34,11 @@ export function TopView({ robot }) {
   </section>`;
 }
 
-/** Places of the wheels, and which of them turn. @param {boolean} car @returns {[number, number, boolean][]} */
+/**
+ * Positions of the wheels, and which of them steer.
+ * @param {boolean} car
+ * @returns {[number, number, boolean][]}
+ */
 const wheels = (car) =>
   car
     ? [[66, 24, false], [66, 76, false], [136, 24, true], [136, 76, true]]

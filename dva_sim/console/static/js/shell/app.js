@@ -1,4 +1,4 @@
-/** The shell: bar, rail, warnings, and the page that the address names. */
+/** The shell: bar, rail, warnings, and the page named in the address. */
 import { html, render } from '../../vendor/preact.js';
 import {
   clock, connection, isAttached, isPast, notice, replay, rows, scene, shelf,
@@ -79,7 +79,7 @@ function skip(event) {
   document.getElementById('main')?.focus();
 }
 
-/** The pages that there are to go to. */
+/** Pages that are available. */
 function pages() {
   const some = scene.value?.pages;
   if (some) return PAGES.filter(([name]) => some.includes(name));
@@ -89,7 +89,7 @@ function pages() {
   return shelf.value ? [...past, SHELF] : past;
 }
 
-/** The page that the address names, or the first that there is. */
+/** Page named in the address, or the first available one. */
 function shown() {
   const names = pages().map(([name]) => name);
   return names.includes(page.value) ? page.value : (scene.value?.pages?.[0] ?? names[0] ?? SHELF[0]);
@@ -113,7 +113,7 @@ function Waiting() {
   return html`<main class="page waiting" id="main" tabindex="-1"><h1>dva-sim</h1><p>${text}</p></main>`;
 }
 
-/** What is wrong stands out, and says what follows from it. */
+/** Warnings, each with its consequence. */
 function Warnings() {
   const { lag_s: lag, held_by_lag: held } = clock.value;
   const limit = Math.round(1000 * (scene.value?.lag_limit_s ?? 0.25));

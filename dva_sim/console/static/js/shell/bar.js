@@ -1,4 +1,4 @@
-/** What is always in sight: time, link, age of the data, alarms, who one is, emergency stop. */
+/** Top bar: time, link, age of the data, alarms, the person's role, emergency stop. */
 import { html } from '../../vendor/preact.js';
 import {
   clock, connection, isAttached, isModelled, isPast, link, maySteer, replay, scene, you,

@@ -5,7 +5,7 @@ import { openHelp } from '../help/help.js';
 
 const WRITING = 'input:not([type=range]), textarea, select';
 
-/** From now on. */
+/** Start listening for keys. */
 export function listenForKeys() {
   window.addEventListener('keydown', (event) => {
     if (event.key === 'Escape' && event.shiftKey) {

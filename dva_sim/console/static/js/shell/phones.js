@@ -1,4 +1,4 @@
-/** The address for phones, as a code for their cameras: for who may drive alone. */
+/** Address for phones, as a code to scan; available only to operators. */
 import { html, signal, useEffect, useRef } from '../../vendor/preact.js';
 import { isOperator } from '../store.js';
 import { Icon } from '../ui/icon.js';
@@ -6,7 +6,7 @@ import { Icon } from '../ui/icon.js';
 const address = signal('');
 const open = signal(false);
 
-/** The button, where phones have an address. */
+/** Button that opens the code; shown if there is an address for phones. */
 export function PhoneButton() {
   const own = isOperator.value;
   useEffect(() => {
@@ -28,7 +28,7 @@ async function ask() {
   }
 }
 
-/** The code, once somebody asks for it: whoever sees it may drive. */
+/** The code, hidden until somebody opens it: anyone who sees it may drive. */
 export function PhoneCode() {
   const dialog = useRef(/** @type {HTMLDialogElement | null} */ (null));
   useEffect(() => {

@@ -1,4 +1,4 @@
-/** Which page is shown, in the address: a reload or a sent link shows the same. */
+/** Current page, kept in the address: a reload or a shared link shows the same page. */
 import { computed, signal } from '../../vendor/preact.js';
 import { robots, scene } from '../store.js';
 
@@ -14,7 +14,7 @@ window.addEventListener('hashchange', () => {
 });
 goElsewhere();
 
-/** The pages of phones and guards are documents of their own, and reached from here, too. */
+/** Redirect to the pages of phones and guards, which are separate documents. */
 function goElsewhere() {
   const found = /^#\/(phone|guard)(\/\w+)?$/.exec(location.hash);
   if (found) location.replace(`/${found[1]}#${found[2] ?? '/main'}`);
@@ -26,7 +26,7 @@ const parts = computed(() => {
   return { path: name, detail: decoded(rest.join('/')), query: new URLSearchParams(query) };
 });
 
-/** What stands behind the name of the page, as in `#/robots/robot-1`; empty: nothing. */
+/** Part of the address after the page's name, as in `#/robots/robot-1`; empty if there is none. */
 export const detail = computed(() => parts.value.detail);
 
 /** @param {string} text */
@@ -40,7 +40,7 @@ function decoded(text) {
 
 export const page = computed(() => (PAGES.includes(parts.value.path) ? parts.value.path : (scene.value?.pages?.[0] ?? 'map')));
 
-/** The robots that are looked at or driven: those of the address, else the first. */
+/** Robots being watched or driven: those in the address, else the first one. */
 export const driven = computed(() => {
   const wanted = (parts.value.query.get('robots') ?? '').split(',');
   const found = wanted.flatMap((label) => robots.value.filter((robot) => robot.label === label));

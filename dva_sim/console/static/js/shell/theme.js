@@ -1,4 +1,4 @@
-/** Light or dark: what the system wishes, until the person chooses. */
+/** Light or dark theme: the system's preference, until the person chooses. */
 import { computed, effect, signal } from '../../vendor/preact.js';
 import { DARK, LIGHT } from '../palette.js';
 
@@ -8,9 +8,9 @@ const system = signal(wish.matches);
 /** @type {import('../../vendor/preact.js').Signal<string | null>} */
 const chosen = signal(remembered());
 
-/** Whether the page is dark. */
+/** True while the theme is dark. */
 export const dark = computed(() => (chosen.value ? chosen.value === 'dark' : system.value));
-/** All colours, by name, as they are now. */
+/** All colours of the current theme, by name. */
 export const colours = computed(
   () => /** @type {Record<string, string>} */ (dark.value ? DARK : LIGHT),
 );
@@ -20,7 +20,7 @@ effect(() => {
   if (chosen.value) document.documentElement.dataset.theme = chosen.value;
 });
 
-/** Change sides, and remember it. */
+/** Switch between light and dark, and save the choice. */
 export function switchTheme() {
   chosen.value = dark.value ? 'light' : 'dark';
   try {

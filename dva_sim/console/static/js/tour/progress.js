@@ -1,4 +1,4 @@
-/** How far somebody is in the tour: the places to go to, and the person's own times. */
+/** Progress in the tour: its goals, and the person's own times. */
 import { signal } from '../../vendor/preact.js';
 import { modeOf, robots, rowOf, scene, seat, tracks } from '../store.js';
 import { act } from '../net/actions.js';
@@ -15,7 +15,7 @@ const MOVED_M = 0.5; // somebody has driven the second robot away meanwhile
  *   took: (number | null)[]}} Progress
  */
 
-/** Where the person is in the tour; null while there is none. */
+/** Current progress in the tour; null while no tour is running. */
 export const progress = signal(/** @type {Progress | null} */ (null));
 
 /** The marked goal of this part of the tour, if any. @returns {import('../types.js').Goal[]} */
@@ -69,7 +69,10 @@ export async function go(step) {
   if (robot) chooseRobots([robot.label]);
 }
 
-/** Whether the robot of a leg that has not begun stands where its goal was chosen for. @param {number} leg */
+/**
+ * True unless the robot of a leg that has not begun was moved since its goal was chosen.
+ * @param {number} leg
+ */
 export function isAtItsStart(leg) {
   const plan = progress.value?.plan;
   const away = awayFromGoal(leg);
@@ -86,7 +89,7 @@ function awayFromGoal(leg) {
 }
 
 /**
- * From the first move until it stands in the ring.
+ * Time a leg from the robot's first move until it stands still in the ring.
  * @param {number} leg
  */
 export function watchLeg(leg) {

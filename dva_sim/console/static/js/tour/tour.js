@@ -1,6 +1,6 @@
 /**
- * One minute that lets one feel it: the same short drive under two patterns, at the same delay, and
- * in the end the person's own two times.
+ * A one-minute tour that makes latency tangible: the same short drive under two patterns, at the same
+ * delay, and at the end the person's own two times.
  */
 import { html, useEffect } from '../../vendor/preact.js';
 import { isModelled, maySteer, robots, rowOf } from '../store.js';
@@ -14,14 +14,14 @@ const WORDS = ['Set up', 'Drive the first robot', 'Drive the second robot', 'You
 const HALF_ROUND = 2.5; // [rad]
 const AHEAD = 0.2; // [rad]
 
-/** The tour's button, where there are two robots for one. */
+/** Button that starts the tour; shown if there are at least two robots. */
 export function TourButton() {
   if (robots.value.length < 2 || progress.value || !isModelled.value) return null;
   return html`<button type="button" class="tour-button" disabled=${!maySteer.value} onClick=${takeTour}>
     <${Icon} name="flag" />Take the tour</button>`;
 }
 
-/** The panel that leads through it. */
+/** Panel that guides through the tour. */
 export function Tour() {
   const now = progress.value;
   if (!now) return null;
@@ -66,7 +66,7 @@ function Leg({ leg }) {
 }
 
 /**
- * What to do before one goes straight on.
+ * Instruction to turn before driving straight ahead.
  * @param {number} side of the goal from the robot's heading, to the left positive [rad]
  * @param {string} goal
  */

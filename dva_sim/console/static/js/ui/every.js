@@ -2,7 +2,7 @@
 import { useEffect, useState } from '../../vendor/preact.js';
 
 /**
- * Render again every so often, while the page can be seen.
+ * Render again periodically while the page is visible.
  * @param {number} ms
  */
 export function useEvery(ms) {

@@ -1,8 +1,8 @@
-/** Fields with their names, and what is wrong with what stands in them. */
+/** Labelled form fields with their error messages. */
 import { html } from '../../vendor/preact.js';
 
 /**
- * A field for words or a number.
+ * Field for text or a number.
  * @param {{name: string, value: string, onInput: (text: string) => void, wrong?: string,
  *   mode?: string, disabled?: boolean, hint?: string, most?: number}} props
  */
@@ -21,7 +21,7 @@ export function Field({ name, value, onInput, wrong = '', mode = 'text', disable
 }
 
 /**
- * A choice of some.
+ * Selection from a list of options.
  * @param {{name: string, value: string, options: [string, string][],
  *   onInput: (value: string) => void, disabled?: boolean, wrong?: string}} props
  */
@@ -39,7 +39,7 @@ export function Choice({ name, value, options, onInput, disabled, wrong = '' }) 
 }
 
 /**
- * A yes or no.
+ * Labelled checkbox.
  * @param {{name: string, value: boolean, onInput: (value: boolean) => void}} props
  */
 export function Tick({ name, value, onInput }) {
@@ -51,7 +51,7 @@ export function Tick({ name, value, onInput }) {
 const idOf = (name) => `field-${name.toLowerCase().replace(/\W+/g, '-')}`;
 
 /**
- * What is wrong with a number; empty if nothing is.
+ * Error message for a number; empty if the number is valid.
  * @param {string} text
  * @param {number} low
  * @param {number} high

@@ -1,4 +1,4 @@
-/** Icons of the sprite, and the marks of severities and states: never without a word beside. */
+/** Icons of the sprite, and the marks of severities and states: always shown with a word beside them. */
 import { html } from '../../vendor/preact.js';
 import { SOURCE_SHAPES, STATES, stateColour } from '../map/marks.js';
 import { HAZARDS } from '../palette.js';
@@ -25,7 +25,7 @@ export function SeverityMark({ severity, quiet = false }) {
   </svg>`;
 }
 
-/** Where a hazard comes from, as on the map. @param {{kind: string}} props */
+/** Mark of a hazard's source, as on the map. @param {{kind: string}} props */
 export function SourceMark({ kind }) {
   const look = /** @type {Record<string, {mark: string, colour: string}>} */ (HAZARDS)[kind];
   return html`<svg class="icon source" viewBox="-.65 -.65 1.3 1.3" aria-hidden="true" focusable="false">

@@ -1,4 +1,4 @@
-/** A slider with its name, its value with unit, and its range in sight. */
+/** A slider that shows its name, its value with unit, and its range. */
 import { html } from '../../vendor/preact.js';
 
 /**

@@ -1,4 +1,4 @@
-/** Says in red that an emergency stop is not confirmed, for as long as it is not. */
+/** Red warning, shown while an emergency stop is not confirmed. */
 import { html } from '../../vendor/preact.js';
 import { giveUp, unconfirmed } from '../net/emergency.js';
 

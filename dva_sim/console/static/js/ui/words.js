@@ -1,4 +1,4 @@
-/** Numbers as people read them: with units, and no more digits than they can use. */
+/** Numbers formatted for reading: with units, and no more digits than are useful. */
 
 /** @param {number} ms */
 export function clockText(ms) {
