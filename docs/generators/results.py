@@ -130,7 +130,8 @@ def _open(study: str) -> Iterator[str]:
 def _answered(answer: KeptAnswer, folder: Path) -> Iterator[str]:
     manifest = json.loads((folder / f"{answer.study}.manifest.json").read_text(encoding="utf-8"))
     yield "## Answer"
-    yield f"**{prose(answer.answer)}**"
+    first, rest = first_and_rest(answer.answer)
+    yield f"**{prose(first)}** {prose(rest)}"
     yield _picture(answer.study)
     yield _band(answer)
     if judged := [*answer.hypotheses, *answer.predictions]:

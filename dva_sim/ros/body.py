@@ -15,7 +15,9 @@ from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import World
 
-STOP_REPEATED: Final = 1.0  # design: a robot is told to stand for so long after each drive [s]
+STOP_REPEATED: Final = (
+    1.0  # design: the stop command is repeated for this time after each drive [s]
+)
 STILL: Final = 0.02  # below this it counts as standing [m/s, rad/s]
 
 

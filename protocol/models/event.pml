@@ -46,7 +46,7 @@ inline happens(which) {
   last = false;
 #endif
   decide();
-#ifdef WAIT_ANEW_AFTER_DECLINE
+#ifdef WAIT_AGAIN_AFTER_DECLINE
   if :: what == DECLINE || what == CALL_AWAY -> waited = 0 :: else fi;
 #endif
 #ifdef REPORTS_RESET

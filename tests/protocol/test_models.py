@@ -104,7 +104,7 @@ def test_an_event_ends_whatever_people_do(tmp_path):
     "changed",
     [
         *("NO_DEADLINE", "NO_ORDER_LIMIT", "NO_LAST_ATTEMPT"),
-        *("WAIT_ANEW_AFTER_DECLINE", "REPORTS_RESET"),
+        *("WAIT_AGAIN_AFTER_DECLINE", "REPORTS_RESET"),
     ],
 )
 def test_without_a_deadline_or_a_last_attempt_an_event_need_not_end(tmp_path, changed):

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import Final
 
 DRIFT: Final = 300e-6  # design: growth of the offset in a second; crystals keep within 100 ppm
-ANEW: Final = 2.0  # design: times so far back are of another count, as after a reload [s]
+RESTARTED: Final = 2.0  # design: times so far back are of another count, as after a reload [s]
 
 
 class PhoneClock:
@@ -29,7 +29,7 @@ class PhoneClock:
 
     def is_old(self, stamp: float) -> bool:
         """Return True if what was told for a time [s] is obsolete."""
-        return self._last_stamp - ANEW < stamp <= self._last_stamp
+        return self._last_stamp - RESTARTED < stamp <= self._last_stamp
 
     def times_of(self, stamps: Sequence[float], came: float) -> list[float]:
         """Return when samples were taken by our clock [s]: not in the future, and in order.
@@ -38,7 +38,7 @@ class PhoneClock:
             stamps: Times by the phone, rising [s]; at least one.
             came: Common arrival time by our clock [s]; not before earlier ones.
         """
-        if stamps[-1] <= self._last_stamp - ANEW:
+        if stamps[-1] <= self._last_stamp - RESTARTED:
             self.offset = math.inf
         grown = self.offset + DRIFT * (came - self._came)
         self.offset = min(came - stamps[-1], grown)

@@ -64,12 +64,12 @@ def _difference(f: Finding, where: NDArray[np.intp]) -> tuple[str, list[str]]:
     reach = [*_differs(f, where), *_elsewhere(f)]
     if f.elsewhere is not None and f.elsewhere.turns:
         over = f"{_reaches(f, f.elsewhere, own=f.mean[stop])}{_after(there)}"
-        first = f"{_depends(f)} on the setting: {over} over {f.elsewhere.count + 1} settings"
+        first = f"{_depends(f)} on the setting: {over}, over {f.elsewhere.count + 1} settings"
         return f"{first}{beyond}", [f"{condition(f)} it is {_size(f, stop)}", *reach]
     if f.models is not None:
         over = f"{_reaches(f, f.models, own=f.mean[stop])}{_after(there)}{_settings(f)}"
         who = f"{_depends(f)} on the persons" if f.models.turns else compared
-        first = f"{who}: {over} over {f.models.count + 1} models of the persons{beyond}"
+        first = f"{who}: {over}, over {f.models.count + 1} models of the persons{beyond}"
         return first, [f"with the study's own persons it is {_size(f, stop)}", *reach]
     size = _size(f, stop, there=f"{_after(there)}{_settings(f)}", beyond=beyond)
     return f"{compared}{_remark_on_size(f, where)}: {size}", reach
@@ -204,7 +204,8 @@ def _elsewhere(f: Finding, but: NDArray[np.bool_] | None = None) -> Iterator[str
     for chosen, clause in kinds:
         where = np.flatnonzero(chosen if but is None else chosen & ~but)
         if len(where):
-            yield f"{places(f, where)} {clause(float(f.bounds[where].max()))}".lstrip()
+            there = places(f, where)
+            yield f"{there}{there and ', '}{clause(float(f.bounds[where].max()))}"
 
 
 def _ruled_out(f: Finding, bound: float) -> str:
@@ -282,7 +283,7 @@ def _what_misses_count(f: Finding) -> str:
 
 def _what_is_measured(f: Finding) -> str:
     part = f"in part {f.part}, " if f.part else ""
-    excess = f", beyond that of the {f.cluster}'s own reference run" if f.in_excess else ""
+    excess = ", beyond that of an ideal reference run" if f.in_excess else ""
     return capital(f"{part}the {measure_name(f.measure)}{excess}.")
 
 

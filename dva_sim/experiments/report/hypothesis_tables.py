@@ -64,15 +64,15 @@ _SETTLED: dict[Verdict, str] = {
     "open": "is undecided",
     "not run": "was not run",
 }
-_NOT_SAID: dict[Verdict, str] = {
+_OPENINGS: dict[Verdict, str] = {
     "held": "",
     "did not hold": "it is not so that ",
     "open": "whether ",
     "not run": "whether ",
 }
-"""What keeps a claim that did not hold from being read as the result."""
+"""Words before a claim in the lead; a refuted one alone would read as the result."""
 _ORDER: tuple[Verdict, ...] = ("did not hold", "open", "not run", "held")
-_MOST_TOLD = 2  # hypotheses, before the rest are only counted
+_MOST_NAMED = 2  # hypotheses, before the rest are only counted
 
 
 def verdict_lead(
@@ -87,9 +87,9 @@ def verdict_lead(
         only_model: The one model of the persons that was tried; empty if several were.
     """
     ranked = sorted(tested, key=lambda claim: _ORDER.index(claim.verdict))
-    told = [t for t in ranked if t.verdict == ranked[0].verdict][:_MOST_TOLD]
+    named = [t for t in ranked if t.verdict == ranked[0].verdict][:_MOST_NAMED]
     beyond = f" ({EXTRAPOLATED})" if is_extrapolated else ""
-    first = f"{_counted(ranked)}{beyond}: {'; '.join(_told(t, cluster) for t in told)}."
+    first = f"{_counted(ranked)}{beyond}: {'; '.join(_with_facts(t, cluster) for t in named)}."
     rest = Counter(t.verdict for t in ranked)
     del rest[ranked[0].verdict]
     clauses = [f"{n} of the others {_SETTLED[verdict]}" for verdict, n in rest.items()]
@@ -117,9 +117,9 @@ def _inside(text: str) -> str:
     return clause[:1].lower() + clause[1:] if clause[1:2].islower() else clause
 
 
-def _told(tested: Tested, cluster: str) -> str:
+def _with_facts(tested: Tested, cluster: str) -> str:
     """`Waiting costs (4.0 s, 95 % interval 3.0 to 5.0 s, claimed above 2.0 s)`."""
-    text = _NOT_SAID[tested.verdict] + _inside(tested.hypothesis.text or _claim(tested))
+    text = _OPENINGS[tested.verdict] + _inside(tested.hypothesis.text or _claim(tested))
     if tested.difference is None:
         return text
     found, unit = tested.difference, unit_of(tested.contrast.measure)

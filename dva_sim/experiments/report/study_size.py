@@ -18,18 +18,19 @@ def size_of(reading: Reading) -> str:
     return f"{_version(reading, usual)}{_as_run(reading)}.{_whole(reading, usual)}"
 
 
+def runs_of(reading: Reading) -> int:
+    """Return the number of runs, with those under other models of the persons."""
+    tables = (name for name in ("runs", "robustness") if reading.results.has(name))
+    return sum(reading.results.table(name).rows for name in tables)
+
+
 def _as_run(reading: Reading) -> str:
     study, cells = reading.study, len(reading.manifest.get("cells", []))
     if reading.by_people:
         return f"1 run in real time, in which people drove, seed {study.get('seed')}"
     persons = _people(reading.persons, study.get("replications"), reading.cluster)
     configurations = f" in {cells:,} configurations" if cells else ""
-    runs = sum(
-        reading.results.table(name).rows
-        for name in ("runs", "robustness")
-        if reading.results.has(name)
-    )
-    return f"{persons}, {runs:,} runs{configurations}, seed {study.get('seed')}"
+    return f"{persons}, {runs_of(reading):,} runs{configurations}, seed {study.get('seed')}"
 
 
 def _people(persons: int, trials: int | None, cluster: str) -> str:

@@ -14,6 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from dva_sim.experiments.report.size_plan_table import plan_lines
+from dva_sim.experiments.report.study_size import runs_of
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.results.results import Results, plain
@@ -152,7 +153,7 @@ def _facts(reading: Reading) -> Iterator[str]:
     results, manifest, study = reading.results, reading.manifest, reading.study
     yield _status(manifest)
     cells = len(manifest.get("cells", []))
-    size = f"{results.runs.rows} runs in {cells} configurations"
+    size = f"{runs_of(reading)} runs in {cells} configurations"
     persons = f"{reading.persons} {reading.cluster}s x {study.get('replications')} trials"
     if reading.by_people:
         yield f"1 run in real time, in which people drove, seed {study.get('seed')}"

@@ -38,7 +38,7 @@ TURNING = 0.1  # above this it turns [rad/s]
 SLACK = 1.02  # measured speeds may exceed a limit by so much
 OBEYS_WITHIN = 5.0  # a robot may wait so long, and ten messages' processing, until it obeys [s]
 ROUNDED = 0.002  # of ticks [s]
-STARTED_ANEW = 10.0  # a robot whose clock has jumped that much [s]
+RESTARTED = 10.0  # a robot whose clock has jumped that much [s]
 LEASE = 30.0  # a driver of whom nothing valid was heard for so long has the robot no longer [s]
 LEASE_SLACK = 2.0  # a robot looks at that once a second, the audit twice [s]
 ENDLESS = 3600.0  # a set point that holds for so long has no end [s]
@@ -623,7 +623,7 @@ def _learn_offset(witness: Witness, status: m.Message | None, now: float) -> Non
     if status is None or not isinstance(status.body, m.RobotStatus):
         return
     offset = now - status.body.tick / 1000
-    if witness.offset is None or abs(offset - witness.offset) > STARTED_ANEW:
+    if witness.offset is None or abs(offset - witness.offset) > RESTARTED:
         witness.offset = offset
 
 

@@ -36,7 +36,7 @@ IN_WORDS = {
     ),
     "levels where every pair is equal, apart from those that are settled": (
         finding([0, 0.2, 0, 3.0, 6.0, 9.0], half_width=np.array([0.0, 1.0, 1.0, 1.0, 1.0, 1.0])),
-        ["; without delay both", " 50 ms", " 100 ms", "above 1.2 s"],
+        ["; without delay, both", " 50 ms", " 100 ms", "above 1.2 s"],
     ),
     "a band too wide to rule out what matters: more persons": (
         finding([0] * 6, half_width=5, persons=4),
@@ -74,7 +74,7 @@ IN_WORDS = {
         finding([1.0] * 6, half_width=0.5),
         ["but by less than the 2 s"],
     ),
-    "a level without runs": (finding([0, 0, 0, 0, np.nan, 0]), ["At 500 ms runs are missing"]),
+    "a level without runs": (finding([0, 0, 0, 0, np.nan, 0]), ["At 500 ms, runs are missing"]),
     "another measure in its own unit": (
         finding(GROWING, measure="path_m", in_excess=False, smallest_effect=None),
         ["With REQ/REP", "higher", "+14.2 m"],

@@ -12,6 +12,7 @@ from dva_sim.cli import answers as command
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.report import kept_answers
 from dva_sim.kernel.errors import ConfigError, ExitCode
+from dva_sim.kernel.wording import first_and_rest
 
 
 def unsafe(job):
@@ -116,7 +117,8 @@ def test_the_page_dates_each_answer(kept):
     kept_answers.keep(answer, manifest, folder)
     page = results.study_page(answer.study, answer.question, answer, folder)
     assert page.startswith(f"# {answer.study}\n")
-    assert unnamed(page, answer.question, answer.answer, answer.date, "since 9.9.9", "seed 3") == []
+    sentences = first_and_rest(answer.answer)
+    assert unnamed(page, answer.question, *sentences, answer.date, "since 9.9.9", "seed 3") == []
 
 
 def test_a_file_that_is_no_answer_is_named(tmp_path):
