@@ -429,7 +429,9 @@ class Dva:
         """Tell a robot who may act on it: its holder, or what another device may read."""
         grant = self.sessions.held(message.source, body.holder, body.level == "sensors")
         if asker.device.device_type != ROBOT or grant is None:
-            text = f"{body.holder or 'nobody'} holds no such robot"
+            text = "nobody holds the robot now"
+            if body.holder:
+                text = f"{body.holder} holds no such robot"
             return self._refuse(message, m.NOT_PERMITTED, text)
         permission = m.Permission(
             grant.holder, grant.level, grant.session, grant.address, grant.sensors

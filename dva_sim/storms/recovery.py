@@ -148,7 +148,11 @@ class RecoveryProbes:
         self._probe.ask(DVA, body, answered, again)
 
     def _ask_for(self, robot: str) -> None:
-        """Ask for a robot until it is granted; one that others drive works, and is left to them."""
+        """Ask for a robot until it is granted; one that others drive works, and is left to them.
+
+        Its holder is asked, too: a DVA that could not write before it was killed may remember a
+        permission whose holder has been told that it is over, and does not use it.
+        """
         if robot not in self._open:
             return
         if self._clock.now - self._used.get(robot, -1e9) < USED_LATELY:
@@ -166,7 +170,8 @@ class RecoveryProbes:
             else:
                 again()
 
-        self._probe.ask(DVA, m.PermissionRequest(robot, "both"), answered, again)
+        wish = m.PermissionRequest(robot, "both", takeover="ask")
+        self._probe.ask(DVA, wish, answered, again)
 
     def _start(self, robot: str, session: int) -> None:
         def again(*_: object) -> None:

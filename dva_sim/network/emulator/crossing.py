@@ -135,22 +135,20 @@ class _Relay:
 
     async def _lead(self, number: int, listener: int) -> asyncio.Server:
         async def leave(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-            try:
+            with suppress(*publishing.BROKEN):
                 there = await asyncio.open_connection(
                     ADDRESSES[ENDS[self._end]], PORT, limit=_BUFFER
                 )
-            except OSError:
-                writer.close()
-                return
-            there[1].write(number.to_bytes(_NUMBER, "big"))
-            await self._join((reader, writer), there)
+                there[1].write(number.to_bytes(_NUMBER, "big"))
+                await self._join((reader, writer), there)
+            writer.close()
 
         listening = socket.socket(fileno=listener)
         return await asyncio.start_unix_server(leave, sock=listening, limit=_BUFFER)
 
     async def _arrive(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Lead a connection that has crossed the link to its place."""
-        with suppress(OSError, asyncio.IncompleteReadError):
+        with suppress(*publishing.BROKEN):
             number = int.from_bytes(await reader.readexactly(_NUMBER), "big")
             place = _place(self._folder, number)
             there = await asyncio.open_unix_connection(place, limit=_BUFFER)

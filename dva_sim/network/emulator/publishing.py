@@ -16,6 +16,8 @@ from dva_sim.network.emulator.linux_calls import NEAR_END
 
 _HOSTS = "127.0.0.1", NEAR_END.address  # where a program of the near end may listen
 _CHUNK = 65_536
+BROKEN = OSError, asyncio.IncompleteReadError, asyncio.CancelledError
+"""What may end a connection; before Python 3.12, servers print a traceback for the last of them."""
 
 
 def words_of(listeners: Sequence[socket.socket]) -> list[str]:
@@ -42,7 +44,7 @@ class _Leader:
 
     async def lead(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Pass on the bytes of a connection both ways; it is closed if nobody listens there."""
-        with suppress(OSError):
+        with suppress(*BROKEN):
             for host in _HOSTS:
                 with suppress(ConnectionRefusedError):
                     there = await asyncio.open_connection(host, self._port)

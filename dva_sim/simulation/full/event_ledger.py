@@ -92,7 +92,9 @@ class Word:
         ended: Devices that have finished, by their own report or the DVA's.
         loose: Devices no longer in charge, by their own report or the DVA's, or after a restart.
         busy: True if somebody accepted it since the last check.
-        sent_again: True if such a device was sent there again since then.
+        sent_again: True if such a device, or one with another robot, was sent there since then.
+        freed: True if somebody reported the end of the work since then: the DVA may have sent the
+            same device again at once, with the order still in its queue.
         found: Findings and actions of those at the place.
     """
 
@@ -102,6 +104,7 @@ class Word:
     loose: set[str] = field(default_factory=set)
     busy: bool = False
     sent_again: bool = False
+    freed: bool = False
     found: set[str] = field(default_factory=set)
 
 
@@ -174,11 +177,16 @@ class EventLedger:
                 if state != "declined":
                     self._takes_up(number, source)
                 if state not in ("departed", "arrived"):
-                    self._word(number).loose.add(source)
+                    self._ends(self._word(number), source)
                     self._word(number).ended.add(source)
             case m.Registration():
                 for word in self._words.values():
-                    word.loose.add(source)
+                    self._ends(word, source)
+
+    @staticmethod
+    def _ends(word: Word, device: str) -> None:
+        word.loose.add(device)
+        word.freed = word.freed or device in word.ordered
 
     def is_heard(self, source: str, now: float) -> None:
         """The DVA has heard a device, whatever it said."""
@@ -230,7 +238,8 @@ class EventLedger:
         if goes == to:  # a person has one order, the newest
             for other in self._words.values():
                 other.ended.add(to)
-        word.ordered[to], word.sent_again = goes, word.sent_again or to in word.loose
+        is_another = to in word.loose or word.ordered.get(to, goes) != goes
+        word.ordered[to], word.sent_again = goes, word.sent_again or is_another
         word.taken.discard(to)
         word.ended.discard(to)
         word.loose.discard(to)
@@ -455,12 +464,16 @@ class EventLedger:
         found = FOUND.intersection((*event.times, event.state.value))
         old = old or Seen(found - FOUND, (), now, now)
         word, hands = self._word(event.number), _in_hand(event)
+        given = "act_assigned" if hands[:1] == ("act",) else "assigned"
+        if word.freed and hands == old.hands and event.times.get(given) != old.times.get(given):
+            word.sent_again = True
+            word.taken -= word.loose
         taken = bool(word.taken.intersection(hands))
         confirmed = "confirmed" in found - old.found
         waits = now if taken or word.busy or confirmed else old.waits
         since = old.since if hands == old.hands and not word.sent_again else now
-        word.busy = word.sent_again = False
         debt = self._debt(event, hands, old.debt, now)
+        word.busy = word.sent_again = word.freed = False
         return Seen(
             found, hands, since, waits, times=dict(event.times), debt=debt, is_over=not event.open
         )

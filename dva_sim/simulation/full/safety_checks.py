@@ -143,6 +143,7 @@ class Witness:
         asked: Time at which that request was first sent.
         hand: Person in manual control, until released.
         registrations: Its newest ones, by number and time stamp.
+        reported: Number of its newest status.
     """
 
     obeys_within: float
@@ -169,6 +170,7 @@ class Witness:
     question: int = 0
     asked: float = 0.0
     hand: str | None = None
+    reported: int = 0
     registrations: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=MOST_COPIES))
 
     def given(self, session: int, held: Held) -> None:
@@ -213,10 +215,19 @@ class Witness:
         if registration in self.registrations:
             return  # sent again
         if self.registrations and registration[0] <= self.registrations[-1][0]:
-            self.question = 0
-            for session in self.confirmed:
-                _end(self, session, now)
+            self._forgets(now)
         self.registrations.append(registration)
+
+    def reports(self, number: int, now: float) -> None:
+        """Note a status; over a bad link it shows a restart long before the registration."""
+        if number < self.reported:
+            self._forgets(now)
+        self.reported = number
+
+    def _forgets(self, now: float) -> None:
+        self.question = 0
+        for session in self.confirmed:
+            _end(self, session, now)
 
     def note_stop(self, when: float) -> None:
         """Note that an emergency has stopped it, or should have; no hand drives it any longer."""
@@ -371,7 +382,7 @@ class SafetyAudit:
         if b"<GetGrant" in payload:
             _note_question(witness, _read(payload), now)
         if b"<RobotStatus>" in payload:
-            _learn_offset(witness, _read(payload), now)
+            _learn_from_status(witness, _read(payload), now)
         if b"<SensorValue>" in payload and (value := _read(payload)) is not None:
             self._report([*_shown_to(witness, to, value.body, now)], now, source)
         if not witness.unanswered:
@@ -618,10 +629,11 @@ def _note_question(witness: Witness, question: m.Message | None, now: float) -> 
         witness.question, witness.asked = question.message_id, now
 
 
-def _learn_offset(witness: Witness, status: m.Message | None, now: float) -> None:
-    """Take the rough offset from a status, if it is unknown or the robot has restarted."""
+def _learn_from_status(witness: Witness, status: m.Message | None, now: float) -> None:
+    """Note its number, and the rough offset if it is unknown or the robot has restarted."""
     if status is None or not isinstance(status.body, m.RobotStatus):
         return
+    witness.reports(status.message_id, now)
     offset = now - status.body.tick / 1000
     if witness.offset is None or abs(offset - witness.offset) > RESTARTED:
         witness.offset = offset

@@ -120,7 +120,7 @@ def test_a_link_that_is_killed_ends_the_console_in_one_line(programs):
     starts = next(p for p, command in programs.processes().items() if "emulator.start" in command)
     os.kill(starts, signal.SIGKILL)
     assert run.ends() == 3
-    assert unnamed(run.complained[-1], "emulated link has ended by itself") == []
+    assert unnamed(run.complained[-1], "emulated link has ended by itself") == [], run.complained
     assert programs.processes() == {}
 
 
