@@ -36,7 +36,7 @@ from dva_sim.simulation.full.event_ledger import SILENT_AFTER
 from dva_sim.simulation.full.observation_json import as_plain, of_plain
 from dva_sim.simulation.full.observations import STATIONARY, FactLog, page_of, terms_of
 from dva_sim.simulation.full.run import Run
-from dva_sim.simulation.full.safety_checks import CHECKED, LEASE
+from dva_sim.simulation.full.safety_checks import CHECKED, LEASE, Held, Witness
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.simulation.full.verdicts import RULES, judged
 from dva_sim.storms.mutants import planted
@@ -500,6 +500,16 @@ def test_a_robot_that_has_restarted_shows_its_sensors_to_nobody_until_it_is_aske
     run.clock.run(30.0)
     assert max(shown) < 16.0  # one may have been on its way
     assert broken(run) == set()
+
+
+@pytest.mark.parametrize(("number", "holder"), [(101, "driver"), (4, None)])
+def test_a_status_shows_that_a_robot_has_restarted_and_knows_no_holder(number, holder):
+    witness = Witness(obeys_within=1.0)
+    witness.given(7, Held("driver", "both", ()))
+    witness.confirmed.add(7)
+    witness.reports(100, 1.0)
+    witness.reports(number, 2.0)
+    assert witness.holder() == holder
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,80 @@
+"""The second book of the events: what begins anew, and what does not."""
+
+import pytest
+
+from dva_sim.core.assignments import Rules
+from dva_sim.core.events import EventTable, State
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.full.event_ledger import EventLedger
+from dva_sim.simulation.full.observations import Page
+from dva_sim.simulation.full.stage import DVA
+
+OPERATOR, ROBOT, OTHER = "02:00:00:03:00:01", "02:00:00:01:00:01", "02:00:00:01:00:02"
+PLACE = m.Position(38.66, -9.2)
+RULES = Rules(order_limit=90.0, depart_within=30.0, still_within=45.0)
+
+
+class Told:
+    """A ledger that is told of one event, and of what is said about it."""
+
+    def __init__(self):
+        self.ledger = EventLedger(RULES, DVA, lambda _: PLACE, 5.0, str)
+        self.table, self._number = EventTable(), 0
+        self.event = self.table.add("fire", PLACE, 0.5, 0.0)
+
+    def assigns(self, now: float, robot: str = ROBOT) -> None:
+        """The DVA's table says who has it from now on."""
+        self.event.operator, self.event.responder = OPERATOR, robot
+        self.event.times["assigned"] = now
+        if self.event.state is State.PENDING:
+            self.table.move(self.event, State.ASSIGNED, now)
+
+    def orders(self, now: float, robot: str = ROBOT) -> None:
+        """An order is sent, and accepted."""
+        self.assigns(now, robot)
+        order = m.Order(self.event.number, "fire", PLACE, robot)
+        self._number += 1
+        self.ledger.says(m.Message(OPERATOR, self._number, DVA, "12:00:00", 0, order))
+        self.says(now, m.Reply(self._number, m.OK, ""))
+
+    def says(self, now: float, body: m.Body) -> None:
+        """The operator says something to the DVA."""
+        self._number += 1
+        message = m.Message(DVA, self._number, OPERATOR, "12:00:00", 0, body)
+        self.ledger.hears(OPERATOR, message, now)
+
+    def broken(self, until: float) -> list[str]:
+        """Everything that is wrong until then, looked at twice a second."""
+        first = int(2 * self.ledger._now) + 1
+        return [
+            what
+            for tick in range(first, int(2 * until) + 1)
+            for _, what in self.ledger.check(tick / 2, Page(self.table, (), True))
+        ]
+
+
+@pytest.mark.invariant("S6")
+@pytest.mark.parametrize(("robot", "breaks"), [(ROBOT, True), (OTHER, False)])
+def test_an_order_with_another_robot_has_its_own_time_to_set_out(robot, breaks):
+    told = Told()
+    assert told.broken(1.0) == []
+    told.orders(1.0)
+    assert told.broken(20.0) == []
+    told.orders(20.0, robot)
+    assert any("set out" in line for line in told.broken(45.0)) is breaks
+
+
+@pytest.mark.invariant("S6")
+@pytest.mark.parametrize(("is_given_again", "breaks"), [(False, True), (True, False)])
+def test_work_that_is_over_and_given_again_at_once_has_its_own_time(is_given_again, breaks):
+    told = Told()
+    assert told.broken(1.0) == []
+    told.orders(1.0)
+    told.event.times["departed"] = 1.5
+    told.says(1.5, m.OrderProgress(told.event.number, "departed"))
+    assert told.broken(40.0) == []
+    told.says(40.0, m.OrderProgress(told.event.number, "failed"))
+    if is_given_again:
+        told.assigns(40.0)
+        del told.event.times["departed"]
+    assert any("pair of hands" in line for line in told.broken(95.0)) is breaks
