@@ -9,10 +9,13 @@ The file is the table `commands` of a study with `model: middleware`:
 
 import csv
 import math
+from collections import defaultdict
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import find
 from dva_sim.network.patterns import Pattern
+
+_OF_RUN = "cell", "person", "trial"  # columns that tell the runs of a study apart
 
 
 class Measured(Pattern):
@@ -20,7 +23,7 @@ class Measured(Pattern):
 
     Whatever the middleware did is in the times: requests that waited for answers, packets that
     were repeated, queues, outages. The modelled link adds its own delay towards the robot, which
-    should be zero. What was measured is repeated for as long as the drive lasts.
+    should be zero. What was measured, run after run, is repeated for as long as the drive lasts.
 
     Args:
         file: Table of commands with the columns `made_s` and `arrived_s`, by name or path.
@@ -32,15 +35,18 @@ class Measured(Pattern):
     published = newest_wins = True
 
     def __init__(self, file, where=None):
-        self.schedule = _applied(file, where or {})
-        first, last = self.schedule[0][0], self.schedule[-1][0]
-        self.length = (last - first) * len(self.schedule) / (len(self.schedule) - 1)
+        self.schedule, self.length = [], 0.0
+        for run in _runs(file, where or {}):
+            first, last = run[0][0], run[-1][0]
+            begin = self.length - first
+            self.schedule += [(made + begin, arrived + begin) for made, arrived in run]
+            self.length += (last - first) * len(run) / (len(run) - 1)
         self.waiting, self.last, self.is_over = None, -1, False
 
     def begin(self, line):
         """A drive begins: the first sending is now."""
         super().begin(line)
-        self.start = line.clock.now - self.schedule[0][0]
+        self.start = line.clock.now
         self._send(0)
 
     def offer(self, command):
@@ -73,25 +79,35 @@ class Measured(Pattern):
             self.line.publish(command)
 
 
-def _applied(file, where):
-    """Pairs of times, sent and applied [s], of the commands that a robot would apply."""
+def _runs(file, where):
+    """Return the pairs of times, sent and applied [s], of each run that has any two."""
     path = find(file, "experiments/traces", ".csv")
     with path.open(encoding="utf-8", newline="") as lines:
         rows = list(csv.DictReader(lines))
     missing = {"made_s", "arrived_s", *where} - set(rows[0] if rows else ())
     if missing:
         raise ConfigError(f"has no column {', '.join(sorted(missing))}", path)
-    chosen = [row for row in rows if all(row[k] == str(v) for k, v in where.items())]
+    runs = defaultdict(list)
     try:
-        pairs = [(float(r["made_s"]), float(r["arrived_s"] or "nan")) for r in chosen]
+        for row in rows:
+            if all(row[key] == str(value) for key, value in where.items()):
+                times = float(row["made_s"]), float(row["arrived_s"] or "nan")
+                runs[tuple(row.get(key) for key in _OF_RUN)].append(times)
     except ValueError as error:
         raise ConfigError(f"times should be numbers: {error}", path) from None
+    found = [run for run in map(_applied, runs.values()) if len(run) > 1]
+    if not found:
+        place = ", ".join(f"{key} {value}" for key, value in where.items()) or "the file"
+        raise ConfigError(f"of {place}, fewer than two commands arrived", path)
+    return found
+
+
+def _applied(pairs):
+    """Return those of the commands that a robot would apply: a newer one had not arrived."""
     newest, kept = -math.inf, []
-    for made, arrived in sorted(pairs, key=lambda pair: pair[1]):
+    arrivals = (pair for pair in pairs if math.isfinite(pair[1]))
+    for made, arrived in sorted(arrivals, key=lambda pair: pair[1]):
         if made > newest and arrived >= made:
             newest = made
             kept.append((made, arrived))
-    if len(kept) < 2:
-        place = ", ".join(f"{key} {value}" for key, value in where.items()) or "the file"
-        raise ConfigError(f"of {place}, fewer than two commands arrived", path)
     return kept

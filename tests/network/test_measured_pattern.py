@@ -61,6 +61,16 @@ def test_what_was_measured_is_repeated_as_long_as_a_drive_lasts(table):
     assert min(took) >= DELAY  # of the modelled link, which comes on top
 
 
+def test_runs_follow_each_other_and_are_not_mixed(tmp_path):
+    file = tmp_path / "commands.csv"
+    rows = [f"{person},{5 + at},{5 + at + late}" for person, late in ((0, 0.1), (1, 0.3))
+            for at in (0.0, 1.0)]  # fmt: skip
+    file.write_text("\n".join(("person,made_s,arrived_s", *rows, "")))
+    times, _ = driven({"file": str(file)}, 6.0)
+    # at 0 s nothing has been made yet
+    assert times == pytest.approx([1.1, 2.3, 3.3, 4.1, 5.1], abs=1e-6)
+
+
 def test_what_is_under_way_when_a_drive_ends_is_lost(table):
     times, _ = driven({"file": str(table), "where": {"middleware": "brokered"}}, 0.5)
     assert max(times, default=0.0) <= 0.5
