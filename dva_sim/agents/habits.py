@@ -254,7 +254,7 @@ class LookingHabits(Sparse):
         nearer_after_s: Time without seeing the place after which it looks from nearer.
         keeps_off_m: Distance from which it looks at a place.
         same_place_m: Distance from the reported place within which a hazard is the reported one.
-        wait_for_picture_s: Time without a picture after which it takes the link for lost.
+        wait_for_picture_s: Time without a picture after which it presumes the link lost.
     """
 
     half_seen_rad: Annotated[

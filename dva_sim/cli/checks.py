@@ -18,7 +18,7 @@ from dva_sim.testing.promises import TRIALS, CheckedKind, error_with_line, tried
 STDIN: Final = "-"
 LINK: Final = "link"
 OFFER: Final = "a relay of TCP over the loopback can take its place for measurements without loss"
-QUIET: Final = "real-time priority, which root has, or a quiet machine helps"
+QUIET: Final = "run as root for real-time priority, or use an idle machine"
 # The highest of all files counts.
 VALID, INVALID, NOT_READ = ExitCode.OK, ExitCode.DOES_NOT_HOLD, ExitCode.MISTAKE
 _SHOWN: Final = 50  # problems of one file
@@ -72,7 +72,7 @@ def _try_all(kind: str, names: Sequence[str], options: Mapping[str, Any]) -> Exi
     trial = TRIALS[kind]
     if not names:
         known = ", ".join(trial.known())
-        raise ConfigError(f"check {kind}: which one? mine.py:Mine, or one of {known}")
+        raise ConfigError(f"check {kind}: name one: mine.py:Mine, or one of {known}")
     return _sum_up(kind, trial.many, [_try(kind, trial, name, options) for name in names])
 
 

@@ -30,9 +30,9 @@ FILM: Final = "one-drive.gif"
 _PATIENCE_S: Final = 300.0  # with a film that is still being made when the study is done
 _INTRODUCTION: Final = """\
 An operator drives a robot to a fire by tilting a phone. Commands go to the robot by REQ/REP, which
-waits for an answer to each, or by PUB/SUB, of which the robot obeys the newest ("latest-wins").
-What does that change if the network is late? First one drive, with one second of delay each way;
-then the small version of the study that asks it: about a minute on two cores.
+waits for an answer to each, or by PUB/SUB, where the robot obeys the newest ("latest-wins").
+What difference does it make on a slow network? First one drive, with one second of delay each way;
+then the small version of the study that answers this: about a minute on two cores.
 """
 
 

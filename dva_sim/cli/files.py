@@ -35,7 +35,7 @@ _FILES = (
 )
 _SCHEMAS = "message", "study", "scenario", "cases", "site", "agent"
 _EVIDENCE = "dispatch", "operators", "network"
-_RATE = "Of these commands."
+_RATE = "Rate of the printed commands."
 _UNIT = "Unit of acceleration, if the log's header does not give it."
 
 

@@ -162,7 +162,7 @@ RUN: dict[str, tuple[Any, Any]] = {"seed": (RunSeed, 1), "set_": (Sets, None)}
 _PILOT = "Run only this many persons, with a random seed of their own."
 OPTIONS: dict[str, Any] = {
     "again": flag("--again", "Replace an earlier registration; the report will say so."),
-    "at": text("Moment of the still, or moments of the strip: 10,20,30.", metavar="SECONDS"),
+    "at": text("Time of the still, or times of the strip: 10,20,30.", metavar="SECONDS"),
     "camera": text("The still shows what this robot's camera sees.", metavar="ROBOT"),
     "columns": flag("--columns", "Explain the columns of one table or all."),
     "figure": several("Add a figure of your own; may be given again.", metavar="FILE:CLASS"),

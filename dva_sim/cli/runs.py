@@ -182,7 +182,7 @@ def live(
         dva-sim live drive-to-event --operators scripted  # fixed commands, an emergency
         dva-sim live drive-to-event --record run.mcap  # for `dva-sim replay` and `check`
         dva-sim live drive-to-event --link delay_s=0.2 --link loss=0.02  # over a bad link
-        dva-sim live drive-to-event --transport mqtt  # by a broker: mosquitto, on this machine
+        dva-sim live drive-to-event --transport mqtt  # through a mosquitto broker on this machine
         dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600  # one part here
     """
     from dva_sim.cli import exposure, live_screen  # late: start-up

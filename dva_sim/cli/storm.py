@@ -58,7 +58,7 @@ def storm(
     The exit code is 1 if a rule was broken, or with --mutants, if a planted bug was not found.
 
     Examples:
-        dva-sim storm --seeds 1:256  # 60 hours of a team
+        dva-sim storm --seeds 1:256  # 60 fleet-hours
         dva-sim storm --hours 100  # continue with further seeds until 100 fleet-hours are reached
         dva-sim storm results/storms/found/all-7.yaml  # replay a failure
         dva-sim storm --mutants all --seeds 1:32  # how many storms it takes to find planted bugs

@@ -248,7 +248,7 @@ class ControlRooms:
     def _responder(self, device: str) -> DeviceEntry:
         entry = self._orders.registry.entries.get(device)
         if entry is None or entry.silent or entry.device.device_type not in (GUARD, ROBOT):
-            raise _Refused(m.UNKNOWN_DEVICE, f"no guard and no robot {device}")
+            raise _Refused(m.UNKNOWN_DEVICE, f"no such guard or robot: {device}")
         return entry
 
     @staticmethod
@@ -266,7 +266,7 @@ class ControlRooms:
         if event.state is State.ON_SCENE:
             raise _Refused(m.BUSY, f"{who} is there already: take it off first")
         if event.state is State.ASSIGNED and body.decisions is None:
-            raise _Refused(m.BUSY, f"{who} is on the way; state Decisions to send another instead")
+            raise _Refused(m.BUSY, f"{who} is on the way; to send another, include Decisions")
 
     def _may_act(self, body: m.Assign, event: Event, device: m.Device, task: str) -> None:
         if not event.needs_containment:
@@ -303,7 +303,7 @@ class ControlRooms:
             raise _Refused(m.UNKNOWN_DEVICE, f"no operator {named}")
         device = entry.device
         if device.device_type == CONTROL_ROOM and device.id_tag != sender.id_tag:
-            raise _Refused(m.NOT_PERMITTED, f"{device.label} decides itself what it drives")
+            raise _Refused(m.NOT_PERMITTED, f"only {device.label} decides what it drives")
         if not self._access.allows(device, robot, "teleoperation", now):
             raise _Refused(m.NOT_PERMITTED, f"{device.label} may not drive {robot.label}")
         in_hand = self._orders.engaged.count(named)

@@ -266,7 +266,7 @@ def _check_private(file: Path, device: str) -> None:
     except OSError as error:
         raise ConfigError(f"cannot be read: {error.strerror}", file) from error
     if os.name == "posix" and mode & 0o077:
-        raise ConfigError(f"others may read this secret; mend it with: chmod 600 {file}", file)
+        raise ConfigError(f"others may read this secret; fix it with: chmod 600 {file}", file)
 
 
 def _check_owner(file: Path, device: str, owner: str) -> None:

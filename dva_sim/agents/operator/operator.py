@@ -22,7 +22,7 @@ from dva_sim.protocol import messages as m
 
 ASK_BEFORE, ASK_AFTER = 3, 1  # design: asked so often for one order: before and in a drive
 AS_SEEN = {
-    "lost link": "takes the link for lost",
+    "lost link": "presumes the link lost",
     REFUSED: "is refused",
 }  # what a drive's end looks like to the operator
 REDIRECTED, RECALLED = BY_DVA = "redirected", "recalled"  # how a drive ends by the DVA's word

@@ -256,7 +256,7 @@ class RobotController:
             now: Time [s].
         """
         if self.by_hand is None or self.by_hand != who:
-            return Decision(m.WRONG_MODE, "it is not in this hand: take manual control first")
+            return Decision(m.WRONG_MODE, "you do not drive it: take manual control first")
         if not (math.isfinite(turn_rate) and 0.0 <= speed < math.inf):
             return Decision(m.BAD_MESSAGE, "no speed ahead and turn rate")
         self.last_valid = now
@@ -371,7 +371,7 @@ class RobotController:
         """Refuse one more observer if the limit is reached; the driver continues."""
         if observer in self.observers or len(self.observers) < MOST_OBSERVERS:
             return None
-        return Decision(m.BUSY, f"{MOST_OBSERVERS} observers are all that this robot serves")
+        return Decision(m.BUSY, f"this robot serves at most {MOST_OBSERVERS} observers")
 
     def _subscription(self, message: m.Message, body: m.DevSub) -> Decision:
         """Decide on a subscription to a sensor: each one is permitted by name (S5)."""

@@ -67,7 +67,7 @@ class RobotFaults:
         self.drops_replies, robot = on, self._robot
         service = self._lose_the_answer if on else robot.inbox.request
         robot.device.network.serve(robot.device.id_tag, service)
-        self._tell("fault: its replies are dropped" if on else "its replies are dropped no more")
+        self._tell("fault: its replies are dropped" if on else "its replies are no longer dropped")
 
     def _lose_the_answer(self, request: Request) -> None:
         robot = self._robot.device.id_tag

@@ -53,7 +53,7 @@ class ManualControl:
         self._done(who, "lets go", decision, now)
         if robot.trace is not None:
             robot.trace.happened(LET_GO, now)
-        robot.device.tell("is driven by hand no more", "mode")
+        robot.device.tell("is no longer driven by hand", "mode")
         return decision
 
     def press_emergency(self) -> None:

@@ -284,7 +284,7 @@ class ConsoleWorld(PublishingWorld):
     def _late(self, behind: float) -> None:
         """An event comes too late: above the limit nobody drives on."""
         if self.lag.measured(time.monotonic(), behind):
-            why = f"stopped: the world is {behind:.2f} s behind real time, more than a drive bears"
+            why = f"stopped: the world is {behind:.2f} s behind real time, too far for driving"
             self.hold(why)
             self.note(why)
 

@@ -87,7 +87,7 @@ def _assumptions(reading: ResultsReading, finding: Finding) -> str:
     text = f"{count} numbers about people and phones are assumed (dva-sim assumed)."
     effects = kept_effects(_MOST_KEYS)
     if not effects:
-        return f"{text} Which of them move such an answer: dva-sim screen {MAIN}."
+        return f"{text} To see which of them move such an answer: dva-sim screen {MAIN}."
     clear = [effect.key for effect in effects if effect.is_clear]
     moved = f"{listing(clear)} moved" if clear else "none of them moved"
     return f"{text} Their effect was screened for {MAIN} only: {moved} its answer beyond chance."

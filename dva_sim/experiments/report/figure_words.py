@@ -35,7 +35,7 @@ WORDS: Final = {
         "One person, one trial: the ways taken under each line, at the first and the last stop."
     ),
     "time_lapse_typical": "Places of all robots and people at moments of the run in the middle.",
-    "time_lapse_worst": "Places of all robots and people at moments of the run that took most.",
+    "time_lapse_worst": "Places of all robots and people at moments of the slowest run.",
     "story_times": "Times of the events that were reached, guards and robots apart.",
     "story_outcomes": "The fate of every event, as shares that add up to one.",
     "trade": "Response against exposure, a mark for each policy, a panel for each load.",

@@ -383,7 +383,7 @@ def write_report(folder: Path, pdf: bool = False, *, figures: Sequence[ReportFig
             f"fix that, then run 'dva-sim report {folder}'"
         ) from None
     if problems:
-        raise ConfigError(f"{'; '.join(problems)}; {page} is made without")
+        raise ConfigError(f"{'; '.join(problems)}; {page} was made without them")
     return page
 
 

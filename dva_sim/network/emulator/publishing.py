@@ -17,7 +17,7 @@ from dva_sim.network.emulator.linux_calls import NEAR_END
 _HOSTS = "127.0.0.1", NEAR_END.address  # where a program of the near end may listen
 _CHUNK = 65_536
 BROKEN = OSError, asyncio.IncompleteReadError, asyncio.CancelledError
-"""What may end a connection; before Python 3.12, servers print a traceback for the last of them."""
+"""Errors that end a connection; before Python 3.12, a server prints a traceback of the last one."""
 
 
 def words_of(listeners: Sequence[socket.socket]) -> list[str]:

@@ -219,13 +219,13 @@ class Witness:
         self.registrations.append(registration)
 
     def reports(self, number: int, now: float) -> None:
-        """Note a status; over a bad link it shows a restart long before the registration."""
+        """Note a status; over a bad link it may show a restart long before the registration."""
         if number < self.reported:
             self._forgets(now)
         self.reported = number
 
     def _forgets(self, now: float) -> None:
-        self.question = 0
+        self.question = self.reported = 0
         for session in self.confirmed:
             _end(self, session, now)
 

@@ -1,4 +1,4 @@
-"""The second book of the events: what begins anew, and what does not."""
+"""The second book of the events: what restarts a deadline, and what does not."""
 
 import pytest
 
@@ -14,8 +14,8 @@ PLACE = m.Position(38.66, -9.2)
 RULES = Rules(order_limit=90.0, depart_within=30.0, still_within=45.0)
 
 
-class Told:
-    """A ledger that is told of one event, and of what is said about it."""
+class Hearer:
+    """A ledger that hears of one event, and of what is said about it."""
 
     def __init__(self):
         self.ledger = EventLedger(RULES, DVA, lambda _: PLACE, 5.0, str)
@@ -56,25 +56,25 @@ class Told:
 @pytest.mark.invariant("S6")
 @pytest.mark.parametrize(("robot", "breaks"), [(ROBOT, True), (OTHER, False)])
 def test_an_order_with_another_robot_has_its_own_time_to_set_out(robot, breaks):
-    told = Told()
-    assert told.broken(1.0) == []
-    told.orders(1.0)
-    assert told.broken(20.0) == []
-    told.orders(20.0, robot)
-    assert any("set out" in line for line in told.broken(45.0)) is breaks
+    heard = Hearer()
+    assert heard.broken(1.0) == []
+    heard.orders(1.0)
+    assert heard.broken(20.0) == []
+    heard.orders(20.0, robot)
+    assert any("set out" in line for line in heard.broken(45.0)) is breaks
 
 
 @pytest.mark.invariant("S6")
 @pytest.mark.parametrize(("is_given_again", "breaks"), [(False, True), (True, False)])
 def test_work_that_is_over_and_given_again_at_once_has_its_own_time(is_given_again, breaks):
-    told = Told()
-    assert told.broken(1.0) == []
-    told.orders(1.0)
-    told.event.times["departed"] = 1.5
-    told.says(1.5, m.OrderProgress(told.event.number, "departed"))
-    assert told.broken(40.0) == []
-    told.says(40.0, m.OrderProgress(told.event.number, "failed"))
+    heard = Hearer()
+    assert heard.broken(1.0) == []
+    heard.orders(1.0)
+    heard.event.times["departed"] = 1.5
+    heard.says(1.5, m.OrderProgress(heard.event.number, "departed"))
+    assert heard.broken(40.0) == []
+    heard.says(40.0, m.OrderProgress(heard.event.number, "failed"))
     if is_given_again:
-        told.assigns(40.0)
-        del told.event.times["departed"]
-    assert any("pair of hands" in line for line in told.broken(95.0)) is breaks
+        heard.assigns(40.0)
+        del heard.event.times["departed"]
+    assert any("pair of hands" in line for line in heard.broken(95.0)) is breaks
