@@ -71,7 +71,7 @@ def episode(
         video: Write a film: `.gif` or `.mp4`.
         still: Draw one moment: `.png`, `.pdf` or `.svg`.
         strip: Draw several moments in one figure: .png, .pdf or .svg.
-        at: Moment of the still, or moments of the strip: 10,20,30. In seconds, also as numbers.
+        at: Time of the still, or times of the strip: 10,20,30. In seconds, also as numbers.
         panels: Number of moments in a strip.
         camera: The still shows what this robot's camera sees.
         inset: Show in the film what a robot's camera sees.
@@ -114,7 +114,7 @@ def replay(
         video: Write a film: `.gif` or `.mp4`.
         still: Draw one moment: `.png`, `.pdf` or `.svg`.
         strip: Draw several moments in one figure: .png, .pdf or .svg.
-        at: Moment of the still, or moments of the strip: 10,20,30. In seconds, also as numbers.
+        at: Time of the still, or times of the strip: 10,20,30. In seconds, also as numbers.
         panels: Number of moments in a strip.
         camera: The still shows what this robot's camera sees.
         inset: Show in the film what a robot's camera sees.

@@ -199,9 +199,12 @@ class Storm(StormScene):
     def _look_at_bounds(self) -> None:
         robots = [robot.agent for robot in self.robots]
         team = {*self.guards, *self.operators}
-        others = [device for device in self.run.stage.devices if device.id_tag in team]
+        devices = self.run.stage.devices
+        others = [device for device in devices if device.id_tag in team]
+        ours = {DVA, *(robot.id for robot in self.robots), *team}
+        strangers = [device for device in devices if device.id_tag not in ours]
         events = self.run.dva.core.events.total
-        for name, held, bound in oversized([self.run.dva, *robots, *others], events):
+        for name, held, bound in oversized([self.run.dva, *robots, *others], events, strangers):
             what = f"{name} holds {held}, more than {bound}"
             self.recorder.violated("S10", self.now, "dva" if "Dva" in name else "robots", what)
 

@@ -421,7 +421,7 @@ def test_a_proposal_names_everybody_with_a_time_and_a_reason():
     content = decide(office, m.GetProposal(2), 2.0)[0].content
     assert isinstance(content, m.Proposal)
     assert (content.device, content.task, content.decide_within) == (ROBOT, "confirm", 60.0)
-    assert not unnamed(content.reason, "earliest", " 2 ")
+    assert not unnamed(content.reason, "first", " 2 ")
     reasons = {c.device: c.reason for c in content.candidates}
     assert reasons == {ROBOT: "free", GUARD: "free", OTHER_GUARD: "is at event 1"}
     times = {c.device: c.arrival_in for c in content.candidates}

@@ -142,6 +142,7 @@ class Witness:
         question: Number of its newest question to the DVA: only the answer to that counts.
         asked: Time at which that request was first sent.
         hand: Person in manual control, until released.
+        let_go: Time at which the last one released it.
         registrations: Its newest ones, by number and time stamp.
         reported: Number of its newest status.
     """
@@ -170,6 +171,7 @@ class Witness:
     question: int = 0
     asked: float = 0.0
     hand: str | None = None
+    let_go: float = -math.inf
     reported: int = 0
     registrations: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=MOST_COPIES))
 
@@ -536,6 +538,7 @@ class SafetyAudit:
             witness.does = None
         elif done.what == "lets go":
             witness.hand, witness.allowed = None, min(witness.allowed, now)
+            witness.let_go = now
         elif done.what == "stops":
             witness.note_stop(now)
         else:
@@ -578,8 +581,13 @@ class SafetyAudit:
             pushed = _pushed(motion, self._motors[right.robot], now)
             if session in witness.sessions and session not in witness.over:
                 yield "S2", f"{to}, and it has not said that the last session is over"
-            elif _goes(motion) and not pushed and not witness.in_hand(now):
+            elif _goes(motion) and not pushed and not self._is_in_hand(right.robot, motion, now):
                 yield "S2", f"{to} while it moves at {_pace(motion)}"
+
+    def _is_in_hand(self, robot: str, motion: RobotMotion, now: float) -> bool:
+        """Return True while somebody drives it by hand, or it still stops after that."""
+        witness, stopping = self.witness(robot), _stopping(motion, self._motors[robot])
+        return witness.in_hand(now) or now <= witness.let_go + stopping
 
     def _overstays(self, witness: Witness, motion: RobotMotion, now: float) -> Iterator[Broken]:
         """Yield a drive that goes on without a valid command for longer than the lease."""
@@ -666,11 +674,16 @@ def _mode_of(order: m.Body) -> Mode:
 
 
 def broken_by_wish(witness: Witness, motion: RobotMotion, now: float) -> Iterator[Broken]:
-    """Yield the rules that a set point of the motors breaks: too long, or after an emergency."""
+    """Yield the rules that a set point of the motors breaks: too long, or after an emergency.
+
+    Motors without power obey none, and what was sent meanwhile has reached nobody.
+    """
     until = motion.asked_until
     is_sent = motion.mode == Mode.MISSION and witness.may_be_on_a_mission(now)
     if is_sent:
         witness.last_mission = now
+    if not motion.powered:
+        return
     if witness.stopped > witness.ordered and until > now > witness.stopped + PHYSICS_TICK:
         yield (
             "S3",
