@@ -116,7 +116,7 @@ OTHERS = (
 @pytest.mark.system
 def test_a_planted_bug_is_found_and_its_storm_is_cut_down_to_what_matters():
     plan = small(*OTHERS, EMERGENCY)
-    with planted("emergency-forgotten") as bug:
+    with planted("emergency-of-holder-only") as bug:
         outcome = play(plan)
         smallest = Shrinker(plan, outcome, tries=12).shrink()
     assert bug.acts
