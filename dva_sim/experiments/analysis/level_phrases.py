@@ -57,10 +57,14 @@ def places(f: Finding, where: NDArray[np.intp]) -> str:
 
 
 def _spoken(f: Finding, where: Iterable[int]) -> str:
-    """Phrase levels that are not plain numbers: `without delay`, `on the poor link`."""
+    """Phrase levels that are not plain numbers: `without delay`, `with 8 robots`."""
     levels = [f.levels[int(i)] for i in where]
     if levels == [0] and (absent := absent_at_zero(f.over)):
         return f"without {absent}"
+    if str(f.over).endswith(".count"):
+        counted = factor_name(f.over)
+        names = listing([level_name(f.over, level) for level in levels])
+        return f"with {names} {counted.removesuffix('s') if levels == [1] else counted}"
     if all(isinstance(level, int | float) and not isinstance(level, bool) for level in levels):
         return ""
     names = listing([level_name(f.over, level) for level in levels])

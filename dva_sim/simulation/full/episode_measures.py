@@ -115,7 +115,7 @@ RUN_COLUMNS = (
     Measure(
         "settled_per_min",
         "events confirmed, contained or refuted per minute of the run",
-        title="events settled",
+        title="rate of events settled",
         better="large",
     ),
     Measure("events", "events that the DVA knew of"),
