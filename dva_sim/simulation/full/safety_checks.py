@@ -139,12 +139,16 @@ class Witness:
         stood_before: Value of `stood` before the newest order was accepted.
         heard: Time at which a message of its driver, or of a manual driver, was last obeyed.
         confirmed: Sessions that the DVA has confirmed to it, when it asked.
-        question: Number of its newest question to the DVA: only the answer to that counts.
+        question: Number of its newest question to the DVA: only the answer to that counts. 0: it
+            has restarted since.
+        last_question: The same, over restarts.
         asked: Time at which that request was first sent.
         hand: Person in manual control, until released.
         let_go: Time at which the last one released it.
         registrations: Its newest ones, by number and time stamp.
         reported: Number of its newest status.
+        restarts: Number of restarts of its program that messages have shown.
+        restarts_shown: How many of them each kind of message has shown.
     """
 
     obeys_within: float
@@ -169,10 +173,13 @@ class Witness:
     heard: float = 0.0
     confirmed: set[int] = field(default_factory=set)
     question: int = 0
+    last_question: int = 0
     asked: float = 0.0
     hand: str | None = None
     let_go: float = -math.inf
     reported: int = 0
+    restarts: int = 0
+    restarts_shown: dict[str, int] = field(default_factory=dict)
     registrations: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=MOST_COPIES))
 
     def given(self, session: int, held: Held) -> None:
@@ -210,26 +217,40 @@ class Witness:
         self.heard = now
 
     def registers(self, registration: tuple[int, str], now: float) -> None:
-        """Note a registration; one whose number goes back shows that its program has restarted.
-
-        It knows no session any longer, unless the DVA confirms one when it asks from now on.
-        """
-        if registration in self.registrations:
-            return  # sent again
-        if self.registrations and registration[0] <= self.registrations[-1][0]:
-            self._forgets(now)
-        self.registrations.append(registration)
+        """Note a registration, unless it is sent again."""
+        if registration not in self.registrations:
+            last = self.registrations[-1][0] if self.registrations else 0
+            self._follows("registration", last, registration[0], now)
+            self.registrations.append(registration)
 
     def reports(self, number: int, now: float) -> None:
-        """Note a status; over a bad link it may show a restart long before the registration."""
-        if number < self.reported:
-            self._forgets(now)
-        self.reported = number
+        """Note a status; each goes to several devices."""
+        if number != self.reported:
+            self._follows("status", self.reported, number, now)
+            self.reported = number
 
-    def _forgets(self, now: float) -> None:
-        self.question = self.reported = 0
-        for session in self.confirmed:
-            _end(self, session, now)
+    def asks(self, number: int, now: float) -> None:
+        """Note a question to the DVA who holds it, unless it is sent again."""
+        if number != self.question:
+            self._follows("question", self.last_question, number, now)
+            self.question = self.last_question = number
+            self.asked = now
+
+    def _follows(self, sequence: str, last: int, number: int, now: float) -> None:
+        """Note the next of some messages; a number that goes back shows that it has restarted.
+
+        Then it knows no session any longer, unless the DVA confirms one when it asks. Over a bad
+        link each kind of message may be the first to show that; the others do so later.
+        """
+        if number > last:
+            return
+        if self.restarts_shown.get(sequence, 0) == self.restarts:
+            self.restarts += 1
+            if self.question > number:
+                self.question = 0
+            for session in self.confirmed:
+                _end(self, session, now)
+        self.restarts_shown[sequence] = self.restarts
 
     def note_stop(self, when: float) -> None:
         """Note that an emergency has stopped it, or should have; no hand drives it any longer."""
@@ -382,7 +403,8 @@ class SafetyAudit:
         if b"<RegMsg>" in payload and (message := _read(payload)) is not None:
             witness.registers((message.message_id, message.timestamp), now)
         if b"<GetGrant" in payload:
-            _note_question(witness, _read(payload), now)
+            if (question := _read(payload)) is not None:
+                witness.asks(question.message_id, now)
         if b"<RobotStatus>" in payload:
             _learn_from_status(witness, _read(payload), now)
         if b"<SensorValue>" in payload and (value := _read(payload)) is not None:
@@ -629,12 +651,6 @@ def offset_of(picture: Any) -> float | None:
         return picture.captured - picture.observation.tick / 1000
     tick = picture.get("tick_ms")  # as a recording has it
     return None if tick is None else float(picture["captured_s"]) - float(tick) / 1000
-
-
-def _note_question(witness: Witness, question: m.Message | None, now: float) -> None:
-    """Note a question to the DVA, unless it is the newest one sent again."""
-    if question is not None and question.message_id != witness.question:
-        witness.question, witness.asked = question.message_id, now
 
 
 def _learn_from_status(witness: Witness, status: m.Message | None, now: float) -> None:

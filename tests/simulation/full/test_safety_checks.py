@@ -502,14 +502,36 @@ def test_a_robot_that_has_restarted_shows_its_sensors_to_nobody_until_it_is_aske
     assert broken(run) == set()
 
 
+def confirmed(witness: Witness, session: int) -> None:
+    witness.given(session, Held("driver", "both", ()))
+    witness.confirmed.add(session)
+
+
 @pytest.mark.parametrize(("number", "holder"), [(101, "driver"), (4, None)])
 def test_a_status_shows_that_a_robot_has_restarted_and_knows_no_holder(number, holder):
     witness = Witness(obeys_within=1.0)
-    witness.given(7, Held("driver", "both", ()))
-    witness.confirmed.add(7)
+    confirmed(witness, 7)
     witness.reports(100, 1.0)
     witness.reports(number, 2.0)
     assert witness.holder() == holder
+
+
+def test_a_restart_counts_once_whichever_message_shows_it_first():
+    witness = Witness(obeys_within=1.0)
+    witness.registers((1, "12:00:00"), 0.0)
+    witness.asks(2, 0.5)
+    witness.reports(100, 1.0)
+    witness.asks(2, 1.5)
+    assert witness.restarts == 0
+    witness.registers((1, "12:00:05"), 6.0)
+    witness.asks(2, 6.0)
+    assert witness.restarts == 1
+    confirmed(witness, 7)
+    witness.reports(4, 6.5)
+    assert (witness.restarts, witness.holder()) == (1, "driver")
+    witness.asks(5, 7.0)
+    witness.reports(3, 8.0)
+    assert (witness.restarts, witness.holder(), witness.question) == (2, None, 0)
 
 
 @pytest.mark.parametrize(
