@@ -148,7 +148,7 @@ class Witness:
         registrations: Its newest ones, by number and time stamp.
         reported: Number of its newest status.
         restarts: Number of restarts of its program that messages have shown.
-        restarts_shown: How many of them each kind of message has shown.
+        restarts_shown: Number of them that each kind of message has shown.
     """
 
     obeys_within: float
@@ -402,9 +402,8 @@ class SafetyAudit:
             return
         if b"<RegMsg>" in payload and (message := _read(payload)) is not None:
             witness.registers((message.message_id, message.timestamp), now)
-        if b"<GetGrant" in payload:
-            if (question := _read(payload)) is not None:
-                witness.asks(question.message_id, now)
+        if b"<GetGrant" in payload and (question := _read(payload)) is not None:
+            witness.asks(question.message_id, now)
         if b"<RobotStatus>" in payload:
             _learn_from_status(witness, _read(payload), now)
         if b"<SensorValue>" in payload and (value := _read(payload)) is not None:
