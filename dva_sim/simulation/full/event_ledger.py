@@ -467,7 +467,8 @@ class EventLedger:
         given = "act_assigned" if hands[:1] == ("act",) else "assigned"
         if word.freed and hands == old.hands and event.times.get(given) != old.times.get(given):
             word.sent_again = True
-            word.taken -= word.loose
+        if word.sent_again or hands != old.hands:
+            word.taken -= word.loose  # the order may still wait in the DVA's queue
         taken = bool(word.taken.intersection(hands))
         confirmed = "confirmed" in found - old.found
         waits = now if taken or word.busy or confirmed else old.waits

@@ -78,3 +78,19 @@ def test_work_that_is_over_and_given_again_at_once_has_its_own_time(is_given_aga
         heard.assigns(40.0)
         del heard.event.times["departed"]
     assert any("pair of hands" in line for line in heard.broken(95.0)) is breaks
+
+
+@pytest.mark.invariant("S6")
+@pytest.mark.parametrize(("is_sent", "breaks"), [(True, True), (False, False)])
+def test_an_order_that_still_waits_for_its_device_was_not_accepted(is_sent, breaks):
+    heard = Hearer()
+    heard.orders(1.0)
+    assert heard.broken(2.0) == []
+    heard.says(2.0, m.OrderProgress(heard.event.number, "declined"))
+    heard.table.move(heard.event, State.PENDING, 2.0)
+    heard.event.operator = heard.event.responder = None
+    assert heard.broken(10.0) == []
+    heard.assigns(10.0)
+    if is_sent:
+        heard.orders(10.0)
+    assert any("set out" in line for line in heard.broken(45.0)) is breaks
