@@ -176,8 +176,9 @@ def _hang(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     storm.run.deafened(robot.id, True)
 
     def ends() -> None:
-        storm.run.deafened(robot.id, False)
-        robot.faults.freeze(False)
+        if robot.faults.frozen:  # else another fault has restarted it
+            storm.run.deafened(robot.id, False)
+            robot.faults.freeze(False)
 
     return ends
 
@@ -187,7 +188,12 @@ def _restart(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 
 def _restart_program(storm: StormScene, robot: StormRobot, chance: random.Random) -> None:
-    """Restart the program of a robot, whose clock is another one then, or a little slow."""
+    """Restart the program of a robot, whose clock is another one then, or a little slow.
+
+    A robot without power runs none.
+    """
+    if not robot.agent.body.powered:
+        return
     storm.run.deafened(robot.id, True)
     slow = max(0.0, robot.agent.controller.clock_offset - chance.uniform(0.5, 10.0))
     robot.agent.restart(chance.choice((slow, chance.uniform(0.0, 1e5))))
