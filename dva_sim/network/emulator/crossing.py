@@ -25,6 +25,7 @@ from dva_sim.network.link import LinkConfig
 
 PORT = 7000  # at which each relay takes connections across the link
 ENDS = {NEAR: FAR, FAR: NEAR}
+_AGAIN_S = 0.05  # between tries to reach the relay at the other end [s]
 _BUFFER = 4096  # of a relay, each way [B]
 _LONGEST = 90  # of the folder's name: Linux takes 107 characters for the name of a socket
 _BACKLOG = 128  # connections that a relay has not taken yet
@@ -136,15 +137,22 @@ class _Relay:
     async def _lead(self, number: int, listener: int) -> asyncio.Server:
         async def leave(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
             with suppress(*publishing.BROKEN):
-                there = await asyncio.open_connection(
-                    ADDRESSES[ENDS[self._end]], PORT, limit=_BUFFER
-                )
+                there = await self._across()
                 there[1].write(number.to_bytes(_NUMBER, "big"))
                 await self._join((reader, writer), there)
             writer.close()
 
         listening = socket.socket(fileno=listener)
         return await asyncio.start_unix_server(leave, sock=listening, limit=_BUFFER)
+
+    async def _across(self) -> publishing.Stream:
+        """Connect to the relay at the other end, which may begin to listen a little later."""
+        while True:
+            with suppress(ConnectionRefusedError):
+                return await asyncio.open_connection(
+                    ADDRESSES[ENDS[self._end]], PORT, limit=_BUFFER
+                )
+            await asyncio.sleep(_AGAIN_S)
 
     async def _arrive(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Lead a connection that has crossed the link to its place."""
