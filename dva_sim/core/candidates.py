@@ -56,7 +56,7 @@ def _reason(event: Event, advised: Advised | None, everybody: list[m.Candidate])
         return "was sent there by the policy"
     sooner = [c for c in free if (c.arrival_in or 0.0) < advised.arrival_in - 0.05]
     if not sooner:
-        return f"the first to arrive of {len(free)} who could go"
+        return f"the first there among {len(free)} who could go"
     best = sooner[0]
     gap = advised.arrival_in - (best.arrival_in or 0.0)
     return f"chosen by the policy; {best.label} would be there {gap:.0f} s earlier"[:256]

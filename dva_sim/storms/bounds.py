@@ -58,19 +58,19 @@ def is_waiting(inbox: CommandQueue, data: bytes) -> bool:
 
 
 def oversized(
-    roots: Iterable[object], events: int = 0, strangers: Iterable[object] = ()
+    roots: Iterable[object], events: int = 0, left_out: Iterable[object] = ()
 ) -> Iterator[tuple[str, int, int]]:
     """Yield each container that holds more than it may, of all that can be reached from objects.
 
     Args:
         roots: Agents; what they share with the whole run is left out.
         events: Number of events that the DVA has ever had.
-        strangers: Other objects to leave out, with everything that only they hold.
+        left_out: Other objects that are not looked at, nor what only they hold.
 
     Yields:
         Class and attribute, number of elements, bound.
     """
-    seen, todo = {id(each) for each in strangers}, [("", root) for root in roots]
+    seen, todo = {id(each) for each in left_out}, [("", root) for root in roots]
     while todo:
         name, each = todo.pop()
         if isinstance(each, (*_ATOMS, *_NOT_THEIRS)) or id(each) in seen:

@@ -202,9 +202,9 @@ class Storm(StormScene):
         devices = self.run.stage.devices
         others = [device for device in devices if device.id_tag in team]
         ours = {DVA, *(robot.id for robot in self.robots), *team}
-        strangers = [device for device in devices if device.id_tag not in ours]
+        left_out = [device for device in devices if device.id_tag not in ours]
         events = self.run.dva.core.events.total
-        for name, held, bound in oversized([self.run.dva, *robots, *others], events, strangers):
+        for name, held, bound in oversized([self.run.dva, *robots, *others], events, left_out):
             what = f"{name} holds {held}, more than {bound}"
             self.recorder.violated("S10", self.now, "dva" if "Dva" in name else "robots", what)
 
