@@ -59,7 +59,7 @@ def build(
     def make(some: Mapping[str, Any]) -> M:
         data = copy.deepcopy(dict(document.data if document else source))  # type: ignore[arg-type]
         for key, value in some.items():
-            set_key(data, key, value)
+            set_key(data, key, copy.deepcopy(value))  # which a later key may change
         locate(data, [document.file.parent] if document else [])
         return complete(validate(model, data, fail), fail)
 

@@ -195,8 +195,13 @@ def jobs(study: Study, grid: Sequence[DesignCell] | None = None) -> list[StudyJo
     """
     every = cells(study) if grid is None else grid
     names = dict.fromkeys(cell.part for cell in every)
-    parts = [(name, [cell for cell in every if cell.part == name]) for name in names]
-    return [job for name, part_cells in parts for job in _jobs_of(study, name, part_cells)]
+    of_part = {name: [cell for cell in every if cell.part == name] for name in names}
+    teams = {name: _team(part_cells) for name, part_cells in of_part.items()}
+    return [
+        job
+        for name, part_cells in of_part.items()
+        for job in _jobs_of(study, name, part_cells, teams.get(_source_of(study, name), 1))
+    ]
 
 
 def runs_in(manifest: Mapping[str, Any]) -> list[StudyRun]:
@@ -258,7 +263,10 @@ def _repeats_of(inputs: StudyInputs) -> Iterator[DesignCell]:
         levels = dict(zip(factors, values, strict=True))
         traits = inputs.parameter_sets[int(str(levels[PARAMETERS]))]
         chosen = {factor: level for factor, level in levels.items() if factor != PARAMETERS}
-        changes = _changes(inputs, fixed | chosen) | ({TRAITS: traits} if traits else {})
+        changes = _changes(inputs, fixed | chosen)
+        own = {*study.parts[study.answer.part].changes, *study.changes, *changes}
+        drawn = {f"{TRAITS}.{name}": value for name, value in traits.items()}
+        changes |= {key: value for key, value in drawn.items() if key not in own}
         yield _cell(inputs, REPEATS, index, levels, changes)
 
 
@@ -340,9 +348,16 @@ def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
     return {**changes, key: named["dispatch"]["policy"]} if key in changes else changes
 
 
-def _jobs_of(study: Study, name: str, part_cells: Sequence[DesignCell]) -> Iterator[StudyJob]:
-    # Persons of one cluster follow each other, so that no two clusters share an operator.
-    team = max(1, *(model_for(cell.scenario).team(cell.scenario) for cell in part_cells))
+def _team(part_cells: Sequence[DesignCell]) -> int:
+    """Return the number of persons in a cluster of a part, in whichever of its cells it is most."""
+    return max(1, *(model_for(cell.scenario).team(cell.scenario) for cell in part_cells))
+
+
+def _jobs_of(
+    study: Study, name: str, part_cells: Sequence[DesignCell], team: int
+) -> Iterator[StudyJob]:
+    # Persons of one cluster follow each other, so that no two clusters share an operator; repeats
+    # have the persons of the part that they repeat.
     draws = _draws(study, name)
     for cell in part_cells:
         play = partial(model_for(cell.scenario).played_by, cell.scenario)

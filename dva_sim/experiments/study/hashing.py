@@ -12,6 +12,7 @@ import json
 import os
 import subprocess
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,8 @@ from typing import Any
 import dva_sim
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import load_yaml
 
 
 def stable_hash(data: Any) -> str:
@@ -33,7 +36,7 @@ def digest(data: Any) -> str:
 
 
 def inputs(scenarios: Iterable[Config], others: Iterable[str] = ()) -> dict[str, str]:
-    """Files that scenarios name by path (maps, traces), with the hash of their contents.
+    """Files that scenarios name (maps, traces), and that these name, with hashes of their contents.
 
     Args:
         scenarios: Scenarios of the runs.
@@ -41,12 +44,26 @@ def inputs(scenarios: Iterable[Config], others: Iterable[str] = ()) -> dict[str,
     """
     dumps = (scenario.model_dump(mode="json") for scenario in scenarios)
     names = sorted({*others, *(text for dump in dumps for text in _texts(dump) if "." in text)})
-    paths = {name: Path(name.rpartition(":")[0] if ".py:" in name else name) for name in names}
     return {
-        name: hashlib.sha256(path.read_bytes()).hexdigest()[:16]
-        for name, path in paths.items()
-        if resources.is_file(path)
+        file: hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+        for name in names
+        for file, path in _files_of(name)
     }
+
+
+def _files_of(name: str) -> Iterator[tuple[str, Path]]:
+    """The file of a name, which may be a shipped trace, and those that it names: a map's image."""
+    path = Path(name.rpartition(":")[0] if ".py:" in name else name)
+    shipped = (root / _TRACES / path for root in resources.roots())
+    found = next(filter(resources.is_file, (path, *shipped)), None)
+    if found is None:
+        return
+    yield name, found
+    if found.suffix in _YAML:
+        with suppress(ConfigError):  # whatever it is, it is no document that names files
+            for text in filter(None, _texts(load_yaml(found).data)):
+                if "." in text and resources.is_file(found.parent / text):
+                    yield f"{name}: {text}", found.parent / text
 
 
 def _texts(data: Any) -> Iterator[str]:
@@ -80,6 +97,8 @@ _JUDGES = (
     "experiments/analysis/study_view.py",
     "statistics",
 )
+_TRACES = "experiments/traces"
+_YAML = (".yaml", ".yml")
 _EDITED = ("agents", "protocol", "worlds")
 _SUFFIXES = {".yaml", ".geojson", ".xsd", ".pgm", ".png", ".py"}
 

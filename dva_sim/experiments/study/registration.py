@@ -145,7 +145,7 @@ def plan_of(study: Study) -> dict[str, Any]:
     cells = cell_grid.cells(nobody, files_read)
     files = {
         name: f"{Path(name).name} {content}"
-        for name, content in inputs(cell.scenario for cell in cells).items()
+        for name, content in inputs((cell.scenario for cell in cells), files_read.measures).items()
     }
     asked = {key: value for key, value in nobody.asked().items() if key not in _OPEN}
     asked["factors"] = {f: levels for f, levels in asked["factors"].items() if f != POINT}

@@ -97,6 +97,11 @@ def of_factors(study: Study) -> Iterator[Problem]:
         for key in keys if factor != TUNING else ():
             if setters.setdefault(key, factor) != factor:
                 yield f"{key!r} is set by two factors", _place(study, factor)
+            for other in (k for k, owner in setters.items() if owner != factor and _nests(k, key)):
+                text = (
+                    f"{key!r} and {other!r} of {setters[other]!r} undo each other; name their keys"
+                )
+                yield text, _place(study, factor)
     for key in study.changes:
         if setters.get(key) in listed:
             yield f"{key!r} is varied by the design; change 'design'", ("design",)
@@ -106,6 +111,12 @@ def of_factors(study: Study) -> Iterator[Problem]:
         yield str(error), ()
     yield from _faults_of_tuning(study)
     yield from of_size(study)
+
+
+def _nests(key: str, other: str) -> bool:
+    """True if one dotted key is a part of what the other names."""
+    short, long = sorted((key, other), key=len)
+    return long.startswith(f"{short}.")
 
 
 def _faults_of_numbers(study: Study, factor: str, levels: Sequence[Level]) -> Iterator[Problem]:

@@ -75,6 +75,19 @@ def test_a_study_without_factors_has_one_cell(tmp_path):
     assert [(job.index, job.cell) for job in jobs] == [(0, ())] * 6
 
 
+def test_a_level_changes_options_in_its_own_cell_alone(tmp_path):
+    text = (
+        STUDY.split("factors:")[0]
+        + "factors: {pattern_options.every: [2, 7]}\n"
+        + "parts: {only: {scenario: one.yaml, changes: {pattern_options: {every: 5},"
+        + " pattern: 'acknowledged_pub_sub.py:AcknowledgedPubSub'}}}\n"
+    )
+    study = study_in(tmp_path, text=text)
+    options = [cell.scenario.pattern_options for cell in cell_grid.cells(study)]
+    assert options == [{"every": 2}, {"every": 7}]
+    assert study.parts["only"].changes["pattern_options"] == {"every": 5}
+
+
 def inputs_of(study):
     return inputs(cell.scenario for cell in cell_grid.cells(study))
 
@@ -90,9 +103,40 @@ def test_files_that_a_scenario_names_are_known_by_their_contents(tmp_path):
     assert found[0] != found[1]
 
 
+def test_so_is_a_shipped_trace_and_what_a_named_file_names(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert list(inputs_of(study_in(tmp_path, "link.trace_up=cellular.up"))) == ["cellular.up"]
+    (tmp_path / "plan.yaml").write_text("image: plan.png\nresolution: 0.05\n")
+    found = []
+    for image in (b"white", b"black"):
+        (tmp_path / "plan.png").write_bytes(image)
+        found.append(inputs((), ["plan.yaml"]))
+    assert found[0].keys() == {"plan.yaml", "plan.yaml: plan.png"}
+    assert found[0] != found[1]
+
+
 def test_seeds_are_what_they_always_were(tmp_path):
     """Results that were begun with an older program go on, and old answers can be run again."""
     jobs = cell_grid.jobs(study_in(tmp_path, text=REPEATED))
     assert [job.seed for job in jobs[:2]] == [1289764452063391784, 6791902960423926731]
     seeds = [(job.part, job.index, *job.cell, job.person, job.trial, job.seed) for job in jobs]
     assert hashlib.sha256(repr(seeds).encode()).hexdigest()[:16] == "d04fb4f22a6c0684"
+
+
+def test_repeats_have_the_persons_of_the_part_they_repeat(tmp_path):
+    study = study_in(tmp_path, "operator.count=2", text=REPEATED)
+    persons = defaultdict(set)
+    for job in cell_grid.jobs(study):
+        persons[job.is_repeat].add((job.person, job.scenario.operator.person))
+    assert persons[True] <= persons[False]
+
+
+def test_a_trait_that_the_study_sets_is_left_by_its_repeats(tmp_path):
+    study = study_in(tmp_path, "operator.traits.hand_lag_s=0.15", text=REPEATED)
+    traits = [
+        cell.scenario.operator.traits
+        for cell in cell_grid.cells(study)
+        if cell.part == "robustness"
+    ]
+    assert {each["hand_lag_s"] for each in traits} == {0.15}
+    assert len({each.get("crossover_rad_s") for each in traits}) == 4

@@ -12,6 +12,7 @@ from dva_sim.cli import names
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study.registration import plan_of
 from dva_sim.kernel import resources
 from dva_sim.kernel.errors import ConfigError
 
@@ -136,3 +137,11 @@ def test_a_model_in_a_file_beside_its_scenario_is_played_in_every_process(tmp_pa
 
 def test_what_can_be_named_holds_the_models():
     assert {entry.name for entry in names.everything("models")["models"]} >= {"full", "timed"}
+
+
+def test_a_registration_fixes_what_an_own_measure_does(tmp_path):
+    study = study_with(tmp_path)
+    before = plan_of(study)["inputs"]
+    file = tmp_path / "mine.py"
+    file.write_text(f"{file.read_text()}\n# otherwise\n")
+    assert plan_of(study)["inputs"] != before

@@ -56,7 +56,7 @@ def test_a_study_that_never_has_enough_runs_all_its_rounds(tmp_path):
     text = TEXT.replace("half_width: 0.1", "half_width: 0.0001").replace("40", "7")
     study = kit.study_in(tmp_path, text=text)
     out = run_study(study, tmp_path / "out", jobs=1, episode=steady)
-    assert stopped(out) == {"rounds": 3, "of": 3, "why": None}
+    assert stopped(out) == {"rounds": 3, "of": 3, "why": "limit"}
 
 
 def test_a_spent_budget_ends_after_a_whole_round_and_stays_ended(tmp_path):

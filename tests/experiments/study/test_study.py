@@ -259,3 +259,8 @@ def test_what_is_recorded_and_the_larger_version_do_not_change_what_is_asked(tmp
 def test_the_main_study_fits_on_one_screen():
     text = load_study("req-rep-vs-pub-sub").file.read_text()
     assert len(text.splitlines()) <= 40
+
+
+def test_factors_that_would_undo_each_other_are_refused(tmp_path):
+    text = TREATED.replace("robot.processing_s: 0.01", "link: {loss: 0.02}")
+    assert unnamed(complaint(tmp_path, text), "'link'", "'link.delay_s'", "undo") == []
