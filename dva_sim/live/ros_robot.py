@@ -14,6 +14,7 @@ from dva_sim.cameras.screens import topic_of
 from dva_sim.cameras.service import PictureService
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Recorder
+from dva_sim.live.line_writer import LineWriter
 from dva_sim.live.process import ending_when_asked
 from dva_sim.network.addresses import check_address
 from dva_sim.network.keys import KeyRing
@@ -92,7 +93,7 @@ def run_ros_robot(options: RosRobotOptions, say: Say) -> None:
         raise ConfigError(f"--namespace {options.namespace!r} should be a name, as in robot_1")
     scenario = options.scenario(profile)
     ring = None if options.keys is None else KeyRing(options.keys)
-    clock, recorder = LiveClock(), Recorder()
+    clock, recorder, writer = LiveClock(), Recorder(), LineWriter(say)
 
     def tell(line: str) -> None:
         recorder.tell(clock.now, "network", line, "link")
@@ -108,16 +109,19 @@ def run_ros_robot(options: RosRobotOptions, say: Say) -> None:
             pictures.serve(robot.agent.device.label)
             robot.on_picture = pictures.show
         network.introduce(DVA, options.dva)
-        say(f"Robot: {robot.agent.device.address}")
-        clock.every(TELL_PERIOD, lambda: _say_news(recorder, say))
+        writer(f"Robot: {robot.agent.device.address}")
+        clock.every(TELL_PERIOD, lambda: _say_news(recorder, writer))
         robot.begin()
         with ending_when_asked(clock, supervised=False) as ending:
-            if not ending.is_asked:
-                clock.run()
-            robot.close()
-            clock.run(clock.now + LAST_WORDS)
-        _say_news(recorder, say)
+            try:
+                if not ending.is_asked:
+                    clock.run()
+            finally:  # whatever ends this program, the robot stands
+                robot.close()
+                clock.run(clock.now + LAST_WORDS)
+        _say_news(recorder, writer)
     finally:
+        writer.close()
         if pictures is not None:
             pictures.close()
         network.close()

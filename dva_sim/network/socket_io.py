@@ -12,6 +12,9 @@ from dva_sim.network.realtime import Socket, has_more
 # As plain numbers: the arithmetic of pyzmq's enumerations costs more than a system call.
 NOBLOCK: Final = int(zmq.NOBLOCK)
 MORE: Final = int(zmq.NOBLOCK | zmq.SNDMORE)
+MOST_PARTS: Final = 2000  # of a message; the route of a request through proxies is part of it
+DROPPED_AT_ONCE: Final = 2000  # parts of a message that has too many
+HEARD_AT_ONCE: Final = 256  # subscriptions: others may send them faster than they can be read
 
 # Without what pyzmq adds to each call for other kinds of sockets.
 recv: Final = zmq.backend.Socket.recv
@@ -26,23 +29,32 @@ def next_of(socket: Socket) -> list[bytes] | None:
 def receive(socket: Socket) -> list[bytes] | None:
     """A message, if there is one: what a REQ socket had may be the copy of a reply."""
     try:
-        return receive_parts(socket)[0]
+        parts, last = receive_parts(socket)
+        if last.more:
+            drop_rest(socket)
+        return parts
     except zmq.Again:
         return None
 
 
 def receive_parts(socket: Socket) -> tuple[list[bytes], zmq.Frame]:
-    """A received message: its parts, and the last frame, which names the sender's key.
+    """A received message: its parts, and the last frame read, which names the sender's key.
 
     A frame says whether it is the last one at half the price of asking the socket, as
-    `recv_multipart` does. Raises `zmq.Again` if there is none.
+    `recv_multipart` does. Where it is not, the message has more parts than are read: see
+    `drop_rest`. Raises `zmq.Again` if there is none.
     """
     frame = recv(socket, NOBLOCK, False)
     parts = [frame.bytes]
-    while frame.more:
+    while frame.more and len(parts) < MOST_PARTS:
         frame = recv(socket, NOBLOCK, False)
         parts.append(frame.bytes)
     return parts, frame
+
+
+def drop_rest(socket: Socket) -> bool:
+    """Drop further parts of a message, of which there may be millions: True if it is read."""
+    return any(not recv(socket, NOBLOCK, False).more for _ in range(DROPPED_AT_ONCE))
 
 
 def cut(socket: Socket) -> str:
@@ -77,7 +89,9 @@ class PublisherSocket:
     def hear(self) -> None:
         """Note subscriptions: XPUB reports the first and the last subscriber of a topic."""
         with suppress(zmq.Again):
-            while has_more(self.socket):
+            for _ in range(HEARD_AT_ONCE):
+                if not has_more(self.socket):
+                    return
                 data = self.socket.recv(NOBLOCK)
                 topic = data[1:].decode(errors="replace")
                 if data[:1] == b"\x01" and len(self._topics) < 10_000:

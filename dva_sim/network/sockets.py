@@ -34,6 +34,7 @@ from dva_sim.network.socket_io import (
     NOBLOCK,
     PublisherSocket,
     cut,
+    drop_rest,
     next_of,
     receive,
     receive_parts,
@@ -253,6 +254,7 @@ class SocketNetwork(RealNetwork):
         if ring is not None:
             clock.every(READ_KEYS, partial(self._read_keys, ring))
         self._routers: dict[str, Socket] = {}
+        self._unread: set[Socket] = set()  # routers in the middle of a request that is dropped
         self._publishers: dict[str, PublisherSocket] = {}
         self._clients: dict[str, dict[Socket, str]] = {}  # by peer: whose
         self._leaving: deque[Socket] = deque()
@@ -318,7 +320,9 @@ class SocketNetwork(RealNetwork):
 
     @override
     def leave(self, node: str) -> None:
-        self._discard(self._routers.pop(node), self._publishers.pop(node).socket)
+        router = self._routers.pop(node)
+        self._unread.discard(router)
+        self._discard(router, self._publishers.pop(node).socket)
 
     def _look_aside(self) -> bool:
         if self._context.closed:
@@ -359,9 +363,15 @@ class SocketNetwork(RealNetwork):
 
     def _requests(self, node: str, router: Socket) -> None:
         """Hand the requests that have arrived to the service of a node."""
+        if router in self._unread and not self._is_dropped(router):
+            return
         for _ in range(DRAIN):
             peer = recv(router, NOBLOCK)
             parts, last = receive_parts(router)
+            if last.more:
+                self.counters["requests of another form"] += 1
+                self._unread.add(router)
+                return  # others have their turn before its many other parts
             sender = None if self._ring is None else self._security.sender(last)
             if sender is not None or self._ring is None:
                 self._request(node, router, peer, parts, sender)
@@ -369,6 +379,13 @@ class SocketNetwork(RealNetwork):
                 self.counters["refused: of a key that is no longer known"] += 1
             if not self.clock.has_more(router):
                 return
+
+    def _is_dropped(self, router: Socket) -> bool:
+        """Drop more of a request with too many parts; True if another one can be read now."""
+        if not drop_rest(router):
+            return False
+        self._unread.discard(router)
+        return self.clock.has_more(router)
 
     def _request(
         self, node: str, router: Socket, peer: bytes, parts: list[bytes], sender: str | None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import re
 import socket
 from collections.abc import Callable
@@ -37,22 +38,22 @@ class MjpegReader:
         take: Callable[[bytes, float | None], object],
     ) -> None:
         self._clock, self._token, self._take = clock, token, take
-        self._parts = urlsplit(url)
+        self._host, self._port, self._path = _place_of(url)
         self._sock: socket.socket | None = None
         self._dialling: Dialling | None = None
         self._data, self._is_over = bytearray(), False
         self._open()
 
     def _open(self) -> None:
-        host, port = self._parts.hostname, self._parts.port or 80
-        if self._is_over or not host or self._parts.scheme != "http":
+        if self._is_over or not self._host:
             return
         self._data.clear()
-        self._dialling = Dialling(self._clock, host, port, self._ask, self._again)
+        self._dialling = Dialling(self._clock, self._host, self._port, self._ask, self._again)
 
     def _ask(self, sock: socket.socket) -> None:
         query = f"?token={self._token}" if self._token else ""
-        ask = f"GET {self._parts.path}{query} HTTP/1.0\r\nHost: {self._parts.netloc}\r\n\r\n"
+        host = f"[{self._host}]" if ":" in self._host else self._host
+        ask = f"GET {self._path}{query} HTTP/1.0\r\nHost: {host}:{self._port}\r\n\r\n"
         self._sock = sock
         self._clock.watch(sock.fileno(), self._read)
         with suppress(OSError):
@@ -106,3 +107,17 @@ class MjpegReader:
         if self._dialling is not None:
             self._dialling.cancel()
         self._end()
+
+
+def _place_of(url: str) -> tuple[str, int, str]:
+    """Return host, port and path of a stream; no host where a robot says what cannot be one.
+
+    A host is an address: looking a name up would block the thread that carries emergencies.
+    """
+    try:
+        parts = urlsplit(url)
+        host, port = parts.hostname or "", parts.port or 80
+        ipaddress.ip_address(host)
+    except ValueError:
+        return "", 0, ""
+    return (host, port, parts.path) if parts.scheme == "http" else ("", 0, "")

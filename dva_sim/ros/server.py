@@ -138,13 +138,17 @@ class RosbridgeServer:
             self.tell(f"{name} has come")
 
     def _refusal(self, request: Any) -> tuple[HTTPStatus, str] | None:
-        """Return why a client is not let in: a page of another site, or no token."""
+        """Return why a client is not let in: no address, a page of another site, or no token."""
         # A browser names the page that asks; a name of another site may lead here (DNS rebinding).
-        origin = request.headers.get("Origin")
+        try:
+            origin = urlsplit(request.headers.get("Origin", "")).hostname
+            asked = parse_qs(urlsplit(request.path).query)
+        except (ValueError, LookupError):  # LookupError: a header that is there twice
+            return HTTPStatus.BAD_REQUEST, "the address or the origin makes no sense\n"
         own = (*LOCAL, str(self._listener.getsockname()[0]))
-        if origin is not None and urlsplit(origin).hostname not in own:
+        if "Origin" in request.headers and origin not in own:
             return HTTPStatus.FORBIDDEN, "a page of another site may not ask here\n"
-        shown = parse_qs(urlsplit(request.path).query).get("token", [""])[0]
+        shown = asked.get("token", [""])[0]
         bearer = request.headers.get("Authorization", "")
         shown = shown or bearer.removeprefix("Bearer ")
         if not hmac.compare_digest(shown.encode("utf-8", "replace"), self._token.encode()):

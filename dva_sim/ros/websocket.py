@@ -76,8 +76,8 @@ class WebSocketConnection:
         return len(self._buffer)
 
     def send(self, text: bytes) -> None:
-        """Send a text message, as UTF-8."""
-        if self.is_open:
+        """Send a text message, as UTF-8; nothing once either end has said good-bye."""
+        if self.is_open and self._protocol.state.name == "OPEN":
             self._protocol.send_text(text)
             self.push()
 

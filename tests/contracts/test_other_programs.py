@@ -21,6 +21,7 @@ from helpers.network.transports import (
 )
 from helpers.processes.patience import PATIENCE_S
 
+from dva_sim.network import socket_io
 from dva_sim.network.real_network import LARGEST
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
@@ -71,6 +72,29 @@ def test_a_request_without_an_empty_frame_is_dropped_and_counted(served):
     served.run_until(lambda: served.network.counters["requests of another form"] == 3)
     others_are_served(served)
     assert program.poll(0) == 0
+
+
+@pytest.mark.invariant("S11")
+def test_a_request_of_very_many_frames_is_dropped_bit_by_bit_and_others_are_served(served):
+    program = served.program(zmq.DEALER, DVA)
+    program.send_multipart([b"", *[b""] * 20_000])
+    program.send_multipart([b"tag", b"", b"<msg>"])
+    others_are_served(served)
+    *route, _ = served.receive(program)
+    assert route == [b"tag", b""]
+    assert served.network.counters["requests of another form"] == 1
+
+
+@pytest.mark.invariant("S11")
+def test_subscriptions_without_end_are_heard_bit_by_bit(served, monkeypatch):
+    monkeypatch.setattr(socket_io, "HEARD_AT_ONCE", 2)
+    program = served.program(zmq.XSUB, DVA, published=True)
+    for number in range(500):
+        program.send(b"\x01%d" % number)
+    others_are_served(served)
+    before = served.clock.now
+    served.run_until(lambda: served.network.ready(DVA, "499", 10))
+    assert served.clock.now > before
 
 
 def test_a_route_of_a_thousand_frames_is_given_back(served):

@@ -160,3 +160,12 @@ def test_a_stream_of_pictures_that_is_none_is_read_without_an_error(pieces, leng
         while reader._picture():
             pass
     assert all(len(picture) < 10_000_000 for picture in taken)
+
+
+@pytest.mark.parametrize(
+    "url",
+    ["http://[", "http://127.0.0.1:99999/", "http://camera.example/x", "ftp://127.0.0.1/", "", "x"],
+)
+def test_a_place_of_pictures_that_is_none_is_never_looked_for(url, monkeypatch):
+    monkeypatch.setattr("dva_sim.ros.mjpeg.Dialling", None)
+    MjpegReader(LiveClock(), url, "secret", lambda *_: None).close()

@@ -15,6 +15,7 @@ from websockets.exceptions import ConnectionClosed
 pytestmark = pytest.mark.system
 
 CMD = "/robot_1/cmd_vel"
+CRLF = "\r\n"
 
 
 @pytest.fixture
@@ -22,6 +23,11 @@ def world():
     world = ServedWorld()
     yield world
     world.close()
+
+
+def address_of(world):
+    host, _, port = world.url.partition("?")[0].removeprefix("ws://").strip("/").partition(":")
+    return host, int(port)
 
 
 def driver(world, name="robot_1"):
@@ -278,3 +284,37 @@ def test_connections_that_say_nothing_make_room_for_those_that_do(world):
             stack.enter_context(socket.create_connection(("127.0.0.1", port)))
         assert world.client().refused == -1
         world.until(lambda: world.client().is_open)
+
+
+@pytest.mark.parametrize(
+    ("line", "origin"), [("GET //[?token= HTTP/1.1", ""), ("GET / HTTP/1.1", "Origin: http://[")]
+)
+def test_an_address_that_makes_no_sense_is_refused_and_the_drive_goes_on(world, line, origin):
+    client = driver(world)
+    head = f"{line}\r\nHost: x\r\n{origin}{origin and CRLF}Upgrade: websocket\r\n"
+    head += "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+    head += "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+    with socket.create_connection(address_of(world)) as rude:
+        rude.sendall(head.encode())
+        rude.setblocking(False)
+        answer = []
+
+        def is_refused():
+            with contextlib.suppress(BlockingIOError):
+                answer.append(rude.recv(1000))
+            return answer
+
+        world.until(is_refused)
+    assert answer[0].startswith(b"HTTP/1.1 400")
+    drive(world, client, 0.2)
+
+
+def test_a_request_together_with_good_bye_is_not_answered_and_the_drive_goes_on(world):
+    client, rude = driver(world), world.client()
+    gone = len(world.lines)
+    text = json.dumps({"op": "call_service", "service": "/rosapi/topics"}).encode()
+    mask = bytes(4)
+    frames = bytes([0x81, 0x80 | 126]) + len(text).to_bytes(2, "big") + mask + text
+    rude.send_raw(frames + bytes([0x88, 0x82]) + mask + (1000).to_bytes(2, "big"))
+    world.until(lambda: len(world.lines) > gone)
+    drive(world, client, 0.2)

@@ -105,6 +105,10 @@ class ScriptedRosClient:
         raw = operation if isinstance(operation, str | bytes) else json.dumps(operation)
         self._socket.send(raw)
 
+    def send_raw(self, data: bytes) -> None:
+        """Send bytes as they are, whatever frames they make."""
+        self._socket.socket.sendall(data)
+
     def subscribe(self, topic: str, kind: str | None = None, **more) -> None:
         typed = {} if kind is None else {"type": kind}
         self.say({"op": "subscribe", "topic": topic, **typed, **more})
