@@ -597,3 +597,22 @@ def test_who_may_read_is_asked_when_it_subscribes(bench):
     assert bench.say(RUI, m.DevSub("smoke", 1.0), session=9).code == m.OK
     bench.say(DVA, m.PermissionRevocation(ROBOT, RUI, 9))
     assert bench.say(RUI, m.DevSub("smoke", 1.0), session=9).code == m.NOT_PERMITTED
+
+
+@pytest.mark.invariant("S3")
+@pytest.mark.parametrize("name", BEGINS)
+def test_after_an_emergency_the_dva_sends_a_robot_nowhere_until_a_person_has_had_it(bench, name):
+    bench.say(DVA, m.PermissionGrant(DVA, "missions", 7))
+    bench.say(RUI, m.Emergency(), now=2.0)
+    assert bench.say(DVA, MESSAGES[name], now=60.0).code == m.BUSY
+    bench.say(DVA, m.PermissionGrant(ANA, "missions", 8), now=61.0)
+    bench.say(DVA, m.PermissionGrant(DVA, "missions", 9), now=70.0)
+    assert bench.say(DVA, MESSAGES[name], now=71.0, session=9).code == m.OK
+
+
+@pytest.mark.invariant("S3")
+def test_who_holds_a_robot_goes_on_after_an_emergency(bench):
+    bench.say(DVA, m.PermissionGrant(ANA, "both", 7))
+    bench.say(RUI, m.Emergency(), now=2.0)
+    assert bench.say(ANA, m.StartTeleOp(), now=3.0).code == m.OK
+    assert not bench.robot.stands

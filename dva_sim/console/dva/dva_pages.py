@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.asking.dispatcher import does
@@ -46,6 +46,11 @@ class DvaPages:
         self._fakes = FakeDevices(
             self._make, lambda i: i == DVA or i in entries, self._identity, self._dismiss
         )
+
+    @property
+    def fakes(self) -> Collection[str]:
+        """Ids of the devices that were added by hand, which hear nothing."""
+        return self._fakes.devices.keys()
 
     def devices(self, now_ms: int) -> DevicesLine | None:
         """The table, once a second; None if nobody looks."""

@@ -6,6 +6,7 @@ Seats are given out here. Whatever ends a drive ends it for good: nothing begins
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from typing import Any
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
@@ -197,14 +198,36 @@ class Actions:
         seat = self._seats.taken.get(client)
         if "robots" not in line and seat is not None:
             line = {"robots": list(self._world.person(seat.number).robots)}
-        robots = self._robots(line)
+        joined = self._joined()
+        robots = self._to_stop(line, joined)
         self._at_robots.stop(robots)
         # Who drives a robot from here learns of its end at once, whoever pressed the button.
         own = self._world.person(0 if seat is None else seat.number)
         for person in self._world.persons:
             if person is not own or seat is None:
                 person.ended_by_others(robots)
+        for robot in joined.keys() & set(robots):
+            own.device.introduce(robot, joined[robot])
         own.emergency(robots, on_result)
+
+    def _joined(self) -> dict[str, str]:
+        """Addresses of robots from outside the scenario that can be reached, by id."""
+        here, fakes = self._world.foreign.addresses(), self._world.dva.fakes
+        return {robot: address for robot, address in here.items() if robot not in fakes}
+
+    def _to_stop(self, line: OfSome, joined: Mapping[str, str]) -> list[str]:
+        """Ids of the robots that a line names, wherever they are from; what is unknown is left."""
+        everywhere = [*self._world.run.field.robots, *joined]
+        given = line.get("robots", "all")
+        if given == "all":
+            return everywhere
+        if not given:
+            raise Refused("No robot was named.")
+        numbers, labels = self._world.feed.numbers, self._world.run.stage.labels
+        named = [r for r in everywhere if {r, numbers.get(r), labels.get(r)} & set(given)]
+        if not named:
+            raise Refused(f"there is no robot {given[0]!r}")
+        return named
 
     def _drew(self, client: str, line: SampleBatch | Wish) -> None:
         """Note which picture of each robot a page has drawn last, if it says so."""

@@ -91,6 +91,14 @@ class ForeignDevices:
             if self._known[id_tag] == "robot"
         ]
 
+    def addresses(self) -> dict[str, str]:
+        """Return where each robot that is here takes requests, by id."""
+        return {
+            id_tag: entry.device.address
+            for id_tag, entry in self._here()
+            if self._known[id_tag] == "robot"
+        }
+
     def _here(self) -> list[tuple[str, DeviceEntry]]:
         entries = self._run.dva.core.registry.entries
         known = ((i, entries.get(i)) for i in self._known)

@@ -297,3 +297,37 @@ def test_no_rule_of_safety_is_broken_by_all_that(driving):
     driving.do("emergency", robots="all")
     driving.let(5.0)
     assert not driving.world.recorder.violations
+
+
+@pytest.fixture
+def joined(driving):
+    """A robot that is no part of the scenario: it registers by itself, and notes what it hears."""
+    device = driving.world.run.stage.device("robot", 9)
+    device.heard = []
+
+    def answer(message):
+        device.heard.append(message.body)
+        return m.Reply(message.message_id, m.OK, "")
+
+    device.serve(answer)
+    device.register(lambda: None)
+    driving.until(lambda: device.id_tag in driving.world.foreign.addresses())
+    return device
+
+
+@pytest.mark.parametrize("named", ["all", "by number", "beside one that is unknown"])
+def test_an_emergency_reaches_a_robot_that_has_joined_from_outside(driving, joined, named):
+    number = driving.world.feed.numbers[joined.id_tag]
+    robots = {"all": "all", "by number": [number], "beside one that is unknown": [77, number]}
+    assert driving.do("emergency", robots=robots[named])[0]
+    assert m.Emergency() in joined.heard
+    assert (driving.robot().controller.mode is Mode.IDLE) == (named == "all")
+
+
+def test_devices_that_hear_nothing_do_not_hold_up_an_emergency(driving):
+    added, _ = driving.do("fake_add", label="decoy", type="Robot")
+    assert added
+    driving.until(lambda: driving.world.foreign.addresses())
+    began = driving.world.clock.now
+    assert driving.do("emergency", robots="all")[0]
+    assert driving.world.clock.now < began + 2.0
