@@ -23,26 +23,34 @@ def answer(finding: Finding) -> Answer:
     if not np.isfinite(finding.low).any():
         return Answer(_without_band(finding), measured)
     first, rest = _effect(finding)
-    clauses = [*rest, *dependence(finding)]
+    clauses = [*rest, *dependence(finding, is_led=bool(finding.differs.any()))]
     second = f" {capital('; '.join(clauses))}." if clauses else ""
     return Answer(f"{capital(first)}.{second}", measured)
 
 
-def dependence(f: Finding) -> Iterator[str]:
-    """Yield what else the difference depends on: other settings, and models of the persons."""
-    if f.elsewhere is not None and not f.elsewhere.turns:
+def dependence(f: Finding, is_led: bool = True) -> Iterator[str]:
+    """Yield what else the difference depends on: other settings, and models of the persons.
+
+    Args:
+        f: The finding.
+        is_led: True if the first sentence is about a difference, and so says one of them.
+    """
+    by_setting = is_led and f.elsewhere is not None and f.elsewhere.turns
+    if f.elsewhere is not None and not by_setting:
         count = f.elsewhere.count
         others = "the other setting" if count == 1 else f"the {count} other settings"
         yield f"in {others} tried it is {_reaches(f, f.elsewhere)}"
+    if f.models is not None and (by_setting or not is_led):
+        over = f"over {f.models.count} other models of the persons"
+        yield f"{over} it is {_reaches(f, f.models)}"
     if f.only_model:
         yield f"only one model of the persons was tried ({f.only_model})"
 
 
 def _effect(f: Finding) -> tuple[str, list[str]]:
     """The first sentence, and the clauses of the second that go with it."""
-    where = np.flatnonzero(f.low > 0) if (f.low > 0).any() else np.flatnonzero(f.high < 0)
-    if len(where):
-        return _difference(f, where)
+    if f.differs.any():
+        return _difference(f, _telling_level(f, np.flatnonzero(f.differs)))
     if f.has_too_few:
         return _too_small(f), list(_elsewhere(f, but=f.is_open))
     anywhere = f" at any {factor_name(f.over)} tried" if f.over else _after(f.everywhere)
@@ -56,9 +64,9 @@ def _effect(f: Finding) -> tuple[str, list[str]]:
     return f"{none}{_settings(f)}: {excluded} ({sure})", list(_elsewhere(f, but=is_settled))
 
 
-def _difference(f: Finding, where: NDArray[np.intp]) -> tuple[str, list[str]]:
+def _difference(f: Finding, stop: int) -> tuple[str, list[str]]:
     """`A is slower than B: +4.5 s at a delay of 1 s (95 % band 3.0 to 6.0 s)`, and where."""
-    stop = _telling_level(f, where)
+    where = np.flatnonzero(f.low > 0 if f.mean[stop] > 0 else f.high < 0)
     compared, there = _compared(f, f.mean[stop]), at(f, [stop])
     beyond = f", {EXTRAPOLATED}" if stop in f.outside else ""
     reach = [*_differs(f, where), *_elsewhere(f)]
@@ -69,8 +77,11 @@ def _difference(f: Finding, where: NDArray[np.intp]) -> tuple[str, list[str]]:
     if f.models is not None:
         over = f"{_reaches(f, f.models, own=f.mean[stop])}{_after(there)}{_settings(f)}"
         who = f"{_depends(f)} on the persons" if f.models.turns else compared
+        if not f.models.turns and not f.models.low * f.models.high > 0:
+            who = f"{who} for the study's own persons, though not for all"
         first = f"{who}: {over}, over {f.models.count + 1} models of the persons{beyond}"
-        return first, [f"with the study's own persons it is {_size(f, stop)}", *reach]
+        own = f"with the study's own persons it is {_size(f, stop)}{_remark_on_size(f, where)}"
+        return first, [own, *reach]
     size = _size(f, stop, there=f"{_after(there)}{_settings(f)}", beyond=beyond)
     return f"{compared}{_remark_on_size(f, where)}: {size}", reach
 
@@ -171,11 +182,11 @@ def _differs(f: Finding, where: NDArray[np.intp]) -> Iterator[str]:
         return
     word, there = _word(f, f.mean[where[0]]), places(f, where)
     yield f"it is {word} {'only there' if len(where) == 1 else there}"
-    other = np.flatnonzero(f.high < 0)
-    if (f.low > 0).any() and len(other):
+    other = np.setdiff1d(np.flatnonzero(f.differs), where)
+    if len(other):
         stop = _telling_level(f, other)
         peak = f" at {level_name(f.over, f.levels[stop])}" if len(other) > 1 else ""
-        yield f"it is {_word(f, -1.0)} {places(f, other)}: {_size(f, stop)}{peak}"
+        yield f"it is {_word(f, f.mean[stop])} {places(f, other)}: {_size(f, stop)}{peak}"
 
 
 def _remark_on_size(f: Finding, where: NDArray[np.intp]) -> str:
@@ -294,8 +305,7 @@ def _telling_level(f: Finding, where: NDArray[np.intp]) -> int:
 
 def telling_stop(finding: Finding) -> int | None:
     """Return the stop the answer leads with, else the last one that has a band."""
-    for chosen in (finding.low > 0, finding.high < 0):
-        if len(where := np.flatnonzero(chosen)):
-            return _telling_level(finding, where)
+    if finding.differs.any():
+        return _telling_level(finding, np.flatnonzero(finding.differs))
     there = np.flatnonzero(np.isfinite(finding.low))
     return int(there[-1]) if len(there) else None

@@ -42,6 +42,7 @@ class ChoiceMap:
         regret: Mean loss beyond the least one, `(g, c, m)`; 0 for the best choice.
         is_clear: True where the 95 % interval of the regret, paired by person and trial, lies above
             0 and the regret above `smallest`, `(g, c, m)`.
+        is_same: True where that interval excludes a regret above `smallest`, `(g, c, m)`.
         smallest: Smallest difference that matters; 0 where none was declared.
         most: Value of runs that never ended; infinite if the measure is unbounded.
         outside: True for cells beyond the delays at which people were watched, `(g, c, m)`.
@@ -59,6 +60,7 @@ class ChoiceMap:
     mean: Floats
     regret: Floats
     is_clear: NDArray[np.bool_]
+    is_same: NDArray[np.bool_]
     smallest: float
     most: float
     outside: NDArray[np.bool_]
@@ -88,19 +90,24 @@ class ChoiceMap:
         return np.asarray(self.is_clear.any(axis=2))
 
     @property
-    def overall(self) -> Floats:
-        """Greatest regret of each choice in any situation in which it is clearly worse, `(c,)`."""
-        return np.asarray(self.clear_worst.max(axis=0))
+    def is_best(self) -> NDArray[np.bool_]:
+        """True for a choice that is as good as the best under every model, `(g, c)`."""
+        return np.asarray(self.is_same.all(axis=2))
 
     @property
-    def clear_worst(self) -> Floats:
-        """Greatest regret where a choice is clearly worse than the best, else 0, `(g, c)`."""
-        return np.asarray(np.where(self.is_clear, self.regret, 0.0).max(axis=2))
+    def overall(self) -> Floats:
+        """Greatest regret of each choice in any situation, settled or not, `(c,)`."""
+        return np.asarray(self.worst.max(axis=0))
 
     @property
     def advised(self) -> Level:
         """The choice whose greatest regret is least."""
         return self.choice.levels[int(np.argmin(self.overall))]
+
+    @property
+    def is_tall(self) -> bool:
+        """True if there are more choices than situations: they then read better as rows."""
+        return len(self.choice.levels) > len(self.given.levels)
 
     @property
     def is_beyond(self) -> bool:
@@ -139,7 +146,7 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
     if not np.isfinite(mean).all():
         return None
     smallest = view.smallest_effect or 0.0
-    best = mean.argmin(axis=1)
+    is_clear, is_same = _judged(cells, mean.argmin(axis=1), smallest)
     return ChoiceMap(
         measure=view.measure,
         choice=view.line,
@@ -147,7 +154,8 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
         models=models,
         mean=mean,
         regret=mean - mean.min(axis=1, keepdims=True),
-        is_clear=_clear(cells, best, smallest),
+        is_clear=is_clear,
+        is_same=is_same,
         smallest=smallest,
         most=view.possible[1],
         outside=_outside(view, axes),
@@ -168,12 +176,16 @@ def _cells(part: RunGrid, grid: NDArray[Any], axes: tuple[Factor, ...]) -> NDArr
     return np.asarray(moved.reshape(*moved.shape[:3], *moved.shape[3 + others :]))
 
 
-def _clear(cells: Floats, best: NDArray[np.intp], smallest: float) -> NDArray[np.bool_]:
-    clear = np.zeros(cells.shape[:3], dtype=bool)
+def _judged(
+    cells: Floats, best: NDArray[np.intp], smallest: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return where a choice is clearly worse than the best, and where it is as good."""
+    clear, same = np.zeros((2, *cells.shape[:3]), dtype=bool)
     for g, c, m in np.ndindex(clear.shape):
         found = interval_of(cells[g, c, m] - cells[g, best[g, m], m])
         clear[g, c, m] = found is not None and found.low > 0.0 and found.mean > smallest
-    return clear
+        same[g, c, m] = c == best[g, m] or (found is not None and found.high <= smallest)
+    return clear, same
 
 
 def _mean(view: StudyView, column: str, axes: tuple[Factor, ...]) -> Floats:

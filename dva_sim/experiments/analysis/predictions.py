@@ -1,16 +1,18 @@
 """Predictions beside findings; fixed rules decide whether each held.
 
 A direction holds when the 95 % interval lies on that side of zero, and fails when it lies on the
-other side or rules out every effect that matters. `same` holds when the interval lies within the
-smallest effect that matters, and fails when it lies wholly outside. A range holds when it
-contains the mean, and fails when the interval does not touch it. All else is open. Nothing is
-judged where tuning has chosen the value there was, so that both sides are the same runs.
+other side or rules out every effect that matters, unless a smaller one was expected. `same` holds
+when the interval lies within the smallest effect that matters, and fails when it lies wholly
+outside. A range holds when it contains the mean, and fails when the interval does not touch it. All
+else is open. Nothing is judged where tuning has chosen the value there was, so that both sides are
+the same runs.
 
 What arithmetic predicts of lock-step messaging: its rate, and from which delay on it binds.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -59,7 +61,8 @@ def verdict_of(
     direction: str | None, expected: Range | None, smallest: float | None, found: Interval
 ) -> Verdict:
     """Judge a prediction by the interval of the finding."""
-    verdicts = [_of_direction(direction, smallest, found)]
+    least = min(map(abs, expected)) if expected is not None else math.inf
+    verdicts = [_of_direction(direction, smallest, found, is_small=least < (smallest or 0.0))]
     if expected is not None:
         verdicts.append(_of_range(expected, found))
     if "did not hold" in verdicts:
@@ -67,7 +70,9 @@ def verdict_of(
     return "held" if all(v == "held" for v in verdicts) else "open"
 
 
-def _of_direction(direction: str | None, smallest: float | None, found: Interval) -> Verdict:
+def _of_direction(
+    direction: str | None, smallest: float | None, found: Interval, is_small: bool
+) -> Verdict:
     low, high = (found.low, found.high) if direction != "below" else (-found.high, -found.low)
     matters = smallest or 0.0
     if direction == "same":
@@ -76,7 +81,7 @@ def _of_direction(direction: str | None, smallest: float | None, found: Interval
         return "did not hold" if low > matters or high < -matters else "open"
     if low > 0:
         return "held"
-    return "did not hold" if high <= 0 or high < matters else "open"
+    return "did not hold" if high <= 0 or (high < matters and not is_small) else "open"
 
 
 def _of_range(expected: Range, found: Interval) -> Verdict:

@@ -11,7 +11,7 @@ nothing of theirs is marked, however long their links are.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,7 @@ class Repeat:
     Attributes:
         strategy: Strategy of the operators; empty if it was not varied.
         parameters: Number of the parameter set; 0 is the usual one.
-        mean: First minus second.
+        mean: First minus second; beside the study's own result, see `RepeatedStop.moved`.
         low: Lower end of its own 95 % interval.
         high: Upper end.
         is_own: True for the study's own model, which is no independent evidence.
@@ -61,6 +61,8 @@ class RepeatedStop:
         high: Upper edge.
         repeats: With a result; those without are left out.
         smallest: Smallest effect that matters.
+        moved: What was added to each repeat: by so much the study's own result, of more persons
+            and trials, is above the repeat of its own model. 0 if that was not repeated.
     """
 
     level: Level
@@ -69,6 +71,7 @@ class RepeatedStop:
     high: float
     repeats: tuple[Repeat, ...]
     smallest: float | None
+    moved: float = 0.0
 
     @property
     def others(self) -> list[Repeat]:
@@ -197,14 +200,21 @@ def _stop(read: _Reading, view: StudyView, level: Level) -> RepeatedStop:
         for model in read.part.settings(but=(str(finding.factor), view.over.name))
         if (repeat := _repeat(read, model | {view.over.name: level})) is not None
     ]
+    found = float(finding.mean[at])
+    moved = next((found - each.mean for each in repeats if each.is_own), 0.0)
     return RepeatedStop(
         level=level,
-        found=float(finding.mean[at]),
+        found=found,
         low=float(finding.low[at]),
         high=float(finding.high[at]),
-        repeats=tuple(repeats),
+        repeats=tuple(_moved(each, moved) for each in repeats),
         smallest=finding.smallest_effect,
+        moved=moved,
     )
+
+
+def _moved(repeat: Repeat, by: float) -> Repeat:
+    return replace(repeat, mean=repeat.mean + by, low=repeat.low + by, high=repeat.high + by)
 
 
 def _repeat(read: _Reading, where: dict[str, Level]) -> Repeat | None:
@@ -245,7 +255,8 @@ def _what_was_repeated(r: RepeatedAnswer) -> str:
     return (
         f"Repeated{under} with the usual parameters and {others} within the bands that "
         f"calibration leaves open ({r.persons} persons, {trials} each, with the same random "
-        "numbers as above, so that only the model differs). The study's own model does not count."
+        "numbers as above). Each is the study's own result, moved by what its repeat differs from "
+        "that of the study's own model."
     )
 
 

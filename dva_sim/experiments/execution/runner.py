@@ -208,6 +208,9 @@ def _run_rounds(
             break
     if why is not None:
         session.end()
+    elif study.stop is not None:
+        is_met = is_enough(study, _rows(todo, chosen, session.checkpoint))
+        why = "enough" if is_met else "limit"
     return _in_order(todo, chosen), {"rounds": number, "of": len(batches), "why": why}
 
 

@@ -89,8 +89,9 @@ def _assumptions(reading: ResultsReading, finding: Finding) -> str:
     if not effects:
         return f"{text} To see which of them move such an answer: dva-sim screen {MAIN}."
     clear = [effect.key for effect in effects if effect.is_clear]
-    moved = f"{listing(clear)} moved" if clear else "none of them moved"
-    return f"{text} Their effect was screened for {MAIN} only: {moved} its answer beyond chance."
+    found = f"{listing(clear)}" if clear else f"none of the {len(effects)} largest effects"
+    verb = "are" if len(clear) > 1 else "is"
+    return f"{text} Screened for {MAIN} only: {found} {verb} clear of chance."
 
 
 def _how(view: StudyView, finding: Finding) -> str:

@@ -15,10 +15,25 @@ from dva_sim.kernel.wording import listing, quantity
 from dva_sim.simulation.labels import factor_name, level_name, named
 
 NEVER = "never done"
+WORST = "worst of these"
+_NAMED = 5  # other choices that a sentence names
 
 
 def choice_table(found: ChoiceMap, part: str) -> CellTable:
-    """A row for each situation: the best choices, and what each other one costs beyond them."""
+    """The best choices in each situation, and what each other one costs beyond them.
+
+    A row is a situation, or a choice where those are more.
+    """
+    text = note("map", **facts_of(found))
+    heads, labels, rows = _by_choice(found) if found.is_tall else _by_situation(found)
+    return CellTable(part, heads, labels, rows, note=text)
+
+
+_Lines = tuple[list[str], int, list[list[str]]]
+
+
+def _by_situation(found: ChoiceMap) -> _Lines:
+    """Heads, how many of them are labels, and a row for each situation."""
     choices = found.choice.levels
     heads = [
         factor_name(found.given.name),
@@ -32,8 +47,25 @@ def choice_table(found: ChoiceMap, part: str) -> CellTable:
         cells = [regret_text(found, g, c) for c in range(len(choices))]
         notes = [found.notes.get(str(situation), "")] if found.notes else []
         rows.append([name, _best(found, g), *cells, *notes])
-    text = note("map", **facts_of(found))
-    return CellTable(part, heads, 2, rows, note=text)
+    return heads, 2, rows
+
+
+def _by_choice(found: ChoiceMap) -> _Lines:
+    """Heads, how many of them are labels, and a row for each choice; assumptions stand below."""
+    situations = range(len(found.given.levels))
+    names = [situation_name(found, g) for g in situations]
+    rows = [
+        [
+            level_name(found.choice.name, level),
+            *(regret_text(found, g, c) for g in situations),
+            overall_text(found, c),
+        ]
+        for c, level in enumerate(found.choice.levels)
+    ]
+    if found.notes:
+        notes = [found.notes.get(str(level), "") for level in found.given.levels]
+        rows.append(["by assumption", *notes, ""])
+    return [factor_name(found.choice.name), *names, WORST], 1, rows
 
 
 def beside_table(found: ChoiceMap, part: str) -> CellTable:
@@ -63,6 +95,7 @@ def facts_of(found: ChoiceMap) -> dict[str, Any]:
         "models": len(found.models.levels),
         "is_beyond": found.is_beyond,
         "is_marked": bool(found.outside.any()) and not found.is_beyond,
+        "line": "column" if found.is_tall else "row",
         "smallest": quantity(found.smallest, found.unit) if found.smallest else "",
         "has_waiting": found.waiting is not None,
     }
@@ -75,13 +108,21 @@ def _range(values: Floats) -> str:
 
 
 def regret_text(found: ChoiceMap, situation: int, choice: int) -> str:
-    """`3 to 69`, over the models of persons; `=` where it is as good as the best."""
-    if not found.is_worse[situation, choice]:
+    """`3 to 69`, over the models of persons; `=`: as good as the best; `3 to 9 ?`: not settled."""
+    if found.is_best[situation, choice]:
         return "="
     if found.never[situation, choice]:
         return NEVER
     low, high = found.least[situation, choice], found.worst[situation, choice]
-    return _range(np.array([low, high]))
+    is_open = not found.is_worse[situation, choice]
+    return f"{_range(np.array([low, high]))}{' ?' if is_open else ''}"
+
+
+def overall_text(found: ChoiceMap, choice: int) -> str:
+    """The most that a choice costs beyond the best one, in any situation."""
+    if found.never[_hardest(found, choice), choice]:
+        return NEVER
+    return regret_number(float(found.overall[choice]))
 
 
 def situation_name(found: ChoiceMap, situation: int) -> str:
@@ -94,25 +135,29 @@ def situation_name(found: ChoiceMap, situation: int) -> str:
 def lead_of(found: ChoiceMap) -> str:
     """Say whether one choice is best everywhere, and which has the least regret."""
     names = [level_name(found.choice.name, level) for level in found.choice.levels]
-    best = [name for name, worse in zip(names, found.is_worse.T, strict=True) if not worse.any()]
+    best = [name for name, good in zip(names, found.is_best.T, strict=True) if good.all()]
     given = factor_name(found.given.name)
     over = f"over {len(found.models.levels)} models of the persons{_beyond(found)}"
     if len(best) == len(names):
         return f"No difference that matters was found on any {given} tried, {over}."
     if best:
         return f"Nothing is better than {listing(best)} on any {given} tried, {over}."
+    if not found.is_worse.any():
+        what = factor_name(found.choice.name)
+        return f"The study is too small to tell which {what} is best on any {given} tried, {over}."
     first, *rest = np.argsort(found.overall, kind="stable").tolist()
     others = "; ".join(
         f"{names[c]} {_cost(found, c)}, "
         f"{level_name(found.given.name, found.given.levels[_hardest(found, c)])}"
-        for c in rest
+        for c in rest[:_NAMED]
     )
+    more = f"; the {len(rest) - _NAMED} others by no less" if len(rest) > _NAMED else ""
     where = named(found.given.name, found.given.levels[_hardest(found, first)])
     return (
         f"No single {factor_name(found.choice.name)} is best on every {given} tried; the smallest "
         f"worst loss is that of {names[first]}: {_cost(found, first)} behind the best one, with "
         f"{where}, {over}. "
-        f"The others are behind by up to: {others}."
+        f"The others are behind by up to: {others}{more}."
     )
 
 
@@ -133,7 +178,7 @@ def _beyond(found: ChoiceMap) -> str:
 
 def _hardest(found: ChoiceMap, choice: int) -> int:
     """The situation in which a choice is farthest behind the best one."""
-    return int(np.argmax(found.clear_worst[:, choice]))
+    return int(np.argmax(found.worst[:, choice]))
 
 
 def _cost(found: ChoiceMap, choice: int) -> str:
@@ -145,7 +190,8 @@ def _cost(found: ChoiceMap, choice: int) -> str:
 def _best(found: ChoiceMap, situation: int) -> str:
     best = found.best_of(situation)
     if len(best) == len(found.choice.levels):
-        return "nothing differs"
+        is_settled = found.is_best[situation].all()
+        return "nothing differs" if is_settled else "nothing is shown to differ"
     return listing([level_name(found.choice.name, level, short=True) for level in best])
 
 

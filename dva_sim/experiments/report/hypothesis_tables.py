@@ -30,6 +30,7 @@ def hypothesis_table(tested: Sequence[Tested], cluster: str = "person") -> CellT
     """Each hypothesis: the claim, what was found, the adjusted test, the verdict."""
     heads = ["hypothesis", "claim", "found (95 % interval)"]
     heads += ["p by Holm", "p of the opposite", "verdict"]
+    families = Counter(t.contrast.family for t in tested)
     rows = [
         [
             ": ".join(filter(None, (t.name, t.hypothesis.text))),
@@ -37,25 +38,31 @@ def hypothesis_table(tested: Sequence[Tested], cluster: str = "person") -> CellT
             _interval(t.difference, t.contrast.measure),
             _p(t.adjusted),
             _p(t.against),
-            ": ".join(filter(None, (_VERDICTS[t.verdict], _few(t, cluster)))),
+            ": ".join(filter(None, (_VERDICTS[t.verdict], _few(t, cluster, tests)))),
         ]
         for t in tested
+        for tests in [families[t.contrast.family]]
     ]
     return CellTable("", heads, len(heads), rows, note=note("hypotheses"))
 
 
-def _few(tested: Tested, cluster: str) -> str:
+def _few(tested: Tested, cluster: str, tests: int) -> str:
     """Say that a hypothesis stayed open for want of persons; else an empty text."""
     found, least = tested.difference, tested.contrast.smallest or tested.hypothesis.margin or None
-    is_few = tested.verdict == "open" and found is not None and _are_few(found, least)
+    is_few = tested.verdict == "open" and found is not None and _are_few(found, least, tests)
     return too_few(found.n_persons, cluster) if is_few and found is not None else ""
 
 
-def _are_few(found: Interval, smallest: float | None) -> bool:
+def _are_few(found: Interval, smallest: float | None, tests: int) -> bool:
     """True if the test, or ruling out the declared difference, needs more persons."""
-    if 2.0 ** (1 - found.n_persons) > 1 - LEVEL:  # the least p that a permutation test can give
+    if _least_p(found.n_persons, tests) > 1 - LEVEL:
         return True
     return smallest is not None and max(-found.low, found.high) > smallest
+
+
+def _least_p(persons: int, tests: int) -> float:
+    """The least p that a permutation test can give by Holm, as the first of a family of tests."""
+    return min(1.0, tests * 2.0 ** (1 - persons))
 
 
 _SETTLED: dict[Verdict, str] = {
@@ -89,7 +96,8 @@ def verdict_lead(
     ranked = sorted(tested, key=lambda claim: _ORDER.index(claim.verdict))
     named = [t for t in ranked if t.verdict == ranked[0].verdict][:_MOST_NAMED]
     beyond = f" ({EXTRAPOLATED})" if is_extrapolated else ""
-    first = f"{_counted(ranked)}{beyond}: {'; '.join(_with_facts(t, cluster) for t in named)}."
+    facts = "; ".join(_with_facts(t, cluster, len(tested)) for t in named)
+    first = f"{_counted(ranked)}{beyond}: {facts}."
     rest = Counter(t.verdict for t in ranked)
     del rest[ranked[0].verdict]
     clauses = [f"{n} of the others {_SETTLED[verdict]}" for verdict, n in rest.items()]
@@ -117,7 +125,7 @@ def _inside(text: str) -> str:
     return clause[:1].lower() + clause[1:] if clause[1:2].islower() else clause
 
 
-def _with_facts(tested: Tested, cluster: str) -> str:
+def _with_facts(tested: Tested, cluster: str, tests: int) -> str:
     """`Waiting costs (4.0 s, 95 % interval 3.0 to 5.0 s, claimed above 2.0 s)`."""
     text = _OPENINGS[tested.verdict] + _inside(tested.hypothesis.text or _claim(tested))
     if tested.difference is None:
@@ -127,7 +135,7 @@ def _with_facts(tested: Tested, cluster: str) -> str:
         f"{signed(found.mean, unit)}",
         f"95 % interval {number(found.low)} to {quantity(found.high, unit)}",
         f"claimed {bound_of(tested)}",
-        _few(tested, cluster),
+        _few(tested, cluster, tests),
     ]
     return f"{text} ({', '.join(filter(None, facts))})"
 
@@ -135,6 +143,8 @@ def _with_facts(tested: Tested, cluster: str) -> str:
 def comparison_table(found: Judgement, cluster: str = "person") -> CellTable:
     """Each comparison at each level it runs over."""
     compared = found.compared
+    families = Counter(c.contrast.family for c in compared)
+    families.update(t.contrast.family for t in found.tested)
     heads = ["comparison", "difference in", "at", "first minus second (95 % interval)"]
     heads += ["in standard deviations", "correlation of pairs", "p", "p by Holm", "apart?"]
     rows = [
@@ -147,17 +157,17 @@ def comparison_table(found: Judgement, cluster: str = "person") -> CellTable:
             number(c.correlation),
             _p(c.p),
             _p(c.adjusted),
-            _apart(c, cluster),
+            _apart(c, cluster, families[c.contrast.family]),
         ]
         for c in compared
     ]
-    families = Counter(c.contrast.family for c in compared)
-    families.update(t.contrast.family for t in found.tested)
     persons = max((c.difference.n_persons for c in compared if c.difference), default=0)
-    least = 2.0 ** (1 - persons) if persons else 0.0  # whatever the runs
+    tests = max((families[c.contrast.family] for c in compared), default=1)
+    least = _least_p(persons, tests) if persons else 0.0  # whatever the runs
     counts = "; ".join(f"{name}: {count}" for name, count in families.items())
     least_p = f"{least:.2g}" if least > 1 - LEVEL else ""
-    text = note("comparisons", families=counts, persons=persons, least_p=least_p)
+    needed = math.ceil(math.log2(2 * tests / (1 - LEVEL)))
+    text = note("comparisons", families=counts, persons=persons, least_p=least_p, needed=needed)
     return CellTable("", heads, len(heads), rows, note=text)
 
 
@@ -214,11 +224,11 @@ def _p(value: float) -> str:
     return f"< {_LEAST_P:g}" if value < _LEAST_P else f"{value:.3f}"
 
 
-def _apart(compared: Compared, cluster: str) -> str:
+def _apart(compared: Compared, cluster: str, tests: int) -> str:
     found = compared.difference
     if not math.isfinite(compared.adjusted) or found is None:
         return "–"
     if compared.adjusted <= 1 - LEVEL:
         return "✓ yes"
-    is_few = _are_few(found, compared.contrast.smallest)
+    is_few = _are_few(found, compared.contrast.smallest, tests)
     return f"? {too_few(found.n_persons, cluster)}" if is_few else "? not shown"

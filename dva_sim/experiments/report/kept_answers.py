@@ -102,6 +102,9 @@ def answer_in(folder: Path) -> tuple[KeptAnswer, dict[str, Any]]:
         raise ConfigError(f"{folder}: safety rules were broken in {reading.broken}")
     if manifest.get("set"):
         raise ConfigError(f"{folder}: was run with --set {' '.join(manifest['set'])}")
+    usual = manifest["usual"]
+    if any(study.get(key) != usual.get(key) for key in ("persons", "replications", "factors")):
+        raise ConfigError(f"{folder}: was run in another size than that of its study's file")
     machine = json.loads((folder / "machine.json").read_text(encoding="utf-8"))
     versions, finding = manifest["versions"], reading.finding
     if versions.get("dirty"):

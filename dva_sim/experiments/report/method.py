@@ -64,7 +64,8 @@ def _why_so_many(reading: Reading) -> str:
         )
     if why == "budget":
         return f" (stopped {batches}: the time limit was reached, so it cannot be reproduced)"
-    return f" (all {stopped.get('of')} batches, the most that was allowed)"
+    asked = "; not every interval became as narrow as was asked" if why == "limit" else ""
+    return f" (all {stopped.get('of')} batches, the most that was allowed{asked})"
 
 
 def _is_task(reading: Reading) -> bool:

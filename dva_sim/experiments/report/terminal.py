@@ -20,7 +20,11 @@ from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.results.results import Results, plain
 
 _GAP = 2  # between columns
-_ENDS = {"enough": "its interval is narrow enough", "budget": "its time is spent"}
+_ENDS = {
+    "enough": "its interval is narrow enough",
+    "budget": "its time is spent",
+    "limit": "no more were allowed, and its interval is wider than was asked",
+}
 
 
 def show(

@@ -113,6 +113,38 @@ def test_the_table_says_what_never_arrives_and_what_rests_on_an_assumption():
     assert far[-1] == "nobody was watched"
 
 
+def few_links():
+    factors = STUDY["factors"] | {"link": ["far", "narrow"]}
+    losses = {key: value for key, value in LOSSES.items() if key[0] != "near"}
+    return read(STUDY | {"factors": factors}, losses)
+
+
+def test_where_choices_are_more_than_links_each_is_a_row():
+    assert not read().is_tall
+    found = few_links()
+    table = choice_table(found, "drive")
+    assert table.heads == ["messaging", "far", "narrow", "worst of these"]
+    rows = {row[0]: row[1:] for row in table.rows}
+    assert rows["tell"] == ["=", "never done", "never done"]
+    assert rows["ask"][1] == "="
+    assert rows["ask"][0].partition(" to ")[2] == rows["ask"][2]
+    assert rows["by assumption"] == ["nobody was watched", "", ""]
+
+
+def test_a_sentence_names_no_more_choices_than_can_be_read():
+    losses = {
+        (link, f"way {n}"): (50.0 + 10.0 * (n if link == "far" else 9 - n),) * 2
+        for link in ("far", "narrow")
+        for n in range(9)
+    }
+    ways = [f"way {n}" for n in range(9)]
+    factors = STUDY["factors"] | {"link": ["far", "narrow"], "messaging": ways}
+    answer = STUDY["answer"] | {"contrast": ways[:2]}
+    lead = lead_of(read(STUDY | {"factors": factors, "answer": answer}, losses))
+    assert lead.count("way ") == 6  # the best and five others
+    assert "the 3 others by no less" in lead
+
+
 def test_without_a_run_in_each_cell_there_is_no_map_yet():
     some = {key: value for key, value in LOSSES.items() if key != ("far", "pace")}
     assert read(losses=some) is None
@@ -176,3 +208,17 @@ def test_beside_the_regret_stand_the_loss_itself_and_what_drives_are_like():
     rows = {tuple(row[:2]): row[2:] for row in beside_table(found, "drive").rows}
     assert rows["far", "tell"][1:] == ["2.5", "0.0 to 25", "100"]
     assert len(rows) == len(LINKS) * len(CHOICES)
+
+
+def test_what_too_few_persons_leave_open_is_neither_equal_nor_free():
+    rng = np.random.default_rng(4)
+    found = read(persons=2)
+    wide = replace(
+        found, is_clear=np.zeros_like(found.is_clear), is_same=rng.random(found.is_same.shape) < 0
+    )
+    assert "too small to tell" in lead_of(wide)
+    table = choice_table(wide, "drive")
+    far = next(row for row in table.rows if row[0].startswith("far"))
+    assert far[table.heads.index("ask")].endswith(" ?")
+    assert far[1] == "nothing is shown to differ"
+    assert wide.overall.max() > 500.0

@@ -110,3 +110,17 @@ def test_where_tuning_chose_the_value_there_was_nothing_is_judged():
     (found,) = judge_all(study, view)
     assert found.verdict == "not judged"
     assert found.found.startswith("the same runs")
+
+
+@pytest.mark.parametrize(
+    ("expected", "high", "verdict"),
+    [
+        ((0.0, 0.15), 0.02, "held"),
+        ((1.0, 2.0), 0.02, "did not hold"),
+        ((0.0, 0.15), -0.01, "did not hold"),
+    ],
+)
+def test_a_small_effect_that_was_expected_is_not_refuted_by_being_small(expected, high, verdict):
+    found = Interval(mean=high - 0.01, low=high - 0.02, high=high, n_persons=12)
+    judged = verdict_of("above", expected, 1.0, found)
+    assert (judged if judged != "open" else "held") == verdict

@@ -20,7 +20,7 @@ EFFECTS = {
 OWN = {"operator": {"strategy": "pursuit"}}
 
 
-def read(effects, effect_s=12.0, rows=None, scenario=OWN):
+def read(effects, effect_s=20.0, rows=None, scenario=OWN):
     runs = synthetic_results.columns(synthetic_results.drive_rows(8, 2, effect_s, missed=0.0))
     study = synthetic_results.manifest(8, 2)["study"] | synthetic_results.CLAIMS
     view = view_of(study, runs)
@@ -37,17 +37,31 @@ def test_shares_count_the_repeats_with_known_signs():
 
 
 def test_signs_are_compared_with_the_studys_own():
-    _, found = read(EFFECTS, effect_s=-30.0)
+    _, found = read(EFFECTS | {("pursuit", 0): -30.0}, effect_s=-30.0)
     (stop,) = found.stops
     assert (stop.same_sign, stop.clear, stop.relevant, stop.negligible) == (1, 1, 1, 1)
 
 
 def test_each_repeat_has_its_effect_and_an_interval_around_it():
     _, found = read(EFFECTS)
-    for repeat in found.stops[0].repeats:
+    (stop,) = found.stops
+    assert stop.moved == pytest.approx(stop.found - 20.15)  # persons 0 to 3 add 0.1 s each
+    for repeat in stop.repeats:
         effect = EFFECTS[repeat.strategy, repeat.parameters]
-        assert repeat.mean == pytest.approx(effect + 0.15)  # persons 0 to 3 add 0.1 s each
+        assert repeat.mean == pytest.approx(effect + 0.15 + stop.moved)
         assert repeat.low < repeat.mean < repeat.high
+
+
+def test_only_what_a_model_changes_is_counted_and_not_which_persons_repeated_it():
+    _, near = read(EFFECTS)
+    _, far = read(EFFECTS, effect_s=120.0)
+    for before, after in zip(near.stops[0].repeats, far.stops[0].repeats, strict=True):
+        assert after.mean - before.mean == pytest.approx(100.0)
+
+
+def test_without_a_repeat_of_the_studys_own_model_nothing_is_moved():
+    _, found = read(EFFECTS, scenario={"operator": {"strategy": "two_point"}})
+    assert found.stops[0].moved == 0.0
 
 
 def test_a_repeat_without_a_pair_is_left_out():
@@ -58,7 +72,7 @@ def test_a_repeat_without_a_pair_is_left_out():
 
 
 def test_the_studys_own_model_is_no_evidence_for_itself():
-    for own, counted in (("pursuit", 2), ("adaptive", 2), ("two_point", 3)):
+    for own, counted in (("pursuit", 2), ("adaptive", 3), ("two_point", 3)):
         _, found = read(EFFECTS, scenario={"operator": {"strategy": own}})
         (stop,) = found.stops
         assert stop.same_sign == counted
@@ -92,7 +106,7 @@ def test_the_sentences_give_shares_and_reach():
     _, found = read(EFFECTS)
     what, text = (s.replace("\N{NO-BREAK SPACE}", " ") for s in sentences(found))
     assert unnamed(what, "4 persons", "2 trials") == []
-    signs = ("delay 1 s the sign holds in 2 of 3 (67 %)", "in 2 of them", "−3.8 to 5.1 s")
+    signs = ("delay 1 s the sign holds in 2 of 3 (67 %)", "in 2 of them", "−4.4 to 4.6 s")
     sizes = ("in 1 of 3 (33 %) the effect exceeds", "in 1 it is below", "adaptive (1 of 2)")
     assert unnamed(text, *signs, *sizes) == []
 

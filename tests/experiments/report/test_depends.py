@@ -39,9 +39,11 @@ def test_who_chooses_to_move_and_wait_did_so_for_a_share_of_the_time(tmp_path):
 
 
 def test_other_models_of_persons_say_how_far_the_effect_reaches(tmp_path):
-    effects = {("pursuit", 0): 20, ("pursuit", 1): 5, ("adaptive", 0): 1, ("adaptive", 1): -4}
+    effects = {("pursuit", 0): 5, ("pursuit", 1): 1, ("adaptive", 0): 20, ("adaptive", 1): -4}
     claims = {"robustness": synthetic_results.CLAIMS["robustness"]}
-    found = reading(tmp_path, study=claims, robustness=synthetic_results.repeat_rows(effects))
+    rows = synthetic_results.drive_rows(6, 2, effect_s=20.0, missed=0.0)
+    repeats = synthetic_results.repeat_rows(effects)
+    found = reading(tmp_path, rows, study=claims, robustness=repeats)
     persons = texts(found.answer.depends)["Persons"]
     assert unnamed(persons, "2 of 3", "difference at 1 s") == []
 
@@ -63,7 +65,7 @@ def test_the_assumed_numbers_are_counted_and_the_screening_of_the_main_study_is_
     effects = "key,size,mean_low,mean_high\na.b,51.6,-9,70\nc.d,{0}\nphone.warming_k,0,0,0\n"
     kept.write_text(effects.format("22,-30,-14"))
     text = texts(reading(tmp_path / "one").answer.depends)["Assumptions"]
-    assert unnamed(text, str(len(all_assumptions())), MAIN, " c.d moved") == []
+    assert unnamed(text, str(len(all_assumptions())), MAIN, " c.d is clear of chance") == []
     assert "a.b" not in text
     kept.write_text(effects.format("22,-30,14"))
     text = texts(reading(tmp_path / "none").answer.depends)["Assumptions"]

@@ -8,9 +8,9 @@ import numpy as np
 
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.choice_table import (
-    NEVER,
+    WORST,
     facts_of,
-    regret_number,
+    overall_text,
     regret_text,
     situation_name,
 )
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from dva_sim.experiments.report.summary import Reading
 
 _ROW = 0.36  # height of a situation [in]
+_ACROSS = 100  # characters that the heads of all columns hold side by side
 _FAINT, _STRONG = 0.12, 0.85  # how much colour the least and the greatest regret have
 _DECADES = 2.0  # from the least coloured regret to the full colour
 
@@ -42,20 +43,21 @@ class ChoiceMapFigure(style.ReportFigure):
         return super().applies(view, reading) and reading.map is not None
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
-        """Draw a row for each situation and a column for each choice."""
+        """Draw a row for each situation and a column for each choice, or the other way round."""
         found = reading.map
         if found is None:
             return None
-        rows = len(found.given.levels)
-        figure, ((ax,),) = style.panels(1, 1, 1.2 + _ROW * (rows + 1))
-        _paint(ax, found)
         choices = [level_name(found.choice.name, x, short=True) for x in found.choice.levels]
-        ax.set_xticks(range(len(choices)), [style.wrapped(name, 14) for name in choices])
+        situations = [*(situation_name(found, g) for g in range(len(found.given.levels))), WORST]
+        across, down = (situations, choices) if found.is_tall else (choices, situations)
+        figure, ((ax,),) = style.panels(1, 1, 1.2 + _ROW * len(down))
+        _paint(ax, found)
+        width = min(14, _ACROSS // len(across))
+        ax.set_xticks(range(len(across)), [style.wrapped(name, width) for name in across])
         ax.xaxis.tick_top()
-        situations = [situation_name(found, g) for g in range(rows)]
-        ax.set_yticks(range(rows + 1), [*situations, "worst of these"])
-        ax.set_xlim(-0.5, len(choices) - 0.5)
-        ax.set_ylim(rows + 0.6, -0.5)
+        ax.set_yticks(range(len(down)), down)
+        ax.set_xlim(-0.5, len(across) - 0.5)
+        ax.set_ylim(len(down) - 0.4, -0.5)
         ax.grid(False)
         ax.tick_params(length=0)
         unit = f" [{found.unit}]" if found.unit else ""
@@ -68,23 +70,31 @@ class ChoiceMapFigure(style.ReportFigure):
 
 
 def _paint(ax: Axes, found: ChoiceMap) -> None:
-    rows = len(found.given.levels)
+    last = len(found.given.levels)
     for (g, c), worst in np.ndenumerate(found.worst):
-        is_best = not found.is_worse[g, c]
-        _cell(ax, c, g, _shade(found, float(worst), is_best), regret_text(found, g, c), is_best)
-    ax.axhline(rows - 0.5, color=SOFT, linewidth=0.8)
+        is_best = bool(found.is_best[g, c])
+        shade = _shade(found, float(worst), is_plain=not found.is_worse[g, c])
+        _cell(ax, _place(found, g, c), shade, regret_text(found, g, c), is_best)
+    border = ax.axvline if found.is_tall else ax.axhline
+    border(last - 0.5, color=SOFT, linewidth=0.8)
     for c, worst in enumerate(found.overall):
-        text = _overall_text(found, c)
         is_best = found.choice.levels[c] == found.advised
-        _cell(ax, c, rows, _shade(found, float(worst), is_best=False), text, is_best)
+        shade = _shade(found, float(worst), is_plain=False)
+        _cell(ax, _place(found, last, c), shade, overall_text(found, c), is_best)
 
 
-def _cell(ax: Axes, x: int, y: int, shade: float, text: str, is_best: bool) -> None:
+def _place(found: ChoiceMap, situation: int, choice: int) -> tuple[int, int]:
+    """Column and row of a cell."""
+    return (situation, choice) if found.is_tall else (choice, situation)
+
+
+def _cell(ax: Axes, place: tuple[int, int], shade: float, text: str, is_best: bool) -> None:
     from matplotlib.patches import Rectangle
 
-    place = (x - 0.47, y - 0.44)
+    x, y = place
+    corner = (x - 0.47, y - 0.44)
     colour = ONE.colour
-    ax.add_patch(Rectangle(place, 0.94, 0.88, facecolor=colour, alpha=shade, edgecolor="none"))
+    ax.add_patch(Rectangle(corner, 0.94, 0.88, facecolor=colour, alpha=shade, edgecolor="none"))
     ax.text(
         x,
         y,
@@ -97,20 +107,13 @@ def _cell(ax: Axes, x: int, y: int, shade: float, text: str, is_best: bool) -> N
     )
 
 
-def _shade(found: ChoiceMap, worst: float, is_best: bool) -> float:
-    """Strength of the colour, by the logarithm of the regret; none for the best."""
+def _shade(found: ChoiceMap, worst: float, is_plain: bool) -> float:
+    """Strength of the colour, by the logarithm of the regret; none where none was shown."""
     least = max(found.smallest, 1e-9)
-    if is_best or worst <= least:
+    if is_plain or worst <= least:
         return 0.0
     share = min(1.0, np.log10(worst / least) / _DECADES)
     return float(_FAINT + (_STRONG - _FAINT) * share)
-
-
-def _overall_text(found: ChoiceMap, choice: int) -> str:
-    worst = float(found.overall[choice])
-    if found.never[int(np.argmax(found.clear_worst[:, choice])), choice]:
-        return NEVER
-    return regret_number(worst)
 
 
 def _numbers(found: ChoiceMap) -> Numbers:
