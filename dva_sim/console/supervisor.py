@@ -183,6 +183,7 @@ class ConsoleSupervisor:
         port = open_port(options.host, options.rosbridge, "--rosbridge", options.token)
         stage = world.run.stage
         gateway = RosGateway(stage, lambda: world.console)
+        gateway.camera_base = str(self._processes.serving["base"])
         gateway.camera_token = self._look_token
         self._say(f"rosbridge: {port.url}")
         return RosbridgeServer(

@@ -209,7 +209,8 @@ class RosGateway:
         on_frame: Callback for news of a robot: the robot, an observation, and its capture time [s].
         on_scan: Callback for the robot, and ranges [m].
         on_picture: Callback for the robot, a JPEG, and its capture time [s].
-        camera_token: Shown to servers of pictures; empty: none.
+        camera_base: URL below which pictures are of this console itself; empty: none are.
+        camera_token: Shown to the server there, and to no other; empty: none.
     """
 
     def __init__(self, stage: Stage, console: Callable[[], Console] | None = None) -> None:
@@ -224,7 +225,7 @@ class RosGateway:
         self.on_frame: Callable[[KnownRobot, CameraFrame], object] = lambda *_: None
         self.on_scan: Callable[[KnownRobot, tuple[float, ...]], object] = lambda *_: None
         self.on_picture: Callable[[KnownRobot, bytes, float], object] = lambda *_: None
-        self.camera_token = ""
+        self.camera_base, self.camera_token = "", ""
         self._free.append(self._new_driver())
         self.device.register(self._look_around)
 
@@ -288,7 +289,9 @@ class RosGateway:
                 take = partial(self._on_jpeg, robot)
                 url = reply.content.camera_url
                 assert isinstance(self.clock, LiveClock)
-                robot.pictures = MjpegReader(self.clock, url, self.camera_token, take)
+                is_own = bool(self.camera_base) and url.startswith(self.camera_base)
+                token = self.camera_token if is_own else ""
+                robot.pictures = MjpegReader(self.clock, url, token, take, is_trusted=is_own)
 
         def unanswered() -> None:
             robot.is_asked = False

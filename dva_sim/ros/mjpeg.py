@@ -28,6 +28,8 @@ class MjpegReader:
         url: `http://HOST:PORT/PATH`.
         token: Shown to the server; empty: none.
         take: Callback for each picture, and its capture time [s]; None: not said.
+        is_trusted: True if the host may have a name. Others may not: looking a name up would block
+            the thread, which carries emergencies, too.
     """
 
     def __init__(
@@ -36,9 +38,10 @@ class MjpegReader:
         url: str,
         token: str,
         take: Callable[[bytes, float | None], object],
+        is_trusted: bool = False,
     ) -> None:
         self._clock, self._token, self._take = clock, token, take
-        self._host, self._port, self._path = _place_of(url)
+        self._host, self._port, self._path = _place_of(url, is_trusted)
         self._sock: socket.socket | None = None
         self._dialling: Dialling | None = None
         self._data, self._is_over = bytearray(), False
@@ -109,15 +112,13 @@ class MjpegReader:
         self._end()
 
 
-def _place_of(url: str) -> tuple[str, int, str]:
-    """Return host, port and path of a stream; no host where a robot says what cannot be one.
-
-    A host is an address: looking a name up would block the thread that carries emergencies.
-    """
+def _place_of(url: str, may_have_name: bool) -> tuple[str, int, str]:
+    """Return host, port and path of a stream; no host where a robot says what cannot be one."""
     try:
         parts = urlsplit(url)
         host, port = parts.hostname or "", parts.port or 80
-        ipaddress.ip_address(host)
+        if not may_have_name:
+            ipaddress.ip_address(host)
     except ValueError:
         return "", 0, ""
     return (host, port, parts.path) if parts.scheme == "http" else ("", 0, "")
