@@ -21,7 +21,7 @@ from helpers.paths import ROOT
 from helpers.processes.other_version import end_with_signals, output, version
 
 import dva_sim
-from dva_sim.experiments.execution.sampled_runs import digest_of_run, sampled_jobs
+from dva_sim.experiments.execution.sampled_runs import run_sampled, sampled_jobs
 from dva_sim.experiments.study.loading import load_study
 
 RECORDED = ("drive-to-event", "fire-drill")
@@ -30,7 +30,7 @@ RECORDED = ("drive-to-event", "fire-drill")
 def line_of_run(name, index, job):
     """One line: which run, its configuration and seed, and the hash of all rows of its tables."""
     where = f"{name} {job.part} {index}: config {job.config}, seed {job.seed}"
-    return f"{where}, tables {digest_of_run(job)}"
+    return f"{where}, tables {run_sampled(job).digest}"
 
 
 def digest_of_recording(name):

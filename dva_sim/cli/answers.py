@@ -15,6 +15,7 @@ from dva_sim.kernel.suggestions import hint
 from dva_sim.kernel.wording import first_and_rest
 
 if TYPE_CHECKING:
+    from dva_sim.experiments.execution.sampled_runs import SampledRuns
     from dva_sim.experiments.report.kept_answers import KeptAnswer
 
 
@@ -54,7 +55,9 @@ def _keep(results: Path, folder: Path, jobs: int | None) -> None:
 
     answer, manifest = kept_answers.answer_in(results)
     sampled = _sampled([answer.study], jobs)[answer.study]
-    print(f"Kept in {kept_answers.keep(replace(answer, sampled=sampled), manifest, folder)}")
+    kept_answers.refuse_other_runs(results, sampled)
+    digests = {key: run.digest for key, run in sampled.items()}
+    print(f"Kept in {kept_answers.keep(replace(answer, sampled=digests), manifest, folder)}")
 
 
 def _compare(folder: Path, studies: list[str], mark: bool, jobs: int | None) -> ExitCode:
@@ -68,7 +71,8 @@ def _compare(folder: Path, studies: list[str], mark: bool, jobs: int | None) -> 
     now = _sampled([answer.study for answer in kept if answer.sampled], jobs)
     code = ExitCode.OK
     for answer in kept:
-        lines, is_stale = _described(answer, now.get(answer.study, {}))
+        runs = now.get(answer.study, {})
+        lines, is_stale = _described(answer, {key: run.digest for key, run in runs.items()})
         print(f"{answer.study}: {lines}. {first_and_rest(answer.answer)[0]}")
         if is_stale and not answer.stale_since:
             if mark:
@@ -96,9 +100,9 @@ def _mark(answer: KeptAnswer, folder: Path) -> None:
     kept_answers.mark_stale(answer, __version__, folder)
 
 
-def _sampled(names: list[str], jobs: int | None) -> dict[str, dict[str, str]]:
+def _sampled(names: list[str], jobs: int | None) -> dict[str, SampledRuns]:
     from dva_sim.experiments.execution.executors import cores  # late: start-up
-    from dva_sim.experiments.execution.sampled_runs import sampled_digests  # late: start-up
+    from dva_sim.experiments.execution.sampled_runs import sampled_runs  # late: start-up
     from dva_sim.experiments.study.file_kinds import open_study  # late: start-up
 
-    return dict(sampled_digests({name: open_study(name) for name in names}, jobs or cores()))
+    return dict(sampled_runs({name: open_study(name) for name in names}, jobs or cores()))

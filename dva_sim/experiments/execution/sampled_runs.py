@@ -10,6 +10,7 @@ import json
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
+from typing import Any, NamedTuple
 
 from dva_sim.experiments.execution.scheduling import run_job
 from dva_sim.experiments.study.cell_grid import StudyJob, cells, jobs
@@ -34,14 +35,31 @@ def sampled_jobs(study: Study) -> Iterator[tuple[int, StudyJob]]:
             yield index, of_part[index]
 
 
-def digest_of_run(job: StudyJob) -> str:
-    """Run one, and digest the rows of its tables."""
-    rows = json.dumps(run_job(job), sort_keys=True, default=str).encode()
-    return hashlib.sha256(rows).hexdigest()
+class SampledRun(NamedTuple):
+    """One of the few runs.
+
+    Attributes:
+        digest: SHA-256 of all rows of its tables.
+        row: Its row of the table `runs`.
+    """
+
+    digest: str
+    row: Mapping[str, Any]
 
 
-def sampled_digests(studies: Mapping[str, Study], processes: int) -> Iterator[tuple[str, Digests]]:
-    """The digests of some studies by their names, in the order given, as they come.
+SampledRuns = dict[str, SampledRun]
+"""Runs by `PART/INDEX/CONFIG/SEED`."""
+
+
+def run_sampled(job: StudyJob) -> SampledRun:
+    """Run one of the few."""
+    tables = run_job(job)
+    rows = json.dumps(tables, sort_keys=True, default=str).encode()
+    return SampledRun(hashlib.sha256(rows).hexdigest(), next(iter(tables["runs"]), {}))
+
+
+def sampled_runs(studies: Mapping[str, Study], processes: int) -> Iterator[tuple[str, SampledRuns]]:
+    """The few runs of some studies by their names, in the order given, as they come.
 
     Args:
         studies: The studies.
@@ -50,7 +68,7 @@ def sampled_digests(studies: Mapping[str, Study], processes: int) -> Iterator[tu
     with ProcessPoolExecutor(processes, mp_context=get_context("forkserver")) as pool:
         asked = {
             name: [
-                (f"{job.part}/{index}/{job.config}/{job.seed}", pool.submit(digest_of_run, job))
+                (f"{job.part}/{index}/{job.config}/{job.seed}", pool.submit(run_sampled, job))
                 for index, job in sampled_jobs(study)
             ]
             for name, study in studies.items()

@@ -17,9 +17,10 @@ from typing import Any
 
 from dva_sim.experiments.analysis.predictions import judge_all
 from dva_sim.experiments.execution.checkpoint import load_so_far
-from dva_sim.experiments.execution.sampled_runs import Digests
+from dva_sim.experiments.execution.sampled_runs import Digests, SampledRuns
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.manifest import status_of
+from dva_sim.experiments.study.parts import REPEATS
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.whole_files import write_whole
 
@@ -130,6 +131,36 @@ def answer_in(folder: Path) -> tuple[KeptAnswer, dict[str, Any]]:
         tables=dict(manifest["tables"]),
     )
     return kept, manifest
+
+
+def refuse_other_runs(folder: Path, sampled: SampledRuns) -> None:
+    """See that the runs of a results folder are those that this program gives.
+
+    Raises:
+        ConfigError: the study's file has changed since, or what simulates has.
+    """
+    runs = load_so_far(folder).runs
+    places = {key: n for n, key in enumerate(zip(runs["config"], runs["seed"], strict=True))}
+    for key, run in sampled.items():
+        part, index, config, seed = key.rsplit("/", 3)
+        place = places.get((config, int(seed)))
+        if place is None:
+            if part == REPEATS:
+                continue
+            raise ConfigError(
+                f"{folder}: has no run of configuration {index} of {part} as it is now"
+            )
+        other = [c for c, value in run.row.items() if not _is_equal(runs[c][place], value)]
+        if other:
+            where = f"{other[0]} of configuration {index} of {part}"
+            raise ConfigError(f"{folder}: this program gives another {where}; run the study again")
+
+
+def _is_equal(kept: Any, value: Any) -> bool:
+    """Compare a cell of a table with what it was written from; what is missing there is nan."""
+    if value is None or value != value:
+        return kept is None or kept != kept
+    return bool(kept == value)
 
 
 def _rows(reading: Reading) -> tuple[AnswerRow, ...]:

@@ -10,6 +10,7 @@ from helpers.wording import unnamed
 
 from dva_sim.cli import answers as command
 from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.execution.sampled_runs import SampledRun, sampled_jobs
 from dva_sim.experiments.report import kept_answers
 from dva_sim.kernel.errors import ConfigError, ExitCode
 from dva_sim.kernel.wording import first_and_rest
@@ -84,7 +85,8 @@ def test_whether_an_answer_is_still_given_is_told_by_its_runs(kept, sampled, now
 def test_an_answer_that_is_no_longer_given_fails_the_gate_until_it_is_marked(kept, monkeypatch):
     answer, manifest, folder = kept
     kept_answers.keep(replace(answer, sampled={"drive/0": "1"}), manifest, folder)
-    monkeypatch.setattr(command, "_sampled", lambda names, jobs: {answer.study: {"drive/0": "2"}})
+    changed = {answer.study: {"drive/0": SampledRun("2", {})}}
+    monkeypatch.setattr(command, "_sampled", lambda names, jobs: changed)
     assert command._compare(folder, [], False, 1) == ExitCode.GATE_FAILED
     assert command._compare(folder, [], True, 1) == ExitCode.OK
     assert command._compare(folder, [], False, 1) == ExitCode.OK
@@ -127,3 +129,27 @@ def test_a_file_that_is_no_answer_is_named(tmp_path):
         file.write_text(text)
         with pytest.raises(ConfigError, match=r"x\.json"):
             kept_answers.read(file)
+
+
+def test_results_in_another_size_than_the_file_has_are_not_kept(tmp_path):
+    folder = finished(tmp_path / "r")
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["usual"]["persons"] = 4
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(ConfigError, match="another size"):
+        kept_answers.answer_in(folder)
+
+
+def test_results_of_a_program_that_gave_other_runs_are_not_kept(tmp_path):
+    folder = finished(tmp_path / "r")
+    jobs = list(sampled_jobs(study_in(tmp_path)))
+    key = "{0.part}/{1}/{0.config}/{0.seed}".format
+    rows = {key(job, n): SampledRun("", cheap(job)["runs"][0]) for n, job in jobs}
+    kept_answers.refuse_other_runs(folder, rows)
+    name, run = next(iter(rows.items()))
+    slower = {"drive_time_s": run.row["drive_time_s"] + 1.0}
+    with pytest.raises(ConfigError, match="another drive_time_s"):
+        kept_answers.refuse_other_runs(folder, {name: SampledRun("", slower)})
+    part, index, _, seed = name.rsplit("/", 3)
+    with pytest.raises(ConfigError, match="as it is now"):
+        kept_answers.refuse_other_runs(folder, {f"{part}/{index}/other/{seed}": run})
