@@ -33,6 +33,9 @@ class Clock:
         """Run `action(*args)` at `time` [s]; a time already past means as soon as possible."""
         self._put(round(time * US), action, args)
 
+    def on_suspended(self, handler: Callable[[float], object]) -> None:
+        """Call `handler` with how long the machine was suspended [s]; virtual time never is."""
+
     def call_after(self, delay: float, action: Callable[..., object], *args: Any) -> None:
         """Run `action(*args)` after `delay` [s]."""
         self._put(round((self.now + delay) * US), action, args)

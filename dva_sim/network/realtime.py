@@ -17,6 +17,7 @@ from typing_extensions import override
 
 from dva_sim.kernel.clock import US, Clock
 
+HEEDED_SLEEP: Final = 1.0  # of a machine that was suspended [s]
 AT_ONCE = 500  # events that are late, before messages have their turn
 LONGEST_WAIT = 60.0  # of one poll [s]
 
@@ -32,6 +33,11 @@ def has_more(socket: Socket) -> bool:
     To try in vain costs ten times as much, and the option `EVENTS` three times.
     """
     return bool(zmq.zmq_poll([(socket, POLLIN)], 0))
+
+
+def slept() -> float:
+    """Return for how long this machine has been suspended since it was started [s]."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME) - time.clock_gettime(time.CLOCK_MONOTONIC)
 
 
 class Poller:
@@ -120,6 +126,7 @@ class LiveClock(Clock):
         self._poller = Poller()
         self._handlers: dict[Any, Callable[[], object]] = {}
         self._running = False
+        self._slept, self._on_suspended = slept(), list[Callable[[float], object]]()
         self.lateness = 0.0
         self._catch_up(math.inf)
 
@@ -128,6 +135,21 @@ class LiveClock(Clock):
         if source not in self._handlers:
             self._poller.register(source)
         self._handlers[source] = handler
+
+    @override
+    def on_suspended(self, handler: Callable[[float], object]) -> None:
+        self._on_suspended.append(handler)
+
+    def _look_for_sleep(self) -> None:
+        """Tell of a sleep before anything is read that came, or waited, meanwhile.
+
+        This clock stood still like all others, so that what is old would count as new.
+        """
+        gap = slept() - self._slept
+        if gap >= HEEDED_SLEEP:
+            self._slept += gap
+            for handler in self._on_suspended:
+                handler(gap)
 
     def unwatch(self, source: Any) -> None:
         """Look at it no more."""
@@ -167,6 +189,7 @@ class LiveClock(Clock):
         wait = (due - self._real()) / US
         wait = 0.0 if wait < 0.0 else wait if wait < LONGEST_WAIT else LONGEST_WAIT
         ready = self._poller.poll(wait)
+        self._look_for_sleep()
         self._catch_up(end)
         for source in ready:
             handler = self._handlers.get(source)
@@ -273,6 +296,7 @@ class PacedClock(LiveClock):
         if self._pulses:
             wait = min(wait, min(pulse.due for pulse in self._pulses) - time.monotonic())
         ready = self._poller.poll(max(0.0, min(LONGEST_WAIT, wait)))
+        self._look_for_sleep()
         self._catch_up(end)
         for pulse in self._pulses:
             pulse.beat(time.monotonic())

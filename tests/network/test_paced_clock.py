@@ -6,7 +6,8 @@ from itertools import pairwise
 
 import pytest
 
-from dva_sim.network.realtime import MOST_BEHIND, PacedClock
+from dva_sim.network import realtime
+from dva_sim.network.realtime import MOST_BEHIND, LiveClock, PacedClock
 
 pytestmark = pytest.mark.system
 
@@ -131,3 +132,20 @@ def test_who_has_nothing_to_do_takes_no_processor():
     begun = time.process_time()
     clock.run()
     assert time.process_time() - begun < 0.1
+
+
+@pytest.mark.parametrize("kind", [LiveClock, PacedClock])
+def test_that_the_machine_was_suspended_is_told_once_before_anything_is_read(kind, monkeypatch):
+    seen, asleep, (ours, theirs) = [], [0.0], os.pipe()
+    monkeypatch.setattr(realtime, "slept", lambda: asleep[0])
+    clock = kind()
+    clock.on_suspended(lambda gap: seen.append(f"slept {gap:g} s"))
+    clock.watch(ours, lambda: seen.append(os.read(ours, 10).decode()))
+    clock.run(clock.now + 0.01)
+    asleep[0] = 20.0
+    os.write(theirs, b"old")
+    clock.run(clock.now + 0.05)
+    clock.unwatch(ours)
+    os.close(ours)
+    os.close(theirs)
+    assert seen == ["slept 20 s", "old"]

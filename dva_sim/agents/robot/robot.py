@@ -47,6 +47,7 @@ LONGEST_HELD = 1e6  # [s]
 WHATEVER_WAITS = 1 << 40  # a message goes however much waits before the link [B]
 MISSION = "mission|"  # topic of how missions stand
 STATUS_PERIOD = 1.0  # [s]
+WAKES_UP = 1.0  # what arrives so soon after a sleep may have been sent before its end [s]
 EXPECTED_SPEED = 0.35  # of a teleoperated robot, by which it bids, as the DVA expects it [m/s]
 EXPECTED_READY = 4.0  # until its operator begins to drive, as the DVA expects it [s]
 STANDING = 0.02  # below this the wheels count as still [m/s, rad/s]
@@ -126,6 +127,7 @@ class RobotAgent:
     ) -> None:
         self.device, self.controller = device, controller
         device.meanwhile = "it obeys its driver as before"
+        device.clock.on_suspended(self._woke)
         self.body, self._world, self._planner, self._setup = body, world, planner, setup
         self._drive_of = drive_of
         self.applied = self.refused = 0
@@ -268,6 +270,17 @@ class RobotAgent:
         """
         self.unfit = why
         self.device.tell(f"cannot be driven: {why}", "mode")
+        self._stand()
+        self.device.withdrawn = True
+
+    def _woke(self, gap: float) -> None:
+        """Obey nothing of before a sleep, and nothing that was sent meanwhile."""
+        self.device.tell(f"stands: its computer was suspended for {gap:.0f} s", "mode")
+        self._stand()
+        self.controller.emergency_at += WAKES_UP  # until then it reads what has waited
+
+    def _stand(self) -> None:
+        """Stand idle until a new order, as after an emergency, and say so."""
         before, now = self.controller.mode, self.device.clock.now
         decision = self.controller.press_emergency(now)
         self.device.recorder.on_hand(ByHand(self.device.id_tag, "", "stops", now))
@@ -278,7 +291,6 @@ class RobotAgent:
             self.mode_changed("")
         self._publish_status()
         self._publish_holder()
-        self.device.withdrawn = True
 
     def return_to_service(self) -> None:
         """Take orders again: what made the robot unfit is over."""

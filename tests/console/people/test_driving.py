@@ -6,6 +6,8 @@ from helpers.wording import unnamed
 
 from dva_sim.agents.operator import steps
 from dva_sim.agents.robot.controller import Mode
+from dva_sim.kernel.clock import Clock
+from dva_sim.network.realtime import LiveClock
 from dva_sim.protocol import messages as m
 
 
@@ -331,3 +333,19 @@ def test_devices_that_hear_nothing_do_not_hold_up_an_emergency(driving):
     began = driving.world.clock.now
     assert driving.do("emergency", robots="all")[0]
     assert driving.world.clock.now < began + 2.0
+
+
+def test_a_robot_whose_computer_was_suspended_stands_until_a_new_order(monkeypatch):
+    handlers = []
+    for kind in (Clock, LiveClock):
+        monkeypatch.setattr(kind, "on_suspended", lambda _, handler: handlers.append(handler))
+    page = Page(monkeypatch)
+    page.sets_out(0.5, then=3.0)
+    for woke in handlers:
+        woke(20.0)
+    page.let(0.9)
+    assert page.robot().controller.mode is Mode.IDLE
+    assert page.robot().body.speed == pytest.approx(0.0, abs=1e-3)
+    page.until(lambda: page.do("start")[0])
+    page.let(2.0)
+    assert page.robot().body.speed > 0.1
