@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import inspect
 import math
@@ -90,7 +91,8 @@ class Plugins(Generic[T]):
         finish = None if factory in self.shipped.values() else self.finish
 
         def made(*given: Any) -> T:
-            one = self.make(word, factory, own, *given)
+            options_of_one = copy.deepcopy(own)  # what it does to them, the next does not see
+            one = self.make(word, factory, options_of_one, *given)
             return one if finish is None else self.ask(word, partial(finish, one))
 
         return made

@@ -18,6 +18,19 @@ from dva_sim.simulation.scenario import Scenario
 
 EXAMPLE = "acknowledged_pub_sub.py:AcknowledgedPubSub"
 
+GREEDY = """
+from dva_sim.network.patterns import Pattern
+
+
+class Greedy(Pattern):
+    def __init__(self, parts):
+        parts.pop(0)
+        self.left = parts
+
+    def offer(self, command):
+        pass
+"""
+
 
 def test_every_pattern_says_all_that_reports_and_pages_tell_of_it():
     page = (ROOT / "protocol" / "README.md").read_text(encoding="utf-8").splitlines()
@@ -102,3 +115,9 @@ def test_knowing_the_patterns_needs_neither_sockets_nor_arrays():
     code = f"import sys, dva_sim.network.patterns; print(sorted({heavy} & sys.modules.keys()))"
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ended.stdout == "[]\n"
+
+
+def test_what_a_pattern_does_to_its_options_stays_with_it(tmp_path):
+    (tmp_path / "greedy.py").write_text(GREEDY)
+    make = load_pattern("greedy.py:Greedy", {"parts": [1, 2]}, tmp_path)
+    assert [make().left, make().left] == [[2], [2]]
