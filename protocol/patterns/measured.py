@@ -4,18 +4,16 @@
     pattern_options: {file: commands.csv, where: {middleware: mqtt-0, link: outage}}
 
 The file is the table `commands` of a study with `model: middleware`:
-`dva-sim export results/middleware --table commands -o commands.csv`.
+`dva-sim export results/middleware --table commands -o commands.csv`. It may be compressed by gzip.
 """
 
-import csv
 import math
-from collections import defaultdict
+import random
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import find
+from dva_sim.network.measured_commands import measured_runs
 from dva_sim.network.patterns import Pattern
-
-_OF_RUN = "cell", "person", "trial"  # columns that tell the runs of a study apart
 
 
 class Measured(Pattern):
@@ -28,26 +26,37 @@ class Measured(Pattern):
     Args:
         file: Table of commands with the columns `made_s` and `arrived_s`, by name or path.
         where: Values of other columns, of the rows that count.
+        window_s: Part of each run whose arrivals count [s], such as `[5, 13]`; all of it if None.
+            Runs that found no connection are left out; if none found one, nothing ever arrives.
     """
 
     title, label = "measured arrivals", "measured"
     sockets, when_slow = "XPUB to SUB", "as measured"
     published = newest_wins = True
 
-    def __init__(self, file, where=None):
-        self.schedule, self.length = [], 0.0
-        for run in _runs(file, where or {}):
-            first, last = run[0][0], run[-1][0]
-            begin = self.length - first
-            self.schedule += [(made + begin, arrived + begin) for made, arrived in run]
-            self.length += (last - first) * len(run) / (len(run) - 1)
+    def __init__(self, file, where=None, window_s=None):
+        path = find(file, "experiments/traces", ".csv")
+        runs = [run for run in measured_runs(path, where or {}) if run]
+        events, self.length, are_sent = [], 0.0, False
+        for run in runs:
+            since, until = _whole(run) if window_s is None else window_s
+            begin = self.length - since
+            events += [(m + begin, a + begin) for m, a in run if since <= a < until]
+            are_sent |= any(since <= m < until for m, _ in run)
+            self.length += until - since
+        if runs and not are_sent:
+            raise ConfigError(f"no command was sent from {since} to {until} s of a run", path)
+        self.schedule = _applied(events)
         self.waiting, self.last, self.is_over = None, -1, False
 
     def begin(self, line):
-        """A drive begins: the first sending is now."""
+        """A drive begins, anywhere in what was measured: at the same place over each middleware."""
         super().begin(line)
-        self.start = line.clock.now
-        self._send(0)
+        if self.schedule:
+            place = random.Random(line.clock.now).uniform(0.0, self.length)
+            self.start = line.clock.now - place
+            first = next((n for n, (made, _) in enumerate(self.schedule) if made >= place), None)
+            self._expect(len(self.schedule) if first is None else first)
 
     def offer(self, command):
         """Keep the newest for the next sending."""
@@ -59,18 +68,20 @@ class Measured(Pattern):
         """The drive is over: what is still on its way is lost."""
         self.is_over = True
 
+    def _expect(self, number):
+        rounds, at = divmod(number, len(self.schedule))
+        due = self.start + rounds * self.length + self.schedule[at][0]
+        self.line.clock.call_at(max(due, self.line.clock.now), lambda: self._send(number))
+
     def _send(self, number):
         if self.is_over:
             return
-        rounds, at = divmod(number, len(self.schedule))
-        made, arrived = self.schedule[at]
+        made, arrived = self.schedule[number % len(self.schedule)]
         if self.waiting is not None:
             command, self.waiting = self.line.newest(self.waiting), None
             then = self.line.clock.now + arrived - made
             self.line.clock.call_at(then, lambda: self._arrive(number, command))
-        rounds, at = divmod(number + 1, len(self.schedule))
-        due = self.start + rounds * self.length + self.schedule[at][0]
-        self.line.clock.call_at(due, lambda: self._send(number + 1))
+        self._expect(number + 1)
 
     def _arrive(self, number, command):
         """Publish it, unless a newer one was there first, as where one round follows another."""
@@ -79,34 +90,17 @@ class Measured(Pattern):
             self.line.publish(command)
 
 
-def _runs(file, where):
-    """Return the pairs of times, sent and applied [s], of each run that has any two."""
-    path = find(file, "experiments/traces", ".csv")
-    with path.open(encoding="utf-8", newline="") as lines:
-        rows = list(csv.DictReader(lines))
-    missing = {"made_s", "arrived_s", *where} - set(rows[0] if rows else ())
-    if missing:
-        raise ConfigError(f"has no column {', '.join(sorted(missing))}", path)
-    runs = defaultdict(list)
-    try:
-        for row in rows:
-            if all(row[key] == str(value) for key, value in where.items()):
-                times = float(row["made_s"]), float(row["arrived_s"] or "nan")
-                runs[tuple(row.get(key) for key in _OF_RUN)].append(times)
-    except ValueError as error:
-        raise ConfigError(f"times should be numbers: {error}", path) from None
-    found = [run for run in map(_applied, runs.values()) if len(run) > 1]
-    if not found:
-        place = ", ".join(f"{key} {value}" for key, value in where.items()) or "the file"
-        raise ConfigError(f"of {place}, fewer than two commands arrived", path)
-    return found
+def _whole(run):
+    """Return when a run began, and when the next may follow it [s]."""
+    made, times = [m for m, _ in run], [t for pair in run for t in pair if math.isfinite(t)]
+    gap = (max(made) - min(made)) / (len(made) - 1) if len(made) > 1 else 0.0
+    return min(made), max(times) + gap
 
 
 def _applied(pairs):
     """Return those of the commands that a robot would apply: a newer one had not arrived."""
     newest, kept = -math.inf, []
-    arrivals = (pair for pair in pairs if math.isfinite(pair[1]))
-    for made, arrived in sorted(arrivals, key=lambda pair: pair[1]):
+    for made, arrived in sorted(pairs, key=lambda pair: pair[1]):
         if made > newest and arrived >= made:
             newest = made
             kept.append((made, arrived))

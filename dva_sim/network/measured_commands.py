@@ -1,0 +1,88 @@
+"""Commands that were measured over real middleware, from the table of a study."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import math
+import zlib
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from dva_sim.kernel.errors import ConfigError
+
+_OF_RUN: Final = "cell", "person", "trial"  # columns that tell the runs of a study apart
+
+
+class SentCommand(NamedTuple):
+    """A command of a run.
+
+    Attributes:
+        made: When it was sent [s], in the time of the run.
+        arrived: When the robot applied it [s]; nan if never.
+    """
+
+    made: float
+    arrived: float
+
+
+Run = tuple[SentCommand, ...]
+_Runs = Mapping[tuple[str, ...], list[Run]]
+
+
+def measured_runs(path: Path, where: Mapping[str, Any]) -> list[Run]:
+    """Return the commands of each run, in the order of the file; a run may have none.
+
+    Args:
+        path: CSV table with the columns `made_s` and `arrived_s`, which may be compressed by gzip.
+            A row without times stands for a run that found no connection.
+        where: Values of other columns, of the rows that count.
+
+    Raises:
+        ConfigError: no row counts, or the file is not such a table.
+    """
+    try:
+        stamp = path.stat().st_mtime_ns
+        groups = _grouped(path, stamp, tuple(where))
+    except (OSError, EOFError, UnicodeError, csv.Error, zlib.error) as error:
+        raise ConfigError(f"cannot be read as a table: {error}", path) from None
+    except ValueError as error:
+        raise ConfigError(f"times should be numbers: {error}", path) from None
+    found = groups.get(tuple(map(str, where.values())))
+    if found is None:
+        place = ", ".join(f"{key} {value}" for key, value in where.items()) or "the file"
+        raise ConfigError(f"of {place}, no command was measured", path)
+    return found
+
+
+@lru_cache(maxsize=2)
+def _grouped(path: Path, stamp: int, keys: tuple[str, ...]) -> _Runs:
+    """The runs by the values of some columns. Thousands of drives use one table: it is read once.
+
+    Args:
+        path: The table.
+        stamp: When it was changed, so that one that was written again is read again.
+        keys: Columns to group by.
+    """
+    groups: dict[tuple[str, ...], dict[tuple[str | None, ...], list[SentCommand]]] = {}
+    opened = gzip.open if path.suffix == ".gz" else open
+    with opened(path, "rt", encoding="utf-8", newline="") as lines:
+        for row in _rows(csv.reader(lines), {"made_s", "arrived_s", *keys}, path):
+            runs = groups.setdefault(tuple(row[key] for key in keys), {})
+            run = runs.setdefault(tuple(row.get(key) for key in _OF_RUN), [])
+            if row["made_s"]:
+                run.append(SentCommand(float(row["made_s"]), float(row["arrived_s"] or math.nan)))
+    return {values: [tuple(run) for run in runs.values()] for values, runs in groups.items()}
+
+
+def _rows(table: Any, needed: set[str], path: Path) -> Iterator[dict[str, str]]:
+    head = next(table, [])
+    if missing := needed - set(head):
+        raise ConfigError(f"has no column {', '.join(sorted(missing))}", path)
+    for cells in filter(None, table):
+        if len(cells) != len(head):
+            problem = f"has {len(cells)} cells in a row, for {len(head)} columns"
+            raise ConfigError(problem, path, table.line_num)
+        yield dict(zip(head, cells, strict=True))
