@@ -78,7 +78,7 @@ def _grouped(path: Path, stamp: int, keys: tuple[str, ...]) -> _Runs:
 
 
 def _rows(table: Any, needed: set[str], path: Path) -> Iterator[dict[str, str]]:
-    head = next(table, [])
+    head: list[str] = next(table, [])
     if missing := needed - set(head):
         raise ConfigError(f"has no column {', '.join(sorted(missing))}", path)
     for cells in filter(None, table):
