@@ -20,8 +20,8 @@ class SentCommand(NamedTuple):
     """A command of a run.
 
     Attributes:
-        made: When it was sent [s], in the time of the run.
-        arrived: When the robot applied it [s]; nan if never.
+        made: Time of sending [s], in the time of the run.
+        arrived: Time at which the robot applied it [s]; nan if never.
     """
 
     made: float
@@ -63,7 +63,7 @@ def _grouped(path: Path, stamp: int, keys: tuple[str, ...]) -> _Runs:
 
     Args:
         path: The table.
-        stamp: When it was changed, so that one that was written again is read again.
+        stamp: Time of its last change, so that one that was written again is read again.
         keys: Columns to group by.
     """
     groups: dict[tuple[str, ...], dict[tuple[str | None, ...], list[SentCommand]]] = {}

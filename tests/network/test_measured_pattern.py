@@ -53,7 +53,7 @@ def driven(options, lasts, begins=0.0):
 
 
 def phases(options, lasts):
-    """When commands came in what was measured, whatever round they came in [s]."""
+    """Times of commands within what was measured, whatever round they came in [s]."""
     times, drive = driven(options, lasts)
     length, start = drive.pattern.length, drive.pattern.start
     assert len(times) > lasts / length  # more than one in each round

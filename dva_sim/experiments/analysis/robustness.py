@@ -61,7 +61,7 @@ class RepeatedStop:
         high: Upper edge.
         repeats: With a result; those without are left out.
         smallest: Smallest effect that matters.
-        moved: What was added to each repeat: by so much the study's own result, of more persons
+        moved: Addition to each repeat: by so much the study's own result, of more persons
             and trials, is above the repeat of its own model. 0 if that was not repeated.
     """
 
