@@ -134,7 +134,7 @@ def answer_in(folder: Path) -> tuple[KeptAnswer, dict[str, Any]]:
 
 
 def refuse_other_runs(folder: Path, sampled: SampledRuns) -> None:
-    """See that the runs of a results folder are those that this program gives.
+    """Refuse a results folder whose runs this program no longer reproduces.
 
     Raises:
         ConfigError: the study's file has changed since, or what simulates has.
