@@ -615,4 +615,4 @@ def test_who_holds_a_robot_goes_on_after_an_emergency(bench):
     bench.say(DVA, m.PermissionGrant(ANA, "both", 7))
     bench.say(RUI, m.Emergency(), now=2.0)
     assert bench.say(ANA, m.StartTeleOp(), now=3.0).code == m.OK
-    assert not bench.robot.stands
+    assert not bench.robot.awaits_person

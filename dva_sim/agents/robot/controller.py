@@ -101,8 +101,8 @@ class RobotController:
         observers: Those to read its sensors, by device, likewise.
         inquiry: Open questions to the DVA.
         by_hand: Person who drives it by hand, at the robot itself; None: nobody does.
-        stands: True from an emergency on until a person has had the robot: the DVA's own missions
-            wait for that.
+        awaits_person: True from an emergency on until a person has had the robot: the DVA's own
+            missions wait for that.
     """
 
     id_tag: str
@@ -125,7 +125,7 @@ class RobotController:
     future_ticks: int = 0
     inquiry: Inquiry = field(default_factory=Inquiry)
     by_hand: str | None = None
-    stands: bool = False
+    awaits_person: bool = False
     _numbered: int = 0  # the session that `last_order_id` and `last_set_id` are of
 
     def tick(self, now: float) -> int:
@@ -246,7 +246,7 @@ class RobotController:
         refusal = self._begin(math.inf, moving)
         if refusal is not None:
             return refusal
-        self.by_hand, self.last_valid, self.stands = who, now, False
+        self.by_hand, self.last_valid, self.awaits_person = who, now, False
         return Decision(m.OK, set_point=STAND)
 
     def drive_by_hand(self, who: str, speed: float, turn_rate: float, now: float) -> Decision:
@@ -303,7 +303,7 @@ class RobotController:
     def _emergency(self, now: float) -> Decision:
         """Stop and stand idle; whatever was received before this moment moves nothing (S3)."""
         self._idle("emergency")
-        self.emergency_at, self.stands = now, True
+        self.emergency_at, self.awaits_person = now, True
         return Decision(m.OK, "stopped", STAND)
 
     def _granted(self, message: m.Message, body: m.PermissionGrant) -> Decision:
@@ -362,7 +362,7 @@ class RobotController:
         """Replace the holder, or leave the robot without one; the current driver is stopped."""
         held, self.grant = self.grant, grant
         if grant is not None and grant.holder != self.dva and grant != held:
-            self.stands = False
+            self.awaits_person = False
         if grant is not None and held is not None and grant.session == held.session:
             return Decision(m.OK)  # the holder may have moved
         if grant is not None and grant.session != self._numbered:
@@ -467,7 +467,7 @@ class RobotController:
         self.last_set_id = max(self.last_set_id, message.message_id)
         if again:
             return Decision(m.OK, "already started")
-        self.mode, self.owner, self.stands = TELEOPERATION, message.source, False
+        self.mode, self.owner, self.awaits_person = TELEOPERATION, message.source, False
         self.last_valid = now
         return Decision(m.OK, set_point=STAND)
 
@@ -514,12 +514,12 @@ class RobotController:
         refusal = self._refusal(message, "missions")
         if refusal is not None:
             return refusal._replace(waits=not self.knows(message))
-        if self.stands and message.source == self.dva:
+        if self.awaits_person and message.source == self.dva:
             return Decision(m.BUSY, "stopped by an emergency; a person has to take it first")
         refusal = self._begin(arrived, moving) or self._order(message)
         if refusal is not None:
             return refusal
-        self.stands = False
+        self.awaits_person = False
         self.mode, self.owner, self.mission = MISSION, message.source, body
         left = len(body.waypoints) if isinstance(body, m.GoTo | m.Patrol) else 1
         self.mission_status = m.MissionStatus(message.message_id, "under_way", left, "")
