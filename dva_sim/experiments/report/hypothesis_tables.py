@@ -30,7 +30,6 @@ def hypothesis_table(tested: Sequence[Tested], cluster: str = "person") -> CellT
     """Each hypothesis: the claim, what was found, the adjusted test, the verdict."""
     heads = ["hypothesis", "claim", "found (95 % interval)"]
     heads += ["p by Holm", "p of the opposite", "verdict"]
-    families = Counter(t.contrast.family for t in tested)
     rows = [
         [
             ": ".join(filter(None, (t.name, t.hypothesis.text))),
@@ -38,22 +37,21 @@ def hypothesis_table(tested: Sequence[Tested], cluster: str = "person") -> CellT
             _interval(t.difference, t.contrast.measure),
             _p(t.adjusted),
             _p(t.against),
-            ": ".join(filter(None, (_VERDICTS[t.verdict], _few(t, cluster, tests)))),
+            ": ".join(filter(None, (_VERDICTS[t.verdict], _few(t, cluster)))),
         ]
         for t in tested
-        for tests in [families[t.contrast.family]]
     ]
     return CellTable("", heads, len(heads), rows, note=note("hypotheses"))
 
 
-def _few(tested: Tested, cluster: str, tests: int) -> str:
+def _few(tested: Tested, cluster: str) -> str:
     """Say that a hypothesis stayed open for want of persons; else an empty text."""
     found, least = tested.difference, tested.contrast.smallest or tested.hypothesis.margin or None
-    is_few = tested.verdict == "open" and found is not None and _are_few(found, least, tests)
+    is_few = tested.verdict == "open" and found is not None and _are_few(found, least)
     return too_few(found.n_persons, cluster) if is_few and found is not None else ""
 
 
-def _are_few(found: Interval, smallest: float | None, tests: int) -> bool:
+def _are_few(found: Interval, smallest: float | None, tests: int = 1) -> bool:
     """True if the test, or ruling out the declared difference, needs more persons."""
     if _least_p(found.n_persons, tests) > 1 - LEVEL:
         return True
@@ -96,8 +94,7 @@ def verdict_lead(
     ranked = sorted(tested, key=lambda claim: _ORDER.index(claim.verdict))
     named = [t for t in ranked if t.verdict == ranked[0].verdict][:_MOST_NAMED]
     beyond = f" ({EXTRAPOLATED})" if is_extrapolated else ""
-    facts = "; ".join(_with_facts(t, cluster, len(tested)) for t in named)
-    first = f"{_counted(ranked)}{beyond}: {facts}."
+    first = f"{_counted(ranked)}{beyond}: {'; '.join(_with_facts(t, cluster) for t in named)}."
     rest = Counter(t.verdict for t in ranked)
     del rest[ranked[0].verdict]
     clauses = [f"{n} of the others {_SETTLED[verdict]}" for verdict, n in rest.items()]
@@ -125,7 +122,7 @@ def _inside(text: str) -> str:
     return clause[:1].lower() + clause[1:] if clause[1:2].islower() else clause
 
 
-def _with_facts(tested: Tested, cluster: str, tests: int) -> str:
+def _with_facts(tested: Tested, cluster: str) -> str:
     """`Waiting costs (4.0 s, 95 % interval 3.0 to 5.0 s, claimed above 2.0 s)`."""
     text = _OPENINGS[tested.verdict] + _inside(tested.hypothesis.text or _claim(tested))
     if tested.difference is None:
@@ -135,7 +132,7 @@ def _with_facts(tested: Tested, cluster: str, tests: int) -> str:
         f"{signed(found.mean, unit)}",
         f"95 % interval {number(found.low)} to {quantity(found.high, unit)}",
         f"claimed {bound_of(tested)}",
-        _few(tested, cluster, tests),
+        _few(tested, cluster),
     ]
     return f"{text} ({', '.join(filter(None, facts))})"
 
