@@ -59,6 +59,8 @@ _SHORT_LEVELS = (
     _LEVELS
     | {name: kind.label for name, kind in PATTERNS.items()}
     | {name: name for name in ("direct", "coordinated", "supervisory")}
+    | {f"mqtt-{qos}": f"MQTT {qos}" for qos in (0, 1)}
+    | {f"mqtt-{qos}-nodelay": f"MQTT {qos}, nodelay" for qos in (0, 1)}
 )
 
 

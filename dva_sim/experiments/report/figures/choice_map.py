@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 _ROW = 0.36  # height of a situation [in]
 _ACROSS = 100  # characters that the heads of all columns hold side by side
+_WORDS, _SMALL_WORDS = 8.5, 6.8  # in a cell, and where there are many side by side [pt]
+_MANY = 8  # columns
 _FAINT, _STRONG = 0.12, 0.85  # how much colour the least and the greatest regret have
 _DECADES = 2.0  # from the least coloured regret to the full colour
 
@@ -51,12 +53,12 @@ class ChoiceMapFigure(style.ReportFigure):
         situations = [*(situation_name(found, g) for g in range(len(found.given.levels))), WORST]
         across, down = (situations, choices) if found.is_tall else (choices, situations)
         figure, ((ax,),) = style.panels(1, 1, 1.2 + _ROW * len(down))
+        ax.set_xlim(-0.5, len(across) - 0.5)
         _paint(ax, found)
         width = min(14, _ACROSS // len(across))
         ax.set_xticks(range(len(across)), [style.wrapped(name, width) for name in across])
         ax.xaxis.tick_top()
         ax.set_yticks(range(len(down)), down)
-        ax.set_xlim(-0.5, len(across) - 0.5)
         ax.set_ylim(len(down) - 0.4, -0.5)
         ax.grid(False)
         ax.tick_params(length=0)
@@ -92,6 +94,7 @@ def _cell(ax: Axes, place: tuple[int, int], shade: float, text: str, is_best: bo
     from matplotlib.patches import Rectangle
 
     x, y = place
+    is_narrow = ax.get_xlim()[1] > _MANY
     corner = (x - 0.47, y - 0.44)
     colour = ONE.colour
     ax.add_patch(Rectangle(corner, 0.94, 0.88, facecolor=colour, alpha=shade, edgecolor="none"))
@@ -101,7 +104,7 @@ def _cell(ax: Axes, place: tuple[int, int], shade: float, text: str, is_best: bo
         text,
         ha="center",
         va="center",
-        fontsize=8.5,
+        fontsize=_SMALL_WORDS if is_narrow else _WORDS,
         fontweight="bold" if is_best else "normal",
         color=PAPER if shade > 0.6 else INK,
     )
