@@ -10,6 +10,7 @@ nothing of theirs is marked, however long their links are.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,7 +19,7 @@ import numpy as np
 
 from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.conditions import get
-from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, Table
+from dva_sim.experiments.analysis.run_grid import Factor, Floats, RunGrid, Table
 from dva_sim.experiments.analysis.study_view import StudyView, interval_of
 from dva_sim.experiments.analysis.support import support_of_part
 from dva_sim.experiments.study.factor_levels import PARAMETERS
@@ -26,6 +27,7 @@ from dva_sim.experiments.study.parts import REPEATS, STRATEGY, Level
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import listing, number, percent, quantity
 from dva_sim.simulation.labels import factor_name, level_name
+from dva_sim.statistics import Interval
 
 
 @dataclass(frozen=True)
@@ -35,8 +37,9 @@ class Repeat:
     Attributes:
         strategy: Strategy of the operators; empty if it was not varied.
         parameters: Number of the parameter set; 0 is the usual one.
-        mean: First minus second; beside the study's own result, see `RepeatedStop.moved`.
-        low: Lower end of its own 95 % interval.
+        mean: First minus second: the study's own result, and what this model changes of it. Where
+            the study's own model was not repeated, the difference in the repeat itself.
+        low: Lower end of its 95 % interval: of that result and of the change, in quadrature.
         high: Upper end.
         is_own: True for the study's own model, which is no independent evidence.
         is_beyond: True if people were never watched with that strategy at these delays.
@@ -61,8 +64,6 @@ class RepeatedStop:
         high: Upper edge.
         repeats: With a result; those without are left out.
         smallest: Smallest effect that matters.
-        moved: Addition to each repeat: by so much the study's own result, of more persons
-            and trials, is above the repeat of its own model. 0 if that was not repeated.
     """
 
     level: Level
@@ -71,7 +72,6 @@ class RepeatedStop:
     high: float
     repeats: tuple[Repeat, ...]
     smallest: float | None
-    moved: float = 0.0
 
     @property
     def others(self) -> list[Repeat]:
@@ -177,6 +177,23 @@ class _Reading:
         self._own, support = get(scenario, STRATEGY), support_of_part(part, scenario)
         self._outside = None if support is None else support.outside.astype(float)
 
+    def own(self, where: dict[str, Level]) -> Floats | None:
+        """The difference under the study's own model; None if that was not repeated."""
+        tried = next((f.levels for f in self.part.factors if f.name == STRATEGY), (self._own,))
+        if self._own not in tried:
+            return None
+        strategy = {STRATEGY: self._own} if STRATEGY in where else {}
+        return self.difference(where | strategy | {PARAMETERS: 0})
+
+    def difference(self, where: dict[str, Level]) -> Floats:
+        """First minus second under a model, `(persons, trials)`."""
+        grid = self.part.grid(self.finding.measure)
+        first, second = (
+            self.part.where(grid, where | {self.finding.factor: level})
+            for level in (self.finding.first, self.finding.second)
+        )
+        return first - second
+
     def is_own(self, where: dict[str, Level]) -> bool:
         """True if these are the strategy and parameters of the study itself."""
         return where[PARAMETERS] == 0 and where.get(STRATEGY, self._own) == self._own
@@ -198,34 +215,22 @@ def _stop(read: _Reading, view: StudyView, level: Level) -> RepeatedStop:
     repeats = [
         repeat
         for model in read.part.settings(but=(str(finding.factor), view.over.name))
-        if (repeat := _repeat(read, model | {view.over.name: level})) is not None
+        if (repeat := _repeat(read, model | {view.over.name: level}, at)) is not None
     ]
-    found = float(finding.mean[at])
-    moved = next((found - each.mean for each in repeats if each.is_own), 0.0)
     return RepeatedStop(
         level=level,
-        found=found,
+        found=float(finding.mean[at]),
         low=float(finding.low[at]),
         high=float(finding.high[at]),
-        repeats=tuple(_moved(each, moved) for each in repeats),
+        repeats=tuple(repeats),
         smallest=finding.smallest_effect,
-        moved=moved,
     )
 
 
-def _moved(repeat: Repeat, by: float) -> Repeat:
-    return replace(repeat, mean=repeat.mean + by, low=repeat.low + by, high=repeat.high + by)
-
-
-def _repeat(read: _Reading, where: dict[str, Level]) -> Repeat | None:
+def _repeat(read: _Reading, where: dict[str, Level], at: int) -> Repeat | None:
     """The paired difference under one model; the reference run drops out of it."""
-    part, finding = read.part, read.finding
-    grid = part.grid(finding.measure)
-    first, second = (
-        part.where(grid, where | {finding.factor: level})
-        for level in (finding.first, finding.second)
-    )
-    found = interval_of(first - second)
+    own, difference = read.own(where), read.difference(where)
+    found = interval_of(difference) if own is None else _beside(read.finding, at, difference - own)
     if found is None:
         return None
     return Repeat(
@@ -236,6 +241,20 @@ def _repeat(read: _Reading, where: dict[str, Level]) -> Repeat | None:
         high=found.high,
         is_own=read.is_own(where),
         is_beyond=read.is_beyond(where),
+    )
+
+
+def _beside(finding: Finding, at: int, change: Floats) -> Interval | None:
+    """The study's own result and what a model changes of it, `(persons, trials)`."""
+    changed = interval_of(change)
+    if changed is None or not np.isfinite(changed.low):
+        return None
+    mean, low, high = (float(edge[at]) for edge in (finding.mean, finding.low, finding.high))
+    return replace(
+        changed,
+        mean=mean + changed.mean,
+        low=mean + changed.mean - math.hypot(mean - low, changed.mean - changed.low),
+        high=mean + changed.mean + math.hypot(high - mean, changed.high - changed.mean),
     )
 
 
@@ -255,8 +274,8 @@ def _what_was_repeated(r: RepeatedAnswer) -> str:
     return (
         f"Repeated{under} with the usual parameters and {others} within the bands that "
         f"calibration leaves open ({r.persons} persons, {trials} each, with the same random "
-        "numbers as above). Each is the study's own result, moved by what its repeat differs from "
-        "that of the study's own model."
+        "numbers as above). Each is the study's own result and what the model changes of it, by "
+        "the repeats of both."
     )
 
 

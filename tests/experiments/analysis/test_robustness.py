@@ -32,7 +32,7 @@ def read(effects, effect_s=20.0, rows=None, scenario=OWN):
 def test_shares_count_the_repeats_with_known_signs():
     _, found = read(EFFECTS)
     (stop,) = found.stops
-    assert (stop.same_sign, stop.clear, stop.relevant, stop.negligible) == (2, 2, 1, 1)
+    assert (stop.same_sign, stop.clear, stop.relevant, stop.negligible) == (2, 1, 1, 1)
     assert (found.persons, found.trials, found.sets) == (4, 2, 1)
 
 
@@ -45,11 +45,11 @@ def test_signs_are_compared_with_the_studys_own():
 def test_each_repeat_has_its_effect_and_an_interval_around_it():
     _, found = read(EFFECTS)
     (stop,) = found.stops
-    assert stop.moved == pytest.approx(stop.found - 20.15)  # persons 0 to 3 add 0.1 s each
     for repeat in stop.repeats:
         effect = EFFECTS[repeat.strategy, repeat.parameters]
-        assert repeat.mean == pytest.approx(effect + 0.15 + stop.moved)
-        assert repeat.low < repeat.mean < repeat.high
+        assert repeat.mean == pytest.approx(stop.found + effect - EFFECTS["pursuit", 0])
+        assert repeat.low <= stop.low + repeat.mean - stop.found  # never surer than the study
+        assert repeat.high >= stop.high + repeat.mean - stop.found
 
 
 def test_only_what_a_model_changes_is_counted_and_not_which_persons_repeated_it():
@@ -59,9 +59,10 @@ def test_only_what_a_model_changes_is_counted_and_not_which_persons_repeated_it(
         assert after.mean - before.mean == pytest.approx(100.0)
 
 
-def test_without_a_repeat_of_the_studys_own_model_nothing_is_moved():
+def test_without_a_repeat_of_the_studys_own_model_each_stands_for_itself():
     _, found = read(EFFECTS, scenario={"operator": {"strategy": "two_point"}})
-    assert found.stops[0].moved == 0.0
+    means = [repeat.mean for repeat in found.stops[0].repeats]
+    assert means == pytest.approx([effect + 0.15 for effect in EFFECTS.values()])
 
 
 def test_a_repeat_without_a_pair_is_left_out():
@@ -106,7 +107,7 @@ def test_the_sentences_give_shares_and_reach():
     _, found = read(EFFECTS)
     what, text = (s.replace("\N{NO-BREAK SPACE}", " ") for s in sentences(found))
     assert unnamed(what, "4 persons", "2 trials") == []
-    signs = ("delay 1 s the sign holds in 2 of 3 (67 %)", "in 2 of them", "−4.4 to 4.6 s")
+    signs = ("delay 1 s the sign holds in 2 of 3 (67 %)", "in 1 of them", "−4.4 to 4.6 s")
     sizes = ("in 1 of 3 (33 %) the effect exceeds", "in 1 it is below", "adaptive (1 of 2)")
     assert unnamed(text, *signs, *sizes) == []
 
