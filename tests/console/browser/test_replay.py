@@ -1,6 +1,7 @@
 """A recording in a real browser: it plays, stands and jumps, and nobody can be told to act."""
 
 import functools
+import json
 import re
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -11,7 +12,7 @@ import pytest
 from helpers.console.accessibility import faults
 from helpers.processes.patience import becomes
 from helpers.processes.programs import Programs, all_gone_after
-from playwright.sync_api import Page, TimeoutError, expect
+from playwright.sync_api import Page, TimeoutError, WebSocketRoute, expect
 from recordings.runs import drill, drive
 
 from dva_sim.recordings.audit_log import AuditEntry, AuditLog, plain_row
@@ -213,6 +214,29 @@ def test_recordings_of_a_folder_are_a_click_away_and_its_report_runs_no_script(
             expect(link).to_have_attribute("aria-current", "page")
             assert faults(page) == [], (name, width)
             assert page.evaluate("document.documentElement.scrollWidth") <= width, name
+
+
+def test_a_late_reply_leads_nobody_away_from_the_page_they_went_to(address, visit, folder):
+    page = visit.context.new_page()
+    held: list[Callable[[], None]] = []
+
+    def hold_replies(socket: WebSocketRoute) -> None:
+        server = socket.connect_to_server()
+
+        def to_page(line: str | bytes) -> None:
+            is_reply = json.loads(line)["k"] == "done"
+            held.append(lambda: socket.send(line)) if is_reply else socket.send(line)
+
+        server.on_message(to_page)
+
+    page.route_web_socket("**/ws/drive*", hold_replies)
+    page.goto(f"{address('console', '--results', folder)}#/recordings")
+    choose(page, "drill.mcap")
+    page.get_by_role("link", name="Events").click()
+    assert becomes(lambda: page.evaluate("location.hash") == "#/events" and bool(held))
+
+    held[0]()
+    assert page.evaluate("location.hash") == "#/events"
 
 
 def test_the_audit_log_of_a_recording_is_shown_with_its_chain(address, audited, folder, visit):

@@ -27,15 +27,16 @@ export function ShelfPage() {
 let isOpening = false;
 
 /**
- * Open a recording and go to the map, once: a second reply would navigate away from another page.
+ * Open a recording, once, and go to the map, unless the person has gone elsewhere meanwhile.
  * @param {string} name
  */
 async function open(name) {
   if (isOpening) return;
   isOpening = true;
+  const before = location.hash;
   const answer = await act('open_recording', { name });
   isOpening = false;
-  if (answer.ok) location.hash = '#/map';
+  if (answer.ok && location.hash === before) location.hash = '#/map';
 }
 
 /** @param {{one: ShelfEntry}} props */
