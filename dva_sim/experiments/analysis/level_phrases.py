@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.answer import Finding
+from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import listing
 from dva_sim.simulation.labels import absent_at_zero, factor_name, level_name, named, setting
@@ -48,6 +50,8 @@ def places(f: Finding, where: NDArray[np.intp]) -> str:
     names = [level_name(f.over, f.levels[int(i)]) for i in where]
     solid = len(where) > 1 and bool((np.diff(where) == 1).all()) and is_ordered(f)
     if len(where) == len(f.levels) > 1:
+        if counted := _counted(f, f.levels):
+            return f"with every number of {counted} tried"
         return f"at every {factor_name(f.over)} tried"
     if solid and where[-1] == len(f.levels) - 1:
         return f"from {names[0]} on"
@@ -61,20 +65,26 @@ def _spoken(f: Finding, where: Iterable[int]) -> str:
     levels = [f.levels[int(i)] for i in where]
     if levels == [0] and (absent := absent_at_zero(f.over)):
         return f"without {absent}"
-    if str(f.over).endswith(".count"):
-        counted = factor_name(f.over)
-        names = listing([level_name(f.over, level) for level in levels])
-        return f"with {names} {counted.removesuffix('s') if levels == [1] else counted}"
+    names = listing([level_name(f.over, level) for level in levels])
+    if counted := _counted(f, levels):
+        return f"with {names} {counted}" if names != "0" else f"without {counted}"
     if all(isinstance(level, int | float) and not isinstance(level, bool) for level in levels):
         return ""
-    names = listing([level_name(f.over, level) for level in levels])
-    if all(str(level).isdigit() for level in levels):
-        return f"with {names} {factor_name(f.over)}"
     if f.over == "link":
         return f"on the {names} link{'s' if len(levels) > 1 else ''}"
     if len(levels) == 1:
         return f"with {named(f.over, levels[0])}"
     return f"with {factor_name(f.over)} {names}"
+
+
+def _counted(f: Finding, levels: Sequence[Level]) -> str:
+    """What the levels count, `robots` or `robot`; empty if they are no counts."""
+    # A bare number is a quantity; counts of a treatment are names.
+    are_numerals = all(isinstance(level, str) and level.isdigit() for level in levels)
+    if not are_numerals and not str(f.over).endswith(".count"):
+        return ""
+    name = factor_name(str(f.over))
+    return re.sub(r"s\b", "", name, count=1) if [str(i) for i in levels] == ["1"] else name
 
 
 def is_ordered(f: Finding) -> bool:

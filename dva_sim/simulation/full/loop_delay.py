@@ -63,7 +63,7 @@ COLUMNS = (
     Measure(
         "loop_delay_mean_s",
         "observation to effect, as the sum of the stages `delay_*_s`",
-        title="observation-to-effect delay, as the sum of its stages",
+        title="observation-to-effect delay (sum of its stages)",
     ),
     Measure(
         "loop_delay_measured_s",

@@ -87,6 +87,14 @@ IN_WORDS = {
         finding([0.0, 9.0], over="link", levels=("good", "poor")),
         ["on the poor link"],
     ),
+    "counts, all of them": (
+        finding([3.0, 5.0, 9.0], over="robot.count", levels=(1, 2, 8)),
+        ["with 8 robots", "with every number of robots tried"],
+    ),
+    "counts of one and of none": (
+        finding([0.0, 9.0], over="crowd", levels=("0", "1")),
+        ["with 1 TCP flow each way", "without TCP flows"],
+    ),
     "a filter": (
         finding([0.0, 9.0], over="phone.filter", levels=("none", "one_pole")),
         ["with one-pole filter"],
