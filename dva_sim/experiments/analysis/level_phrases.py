@@ -78,7 +78,7 @@ def _spoken(f: Finding, where: Iterable[int]) -> str:
 
 
 def _counted(f: Finding, levels: Sequence[Level]) -> str:
-    """What the levels count, `robots` or `robot`; empty if they are no counts."""
+    """Name of what the levels count, as in `8 robots` or `1 robot`; empty unless they count."""
     # A bare number is a quantity; counts of a treatment are names.
     are_numerals = all(isinstance(level, str) and level.isdigit() for level in levels)
     if not are_numerals and not str(f.over).endswith(".count"):
