@@ -23,6 +23,7 @@ LOOP = "loop_delay_mean_s"
 
 
 PERSONAL = ("delay_human_s", "delay_hand_s")
+LEGS = ("picture_age_mean_s", "age_in_force_mean_s")  # of a loop that is not measured as a whole
 WAITING = "move_and_wait_share"
 SELDOM = 0.05  # a way of steering that takes less of the driving time does not count
 
@@ -54,28 +55,39 @@ def support_of_part(part: RunGrid, scenario: Mapping[str, Any]) -> Support | Non
         scenario: The part's before any factor changed it, for the strategy.
     """
     strategies = _strategies(part, scenario)
-    if not part.has(LOOP) or not strategies:
+    runs = _loop_delays(part)
+    if runs is None or not strategies:
         return None
-    runs = part.grid(LOOP)
-    for column in PERSONAL:
-        runs = runs - np.nan_to_num(part.grid(column))
     delays = nan_mean(runs.reshape(*runs.shape[:-2], -1), axis=-1)
-    waits = _waiting(part, delays)
+    own = str(get(scenario, STRATEGY))
+    waits = _waiting(part, own, delays)
     outside = np.isfinite(delays)
     for name in strategies:
         covered = np.full(delays.shape, bool(ranges(name)))
         for steering, share in (("closed", 1.0 - waits), ("waiting", waits)):
             covered &= (share <= SELDOM) | _watched(delays, ranges(name, steering))
-        outside &= ~(_has(part, name) & covered)
+        outside &= ~(_has(part, name, own) & covered)
     return Support(delays, outside, "; ".join(map(_coverage, strategies)))
 
 
-def _waiting(part: RunGrid, delays: Floats) -> Floats:
-    """Share of the driving time that each cell's persons moved and waited; else by strategy."""
+def _loop_delays(part: RunGrid) -> Floats | None:
+    """Delay of each run's loop without the person [s]; None where no part of it is measured."""
+    if part.has(LOOP):
+        return part.grid(LOOP) - sum(np.nan_to_num(part.grid(column)) for column in PERSONAL)
+    if all(map(part.has, LEGS)):
+        return sum((part.grid(leg) for leg in LEGS), start=np.zeros(1))
+    return None
+
+
+def _waiting(part: RunGrid, own: str, delays: Floats) -> Floats:
+    """Share of the driving time that each cell's persons moved and waited.
+
+    Where it is not measured, only persons of that strategy move and wait.
+    """
     if part.has(WAITING):
         shares = part.grid(WAITING)
         return np.nan_to_num(nan_mean(shares.reshape(*shares.shape[:-2], -1), axis=-1))
-    return np.where(_has(part, "move_and_wait"), 1.0, np.zeros(delays.shape))
+    return np.where(_has(part, "move_and_wait", own), 1.0, np.zeros(delays.shape))
 
 
 def _watched(delays: Floats, known: Sequence[tuple[float, float]]) -> Marks:
@@ -92,9 +104,9 @@ def _strategies(part: RunGrid, scenario: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(str(name) for name in names if name is not None)
 
 
-def _has(part: RunGrid, strategy: str) -> Marks:
-    """Mark the cells driven by a strategy."""
-    has = [setting.get(STRATEGY, strategy) == strategy for setting in part.settings()]
+def _has(part: RunGrid, strategy: str, own: str) -> Marks:
+    """Mark the cells driven by a strategy; `own` is that of cells that set none."""
+    has = [setting.get(STRATEGY, own) == strategy for setting in part.settings()]
     return np.array(has).reshape([len(f.levels) for f in part.factors])
 
 

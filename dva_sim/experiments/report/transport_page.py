@@ -39,7 +39,6 @@ class TransportPage(ModelPage):
 
     name: ClassVar[str] = "transport"
     summaries: ClassVar[tuple[Summary, ...]] = SUMMARIES
-    has_support: ClassVar[bool] = False
     assumed: ClassVar[tuple[str, ...]] = ()
 
     @classmethod

@@ -44,6 +44,26 @@ def test_the_loop_without_the_person_decides_not_the_link():
     )
 
 
+def test_a_loop_that_is_measured_in_two_legs_is_their_sum():
+    part = part_of()
+    legs = {"picture_age_mean_s": 1.0, "age_in_force_mean_s": 0.25}
+    table = {name: column for name, column in part.treated.items() if "loop" not in name}
+    two = table | {name: np.full(6, age) for name, age in legs.items()}
+    found = support_of_part(RunGrid(two, "drive", part.factors), {})
+    np.testing.assert_allclose(found.delays, 1.25)
+    assert support_of_part(RunGrid(table, "drive", part.factors), {}) is None
+
+
+@pytest.mark.parametrize(("strategy", "is_outside"), [("adaptive", False), ("move_and_wait", True)])
+def test_who_is_not_seen_to_wait_waits_by_strategy_alone(strategy, is_outside):
+    part = part_of()
+    delays = {"loop_delay_mean_s": np.full(6, 0.1 + 0.3)}
+    table = {name: column for name, column in part.treated.items() if "wait" not in name}
+    one = RunGrid(table | delays, "drive", [DELAY])
+    found = support_of_part(one, {"operator": {"strategy": strategy}})
+    assert found.outside.tolist() == [is_outside] * 3
+
+
 def test_each_strategy_has_the_support_of_its_own_data():
     assert ranges("pursuit")[-1][1] < 1.1 < ranges("adaptive")[-1][1]
     found = support_of_part(part_of(), {})
