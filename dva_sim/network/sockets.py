@@ -191,6 +191,14 @@ BIND_AGAIN: Final = 0.05  # while a port is not free yet that was just closed [s
 RETRY: Final = 5.0  # after ZeroMQ gave up to connect [s]
 PORT_TRIES: Final = 50
 MOST_SOCKETS: Final = 60_000
+# A peer that lost its power takes no leave: who only listens to it would wait for good, and the
+# next request for its time-out. So the kernel asks a silent peer whether it still knows it.
+KEEP_ALIVE: Final = {
+    zmq.TCP_KEEPALIVE: 1,
+    zmq.TCP_KEEPALIVE_IDLE: 2,  # silent for so long [s]
+    zmq.TCP_KEEPALIVE_INTVL: 2,  # until it is asked once more [s]
+    zmq.TCP_KEEPALIVE_CNT: 15,  # without an answer; then the connection is given up
+}
 
 
 def give_back_memory() -> None:
@@ -463,6 +471,8 @@ class SocketNetwork(RealNetwork):
         socket = self._socket(kind)
         socket.linger = 0
         socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_PICTURE if kind == zmq.SUB else LARGEST)
+        for option, value in KEEP_ALIVE.items():
+            socket.setsockopt(option, value)
         self._clients.setdefault(peer, {})[socket] = node
         if self._has_key(peer):
             self._security.connect_client(socket, node, peer)
