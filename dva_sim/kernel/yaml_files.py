@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -14,10 +14,12 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq, TaggedScalar
 from ruamel.yaml.constructor import ConstructorError, RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
+from dva_sim.kernel import resources
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_words import in_words
 
 KeyPath = tuple[str | int, ...]
+SUFFIXES = (".yaml", ".yml")
 MOST_VALUES = 20_000  # in one file
 
 
@@ -84,6 +86,27 @@ def load_yaml(path: str | Path) -> Document:
     if not isinstance(data, dict):
         raise ConfigError("should be a mapping of keys to values", path, 1, 1)
     return Document(deepcopy(data), path, places)
+
+
+def with_named_files(path: Path) -> list[Path]:
+    """A file and, if it is such a document, the files beside it that it names."""
+    if path.suffix not in SUFFIXES:
+        return [path]
+    try:
+        data = load_yaml(path).data
+    except ConfigError:  # whatever it is, it is no document that names files
+        return [path]
+    beside = (path.parent / text for text in texts_in(data) if "." in text)
+    return [path, *filter(resources.is_file, beside)]
+
+
+def texts_in(data: object) -> Iterator[str]:
+    """Every text among plain data, keys apart."""
+    if isinstance(data, str):
+        yield data
+    elif isinstance(data, Mapping | list):
+        for value in data.values() if isinstance(data, Mapping) else data:
+            yield from texts_in(value)
 
 
 @lru_cache(maxsize=64)

@@ -23,9 +23,10 @@ from pydantic import Field, model_validator
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.read_once import read_once
 from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.suggestions import hint
-from dva_sim.kernel.yaml_files import Document, load_yaml
+from dva_sim.kernel.yaml_files import Document, load_yaml, with_named_files
 from dva_sim.worlds.compartments import NOWHERE, FloorPartition, of_floor, of_rooms
 from dva_sim.worlds.drawn_plan import make_plan
 from dva_sim.worlds.geo import GeoFrame, Pose
@@ -240,12 +241,11 @@ def map_site(
         ConfigError: the map is missing or not valid, or has no room for so many.
     """
     file = resources.find(str(path), "worlds").resolve()
-    return _map_site(file, seed, robots, guards, max(radius, FOOTPRINT))
+    return _map_site(_bare_map(file), seed, robots, guards, max(radius, FOOTPRINT))
 
 
 @lru_cache(maxsize=64)
-def _map_site(path: Path, seed: int, robots: int, guards: int, radius: float) -> Site:
-    bare = _bare_map(path)
+def _map_site(bare: Site, seed: int, robots: int, guards: int, radius: float) -> Site:
     desks = _scatter(bare, Streams(seed), "operator-desk", DESKS, FOOTPRINT)
     return replace(_settled(bare, seed, robots, guards, radius), operator_desks=desks)
 
@@ -294,7 +294,7 @@ def _settled(site: Site, seed: int, robots: int, guards: int, radius: float) -> 
     return replace(site, robot_bases=bases, guard_posts=posts)
 
 
-@lru_cache(maxsize=4)
+@read_once(with_named_files, most=4)
 def _bare_map(path: Path) -> Site:
     """All of a map's site that does not depend on the seed."""
     grid = load_ros_map(path)
@@ -429,7 +429,7 @@ class SiteFile(Config):
 
 
 def load_site(name_or_path: str | Path, options: Mapping[str, Any] | None = None) -> Site:
-    """Read a site in our own format, by name or path; once per process.
+    """Read a site in our own format, by name or path.
 
     Args:
         name_or_path: Such as `caparica`.
@@ -442,7 +442,7 @@ def load_site(name_or_path: str | Path, options: Mapping[str, Any] | None = None
     return _load_site(path, json.dumps(dict(options or {}), sort_keys=True))
 
 
-@lru_cache(maxsize=16)
+@read_once(with_named_files, most=16)
 def _load_site(path: Path, options: str) -> Site:
     if path.suffix in PLANS:
         raise ConfigError(f"is a plan; {_site_of_plan(path)}", path)

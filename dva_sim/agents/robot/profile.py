@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 from typing import Annotated, Any, Final
 
 from pydantic import Field, model_validator
@@ -13,6 +12,7 @@ from dva_sim.agents.robot.command_queue import ServiceTime
 from dva_sim.agents.robot.sensors import KINDS, SensorConfig
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, validate
+from dva_sim.kernel.read_once import read_once
 from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.worlds.drives import LONGEST_TICK, DriveSpec, load_drive
 
@@ -96,9 +96,9 @@ class RobotProfile(Config):
         )
 
 
-@cache
+@read_once(lambda name: [resources.find(name, FOLDER)])
 def load_robot(name: str) -> RobotProfile:
-    """The profile of a name or path, once per process.
+    """The profile of a name or path.
 
     Raises:
         ConfigError: not found, or not valid.

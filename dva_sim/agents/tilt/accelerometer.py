@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from functools import cache
 from itertools import chain, repeat
 from math import cos, sin
 from typing import Annotated, Final
@@ -14,8 +13,10 @@ from pydantic import Field, model_validator
 
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, validate
+from dva_sim.kernel.read_once import read_once
 from dva_sim.kernel.yaml_files import load_yaml
 
+FOLDER: Final = "agents/accelerometers"
 GRAVITY: Final = 9.80665  # source: ISO 80000-3: [m/s^2]
 WHOLE: Final = 1.5 * 2.0**52  # design: added and taken away, which rounds four times as fast
 TICK: Final = 2.0**-12  # design: of the clock that tells when a sample is taken [s]
@@ -78,14 +79,14 @@ class AccelerometerPart(Config):
         return 1e-6 * GRAVITY * self.noise_density_ug * math.sqrt(self.bandwidth_hz)
 
 
-@cache
+@read_once(lambda name: [resources.find(name, FOLDER)])
 def load_part(name: str) -> AccelerometerPart:
     """The part of that name, or in that file.
 
     Raises:
         ConfigError: there is none, or it cannot be read.
     """
-    document = load_yaml(resources.find(name, "agents/accelerometers"))
+    document = load_yaml(resources.find(name, FOLDER))
     return validate(AccelerometerPart, document.data, document.error)
 
 

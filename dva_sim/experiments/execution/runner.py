@@ -26,6 +26,8 @@ from dva_sim.experiments.results.manifest import failures, machine, manifest_of,
 from dva_sim.experiments.results.results import JOURNAL, MACHINE, MANIFEST, TABLES, digests
 from dva_sim.experiments.results.tables import design_row, write_tables
 from dva_sim.experiments.study.cell_grid import StudyJob
+from dva_sim.experiments.study.file_watch import FileWatch
+from dva_sim.experiments.study.hashing import edited_files
 from dva_sim.experiments.study.loading import Settings, pairs_of
 from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.experiments.study.stopping import is_enough, rounds
@@ -65,8 +67,8 @@ def run_study(
         The results folder.
 
     Raises:
-        ConfigError: the study is not valid, the folder holds another one, or the cluster does not
-            exist.
+        ConfigError: the study is not valid, the folder holds another one, a file that runs read
+            has changed meanwhile, or the cluster does not exist.
         FolderInUse: another process writes into the folder.
         DvaSimError: the disk is full, another program holds the checkpoint, or the cluster is lost.
         KeyboardInterrupt: after tidying up; its message says what has been done.
@@ -127,6 +129,7 @@ class _Session:
     ) -> None:
         self.checkpoint = checkpoint
         self._workers, self._episode, self._limit_s = workers, episode, limit_s
+        self._watch = FileWatch([*plan.input_files, *edited_files()])
         self._tell = progress or (lambda *_: None)
         self._place = _at_random if plan.is_real_time else _as_designed
         keys = {job.key for job in plan.jobs}
@@ -149,6 +152,7 @@ class _Session:
         batches = scheduling.run_all(rest, self._episode, self._workers, self._limit_s)
         with closing(batches):
             for batch in batches:
+                self._watch.refuse_changes()  # these runs may have read either
                 now = time.perf_counter()
                 self.checkpoint.add(batch, now - clock)
                 clock, self._count = now, self._count + len(batch)

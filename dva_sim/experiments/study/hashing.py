@@ -11,8 +11,7 @@ import hashlib
 import json
 import os
 import subprocess
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,8 +19,7 @@ from typing import Any
 import dva_sim
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config
-from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.yaml_files import load_yaml
+from dva_sim.kernel.yaml_files import texts_in, with_named_files
 
 
 def stable_hash(data: Any) -> str:
@@ -36,19 +34,28 @@ def digest(data: Any) -> str:
 
 
 def inputs(scenarios: Iterable[Config], others: Iterable[str] = ()) -> dict[str, str]:
-    """Files that scenarios name (maps, traces), and that these name, with hashes of their contents.
+    """Hashes of the contents of `input_files`, by name."""
+    return {name: hash_of_file(path) for name, path in input_files(scenarios, others)}
+
+
+def input_files(
+    scenarios: Iterable[Config], others: Iterable[str] = ()
+) -> Iterator[tuple[str, Path]]:
+    """Name and path of each file that scenarios name (maps, traces), and that these name.
 
     Args:
         scenarios: Scenarios of the runs.
         others: Other files that the runs depend on, as `file.py:Class`.
     """
     dumps = (scenario.model_dump(mode="json") for scenario in scenarios)
-    names = sorted({*others, *(text for dump in dumps for text in _texts(dump) if "." in text)})
-    return {
-        file: hashlib.sha256(path.read_bytes()).hexdigest()[:16]
-        for name in names
-        for file, path in _files_of(name)
-    }
+    names = sorted({*others, *(text for dump in dumps for text in texts_in(dump) if "." in text)})
+    for name in names:
+        yield from _files_of(name)
+
+
+def hash_of_file(path: Path) -> str:
+    """64 bits over the contents of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
 def _files_of(name: str) -> Iterator[tuple[str, Path]]:
@@ -59,19 +66,8 @@ def _files_of(name: str) -> Iterator[tuple[str, Path]]:
     if found is None:
         return
     yield name, found
-    if found.suffix in _YAML:
-        with suppress(ConfigError):  # whatever it is, it is no document that names files
-            for text in filter(None, _texts(load_yaml(found).data)):
-                if "." in text and resources.is_file(found.parent / text):
-                    yield f"{name}: {text}", found.parent / text
-
-
-def _texts(data: Any) -> Iterator[str]:
-    if isinstance(data, str):
-        yield data
-    elif isinstance(data, Mapping | list):
-        for value in data.values() if isinstance(data, Mapping) else data:
-            yield from _texts(value)
+    for other in with_named_files(found)[1:]:
+        yield f"{name}: {os.path.relpath(other, found.parent)}", other
 
 
 # Reports may change without making old runs stale; what measures and simulates may not.
@@ -98,14 +94,13 @@ _JUDGES = (
     "statistics",
 )
 _TRACES = "experiments/traces"
-_YAML = (".yaml", ".yml")
 _EDITED = ("agents", "protocol", "worlds")
 _SUFFIXES = {".yaml", ".geojson", ".xsd", ".pgm", ".png", ".py"}
 
 
 def fingerprint() -> str:
     """64 bits over the simulating code and every profile, site and schema within reach."""
-    return _hash_of((*_code(_CODE), *_edited()))
+    return _hash_of((*_code(_CODE), *edited_files()))
 
 
 def fingerprint_of_judges() -> str:
@@ -130,8 +125,8 @@ def _code(parts: Iterable[str]) -> Iterator[tuple[str, Path]]:
                 yield name, path
 
 
-def _edited() -> Iterator[tuple[str, Path]]:
-    """Each name once, from the nearest folder that has it, as it would be found."""
+def edited_files() -> Iterator[tuple[str, Path]]:
+    """Profiles, sites and schemas within reach: each name once, from the nearest folder."""
     seen: dict[str, Path] = {}
     for root in resources.roots():
         for folder in _EDITED:

@@ -1,14 +1,10 @@
-"""Recorded links in files: packet opportunities, logs of delays, bare delays.
-
-Each file is read once per process.
-"""
+"""Recorded links in files: packet opportunities, logs of delays, bare delays."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +13,7 @@ from numpy.typing import NDArray
 
 from dva_sim.kernel import resources
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.read_once import read_once
 
 Floats = NDArray[np.float64]
 _LOST = frozenset({"-", "*", "lost", "nan"})
@@ -40,7 +37,7 @@ class DelayLog(NamedTuple):
     delays: Floats
 
 
-@cache
+@read_once(lambda path: [_found(path)])
 def read_trace(path: str) -> Floats:
     """Packet opportunities [s], shape `(n,)`, of a Mahimahi trace.
 
@@ -77,7 +74,7 @@ def longest_gap_s(times: Floats) -> float:
     return float(np.max(np.diff(times, prepend=0.0)))
 
 
-@cache
+@read_once(lambda path: [_found(path)])
 def read_delays(path: str) -> tuple[float, ...]:
     """Delays [s] of a file with one a line [ms].
 
@@ -91,7 +88,7 @@ def read_delays(path: str) -> tuple[float, ...]:
     return delays
 
 
-@cache
+@read_once(lambda path: [_found(path)])
 def read_delay_log(path: str) -> DelayLog:
     """A log of probes: two columns, time [s] and delay [ms], or what `ping -D` prints.
 

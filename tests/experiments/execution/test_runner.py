@@ -149,6 +149,33 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path, plain, starte
     assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)) == plain
 
 
+@pytest.mark.parametrize(
+    ("disturb", "problem"),
+    [
+        (lambda trace: trace.write_text("1\n2\n3\n"), "has changed since the study began"),
+        (Path.unlink, "has gone since the study began"),
+    ],
+    ids=["changed", "gone"],
+)
+def test_no_run_is_kept_that_may_have_read_another_file_than_the_others(tmp_path, disturb, problem):
+    trace = tmp_path / "cell.up"
+    trace.write_text("1\n2\n")
+    study, out = kit.study_in(tmp_path, f"link.trace_up={trace}"), tmp_path / "out"
+
+    def edit(done: int, _: int) -> None:
+        if done == 5:
+            disturb(trace)
+
+    with pytest.raises(ConfigError, match=problem):
+        run_study(study, out, jobs=1, episode=kit.cheap, progress=edit)
+    trace.write_text("1\n2\n")
+    assert dry_run(study, out).done == 5
+
+    finished = kit.files(run_study(study, out, jobs=1, episode=kit.cheap))
+    whole = run_study(study, tmp_path / "whole", jobs=1, episode=kit.cheap)
+    assert finished == kit.files(whole)
+
+
 @pytest.mark.system
 def test_ctrl_c_while_a_lock_of_the_pool_is_taken_ends_the_run_all_the_same(tmp_path, monkeypatch):
     """Raised there it would leave the lock taken; then nobody could end the pool."""
