@@ -31,8 +31,17 @@ def test_what_moves_is_drawn_every_second_frame(fake, visit):
         const {draw} = Live.prototype; window.drawn = 0;
         Live.prototype.isMoving = () => true;
         Live.prototype.draw = function (...about) {
-          window.drawn += 1; draw.apply(this, about); }; }"""
+          window.drawn += 1; draw.apply(this, about); };
+        const ask = window.requestAnimationFrame; window.asked = 0;
+        window.requestAnimationFrame = (next) => { window.asked += 1; return ask(next); }; }"""
     )
+
+    def asks_this_clock() -> bool:
+        page.clock.run_for(16)  # the frame before may still wait for the browser's own clock
+        return page.evaluate("window.asked") > 0
+
+    assert becomes(asks_this_clock)
+    page.evaluate("window.drawn = 0")
     page.clock.run_for(800)  # 50 frames
 
     assert 16 <= page.evaluate("window.drawn") <= 40  # some more for what is told meanwhile
