@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from typing import Any, Final, Protocol
@@ -191,13 +191,22 @@ BIND_AGAIN: Final = 0.05  # while a port is not free yet that was just closed [s
 RETRY: Final = 5.0  # after ZeroMQ gave up to connect [s]
 PORT_TRIES: Final = 50
 MOST_SOCKETS: Final = 60_000
-# A peer that lost its power takes no leave: who only listens to it would wait for good, and the
-# next request for its time-out. So the kernel asks a silent peer whether it still knows it.
-KEEP_ALIVE: Final = {
+# A peer that loses its power disappears without closing its connections. Who only listens to it
+# would wait for ever, and the next request for its time-out; its own would be kept for good.
+CLIENT: Final[Mapping[int, int]] = {
     zmq.TCP_KEEPALIVE: 1,
-    zmq.TCP_KEEPALIVE_IDLE: 2,  # silent for so long [s]
-    zmq.TCP_KEEPALIVE_INTVL: 2,  # until it is asked once more [s]
-    zmq.TCP_KEEPALIVE_CNT: 15,  # without an answer; then the connection is given up
+    zmq.TCP_KEEPALIVE_IDLE: 2,  # silence after which the kernel asks for a sign of life [s]
+    zmq.TCP_KEEPALIVE_INTVL: 2,  # from one question to the next [s]
+    zmq.TCP_KEEPALIVE_CNT: 15,  # questions without an answer that end a connection
+    zmq.TCP_MAXRT: 30_000,  # time that sent bytes may stay unacknowledged [ms]
+    zmq.CONNECT_TIMEOUT: 10_000,  # before it starts anew: the kernel's pauses grow [ms]
+}
+# More patient, since a phone that sleeps and only listens would never connect again.
+LISTENER: Final[Mapping[int, int]] = {
+    zmq.TCP_KEEPALIVE: 1,
+    zmq.TCP_KEEPALIVE_IDLE: 30,
+    zmq.TCP_KEEPALIVE_INTVL: 30,
+    zmq.TCP_KEEPALIVE_CNT: 20,
 }
 
 
@@ -448,15 +457,15 @@ class SocketNetwork(RealNetwork):
 
     # --- sockets -----------------------------------------------------------------------
 
-    def _socket(self, kind: int) -> Socket:
-        """A socket with what is set on all: that counts for connections made afterwards."""
+    def _socket(self, kind: int, options: Mapping[int, int]) -> Socket:
+        """A socket with these options and those of all: connections made afterwards have them."""
         socket = self._context.socket(kind)
-        for option, value in self._options.items():
+        for option, value in {**options, **self._options}.items():
             socket.setsockopt(option, value)
         return socket
 
     def _listener(self, kind: int, node: str) -> Socket:
-        socket = self._socket(kind)
+        socket = self._socket(kind, LISTENER)
         socket.linger = LINGER
         socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_TOPIC if kind == zmq.XPUB else LARGEST)
         try:
@@ -468,11 +477,9 @@ class SocketNetwork(RealNetwork):
 
     def client(self, kind: int, node: str, peer: str) -> Socket:
         """A socket of `node`, connected to `peer` if there is a way to it."""
-        socket = self._socket(kind)
+        socket = self._socket(kind, CLIENT)
         socket.linger = 0
         socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_PICTURE if kind == zmq.SUB else LARGEST)
-        for option, value in KEEP_ALIVE.items():
-            socket.setsockopt(option, value)
         self._clients.setdefault(peer, {})[socket] = node
         if self._has_key(peer):
             self._security.connect_client(socket, node, peer)

@@ -13,6 +13,10 @@ from client import DVA, field
 def listen(address):
     """Return a socket that gets the heartbeats of the DVA at that address."""
     socket = zmq.Context.instance().socket(zmq.SUB)
+    # Else nothing would show that the DVA's machine has lost its power and come back.
+    socket.setsockopt(zmq.TCP_KEEPALIVE, 1)
+    socket.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 2)
+    socket.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
     host, port = address.split(":")
     socket.connect(f"tcp://{host}:{int(port) + 1}")
     socket.subscribe("heartbeat|")

@@ -1,4 +1,4 @@
-"""A peer that loses its power takes no leave, and is heard and asked again once it is back."""
+"""A peer that lost its power, without closing a connection, is heard and asked once it is back."""
 
 import json
 import os

@@ -1,7 +1,7 @@
 """A robot on a machine of its own that loses its power: a program for a network namespace.
 
-A machine without power takes no leave: its connections end at one side alone. That takes two
-network stacks, each a namespace, with a bridge between them that stays.
+Its connections end without a word to the other side. That takes two network stacks, each a
+namespace, with a bridge between them that stays.
 """
 
 import json
