@@ -71,8 +71,8 @@ def test_numbers_of_the_map_are_those_of_the_kept_answer():
     assert f"REQ/REP {costs['REQ/REP']} s, very far (1 s)" in kept["answer"].replace("\xa0", " ")
     (paced,) = re.findall(r"at most\s+(\d+) s", section)
     assert int(paced) == round(float(costs["paced requests"]))
-    publishing = [float(costs[name]) for name in ("latest-wins PUB/SUB", "acknowledged")]
-    assert min(publishing) > 120
+    for publishing in ("plain PUB/SUB", "latest-wins PUB/SUB", "acknowledged"):
+        assert f"{publishing} never done" in kept["answer"]
     assert "extrapolated" in section
 
 

@@ -20,10 +20,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.run_grid import Factor, Floats, RunGrid, nan_mean
-from dva_sim.experiments.analysis.study_view import StudyView, interval_of
+from dva_sim.experiments.analysis.run_grid import Factor, Floats, RunGrid, nan_mean, person_means
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.units import unit_of
+from dva_sim.simulation.labels import measure_called
+from dva_sim.statistics import band
 
 BESIDE = ("contacts", "stop_share")
 _WAITS = "move_and_wait_share"
@@ -34,19 +36,21 @@ class ChoiceMap:
     """The regret of each choice in each situation, under each model of the persons.
 
     Attributes:
-        measure: Column in which the loss is counted; less is better.
+        measure: Column in which the loss is counted; where more of it is better, the loss is its
+            negative.
         choice: Factor of the choices, `c` levels.
         given: Factor of the situations, `g` levels.
         models: Factor of the models of persons, `m` levels.
-        mean: Mean loss, `(g, c, m)`; nan where nothing was run.
+        mean: Mean loss, `(g, c, m)`.
         regret: Mean loss beyond the least one, `(g, c, m)`; 0 for the best choice.
-        is_clear: True where the 95 % interval of the regret, paired by person and trial, lies above
-            0 and the regret above `smallest`, `(g, c, m)`.
-        is_same: True where that interval excludes a regret above `smallest`, `(g, c, m)`.
+        is_clear: True where the 95 % band of the regret lies above 0 and the regret above
+            `smallest`, `(g, c, m)`. The band, paired by person and trial, holds every difference
+            of two choices in a situation at once, so whichever was found to be best.
+        is_same: True where that band excludes a regret above `smallest`, `(g, c, m)`.
         smallest: Smallest difference that matters; 0 where none was declared.
         most: Value of runs that never ended; infinite if the measure is unbounded.
         outside: True for cells beyond the delays at which people were watched, `(g, c, m)`.
-        median: Median loss, `(g, c, m)`.
+        median: Median of the measure, `(g, c, m)`.
         beside: Means of further measures of the runs, `(g, c, m)` each, by column.
         waiting: Share of the persons who choose how they steer that move and wait, `(g, c)`; None
             where no model lets them choose.
@@ -81,8 +85,9 @@ class ChoiceMap:
 
     @cached_property
     def worst(self) -> Floats:
-        """Greatest regret over the models, `(g, c)`."""
-        return np.asarray(self.regret.max(axis=2))
+        """Greatest regret over the models, `(g, c)`; infinite where runs of others end alone."""
+        fails = (self.never & ~self.never.all(axis=1, keepdims=True)).any(axis=2)
+        return np.where(fails, np.inf, self.regret.max(axis=2))
 
     @property
     def is_worse(self) -> NDArray[np.bool_]:
@@ -92,7 +97,12 @@ class ChoiceMap:
     @property
     def is_best(self) -> NDArray[np.bool_]:
         """True for a choice that is as good as the best under every model, `(g, c)`."""
-        return np.asarray(self.is_same.all(axis=2))
+        return np.asarray((self.is_same & ~self.never).all(axis=2))
+
+    @property
+    def is_lost(self) -> NDArray[np.bool_]:
+        """True for a situation in which no choice ends any run, `(g,)`."""
+        return np.asarray(self.never.all(axis=(1, 2)))
 
     @property
     def overall(self) -> Floats:
@@ -116,8 +126,8 @@ class ChoiceMap:
 
     @cached_property
     def never(self) -> NDArray[np.bool_]:
-        """True for a choice that ends no run in a situation, under any model, `(g, c)`."""
-        return np.asarray((self.mean >= self.most).all(axis=2))
+        """True for a choice that ends no run in a situation under a model, `(g, c, m)`."""
+        return np.asarray(self.mean >= self.most)
 
     def best_of(self, situation: int) -> list[Level]:
         """The choices that are not clearly worse than the best; all where nothing differs."""
@@ -142,11 +152,13 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
         return None
     axes = (view.over, view.line, models)
     cells = _cells(view.part, view.part.grid(view.measure), axes)  # (g, c, m, persons, trials)
-    mean = nan_mean(nan_mean(cells, axis=-1), axis=-1)
+    is_loss = measure_called(view.measure).better == "small"
+    losses = cells if is_loss else -cells
+    mean = nan_mean(nan_mean(losses, axis=-1), axis=-1)
     if not np.isfinite(mean).all():
         return None
     smallest = view.smallest_effect or 0.0
-    is_clear, is_same = _judged(cells, mean.argmin(axis=1), smallest)
+    is_clear, is_same = _judged(losses, mean.argmin(axis=1), smallest)
     return ChoiceMap(
         measure=view.measure,
         choice=view.line,
@@ -157,7 +169,7 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
         is_clear=is_clear,
         is_same=is_same,
         smallest=smallest,
-        most=view.possible[1],
+        most=view.possible[1] if is_loss else np.inf,
         outside=_outside(view, axes),
         median=np.nanmedian(cells, axis=(3, 4)),
         beside={column: _mean(view, column, axes) for column in BESIDE},
@@ -177,15 +189,36 @@ def _cells(part: RunGrid, grid: NDArray[Any], axes: tuple[Factor, ...]) -> NDArr
 
 
 def _judged(
-    cells: Floats, best: NDArray[np.intp], smallest: float
+    losses: Floats, best: NDArray[np.intp], smallest: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return where a choice is clearly worse than the best, and where it is as good."""
-    clear, same = np.zeros((2, *cells.shape[:3]), dtype=bool)
-    for g, c, m in np.ndindex(clear.shape):
-        found = interval_of(cells[g, c, m] - cells[g, best[g, m], m])
-        clear[g, c, m] = found is not None and found.low > 0.0 and found.mean > smallest
-        same[g, c, m] = c == best[g, m] or (found is not None and found.high <= smallest)
+    clear, same = np.zeros((2, *losses.shape[:3]), dtype=bool)
+    for g in range(len(losses)):
+        mean, low, high = _differences(losses[g])
+        for c, m in np.ndindex(clear.shape[1:]):
+            to_best = c, best[g, m], m
+            clear[g, c, m] = low[to_best] > 0.0 and mean[to_best] > smallest
+            same[g, c, m] = c == best[g, m] or high[to_best] <= smallest
     return clear, same
+
+
+def _differences(losses: Floats) -> tuple[Floats, Floats, Floats]:
+    """Mean and band of each choice's loss minus each other's, all at once, `(c, c, m)` each.
+
+    Args:
+        losses: Losses in one situation, `(c, m, persons, trials)`.
+    """
+    count, models = losses.shape[:2]
+    mean, low, high = np.full((3, count, count, models), np.nan)
+    one, other = np.triu_indices(count, 1)
+    pairs = losses[one] - losses[other]
+    found = band(person_means(pairs.reshape(-1, *losses.shape[2:])))
+    alike = (found.n_persons > 1) & ~np.isfinite(found.low)  # all persons differ by the same
+    ends = (np.where(alike, found.mean, edge) for edge in (found.low, found.high))
+    means, lows, highs = (x.reshape(-1, models) for x in (found.mean, *ends))
+    mean[one, other], low[one, other], high[one, other] = means, lows, highs
+    mean[other, one], low[other, one], high[other, one] = -means, -highs, -lows
+    return mean, low, high
 
 
 def _mean(view: StudyView, column: str, axes: tuple[Factor, ...]) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -98,6 +99,7 @@ def facts_of(found: ChoiceMap) -> dict[str, Any]:
         "line": "column" if found.is_tall else "row",
         "smallest": quantity(found.smallest, found.unit) if found.smallest else "",
         "has_waiting": found.waiting is not None,
+        "cut_off": quantity(found.most, found.unit) if found.never.any() else "",
     }
 
 
@@ -109,10 +111,10 @@ def _range(values: Floats) -> str:
 
 def regret_text(found: ChoiceMap, situation: int, choice: int) -> str:
     """`3 to 69`, over the models of persons; `=`: as good as the best; `3 to 9 ?`: not settled."""
+    if found.never[situation, choice].all():
+        return NEVER
     if found.is_best[situation, choice]:
         return "="
-    if found.never[situation, choice]:
-        return NEVER
     low, high = found.least[situation, choice], found.worst[situation, choice]
     is_open = not found.is_worse[situation, choice]
     return f"{_range(np.array([low, high]))}{' ?' if is_open else ''}"
@@ -120,9 +122,8 @@ def regret_text(found: ChoiceMap, situation: int, choice: int) -> str:
 
 def overall_text(found: ChoiceMap, choice: int) -> str:
     """The most that a choice costs beyond the best one, in any situation."""
-    if found.never[_hardest(found, choice), choice]:
-        return NEVER
-    return regret_number(float(found.overall[choice]))
+    worst = float(found.overall[choice])
+    return NEVER if math.isinf(worst) else regret_number(worst)
 
 
 def situation_name(found: ChoiceMap, situation: int) -> str:
@@ -135,9 +136,12 @@ def situation_name(found: ChoiceMap, situation: int) -> str:
 def lead_of(found: ChoiceMap) -> str:
     """Say whether one choice is best everywhere, and which has the least regret."""
     names = [level_name(found.choice.name, level) for level in found.choice.levels]
-    best = [name for name, good in zip(names, found.is_best.T, strict=True) if good.all()]
+    settled = found.is_best[~found.is_lost].T
+    best = [name for name, good in zip(names, settled, strict=True) if good.all()]
     given = factor_name(found.given.name)
     over = f"over {len(found.models.levels)} models of the persons{_beyond(found)}"
+    if found.is_lost.all():
+        return f"Nothing was ever done on any {given} tried, {over}."
     if len(best) == len(names):
         return f"No difference that matters was found on any {given} tried, {over}."
     if best:
@@ -183,11 +187,13 @@ def _hardest(found: ChoiceMap, choice: int) -> int:
 
 def _cost(found: ChoiceMap, choice: int) -> str:
     """`14.6 s`: the most that a choice costs beyond the best one."""
-    is_never = found.never[_hardest(found, choice), choice]
-    return NEVER if is_never else quantity(float(found.overall[choice]), found.unit)
+    worst = float(found.overall[choice])
+    return NEVER if math.isinf(worst) else quantity(worst, found.unit)
 
 
 def _best(found: ChoiceMap, situation: int) -> str:
+    if found.is_lost[situation]:
+        return NEVER
     best = found.best_of(situation)
     if len(best) == len(found.choice.levels):
         is_settled = found.is_best[situation].all()
@@ -196,5 +202,7 @@ def _best(found: ChoiceMap, situation: int) -> str:
 
 
 def regret_number(value: float) -> str:
-    """Format a regret, which has room for no more."""
+    """Format a regret, which has room for no more; infinite if others end runs alone."""
+    if not math.isfinite(value):
+        return "never" if math.isinf(value) else "–"
     return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"

@@ -41,19 +41,20 @@ STUDY = {
 }
 
 
-def read(study=STUDY, losses=LOSSES, persons=6):
+def read(study=STUDY, losses=LOSSES, persons=6, measure="drive_time_s", noise=None):
     rng = np.random.default_rng(1)
     skills = rng.normal(0.0, 5.0, persons)
 
     def loss(mean, person, link):
         if mean >= HORIZON_S:
             return HORIZON_S
-        return mean + skills[person] + rng.normal(0.0, 0.2) * (link != "near")
+        chance = rng.normal(0.0, 0.2) if noise is None else noise()
+        return mean + skills[person] + chance * (link != "near")
 
     rows = [
         {"part": "drive", "person": person, "trial": 0, "seed": person, "is_reference": False}
         | {"link": link, "messaging": choice, "steering": model}
-        | {"drive_time_s": loss(mean, person, link)}
+        | {measure: loss(mean, person, link)}
         | {"contacts": person, "stop_share": 0.25 * (model == "wait")}
         | {"move_and_wait_share": 0.5 * (model == "wait" and (link == "far" or person == 0))}
         for (link, choice), means in losses.items()
@@ -103,6 +104,54 @@ def test_a_choice_that_is_best_everywhere_leads():
     assert "Nothing is better than pace" in lead_of(
         read(losses={key: (50.0 - 9 * (key[1] == "pace"),) * 2 for key in LOSSES})
     )
+
+
+def with_losses(**changed):
+    """The losses with those of some links replaced: a pair for each choice."""
+    return LOSSES | {
+        (link, choice): pair
+        for link, pairs in changed.items()
+        for choice, pair in zip(CHOICES, pairs, strict=True)
+    }
+
+
+def test_a_link_on_which_nothing_ever_arrives_settles_nothing():
+    dead = with_losses(narrow=[(HORIZON_S, HORIZON_S)] * 3)
+    found = read(losses=dead)
+    table = choice_table(found, "drive")
+    narrow = next(row for row in table.rows if row[0].startswith("narrow"))
+    assert narrow[1:5] == ["never done"] * 4
+    assert "Nothing is better than tell" in lead_of(found)  # where anything was
+    everywhere = read(losses=dict.fromkeys(LOSSES, (HORIZON_S, HORIZON_S)))
+    assert "Nothing was ever done" in lead_of(everywhere)
+
+
+def test_what_is_done_under_one_model_alone_is_behind_without_end():
+    some = with_losses(far=[(70.0, HORIZON_S), (50.0, 80.0), (55.0, 80.5)])
+    found = read(losses=some)
+    far = choice_table(found, "drive").rows[1]
+    assert far[2].endswith(" to never")
+    assert "ask never done, far" in lead_of(found)
+
+
+def test_more_is_better_where_the_measure_says_so():
+    rates = {key: (9.0, 8.0) if key[1] == "tell" else (2.0, 1.0) for key in LOSSES}
+    answer = STUDY["answer"] | {"measure": "command_rate_hz", "smallest_effect_s": None}
+    found = read(STUDY | {"answer": answer}, rates, measure="command_rate_hz")
+    assert found.advised == "tell"
+    assert found.worst[1].tolist() == pytest.approx([7.0, 0.0, 7.0], abs=0.5)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_of_many_equal_choices_none_is_called_worse_for_being_unlucky(seed):
+    ways = [f"way {n}" for n in range(14)]
+    rng = np.random.default_rng(seed)
+    losses = {(link, way): (50.0, 50.0) for link in LINKS for way in ways}
+    factors = STUDY["factors"] | {"messaging": ways}
+    answer = STUDY["answer"] | {"contrast": ways[:2], "smallest_effect_s": 0.1}
+    study = STUDY | {"factors": factors, "answer": answer}
+    found = read(study, losses, persons=12, noise=lambda: rng.normal(0.0, 3.0))
+    assert not found.is_worse.any()
 
 
 def test_the_table_says_what_never_arrives_and_what_rests_on_an_assumption():
