@@ -67,7 +67,7 @@ def _spoken(f: Finding, where: Iterable[int]) -> str:
         return f"without {absent}"
     names = listing([level_name(f.over, level) for level in levels])
     if counted := _counted(f, levels):
-        return f"with {names} {counted}" if names != "0" else f"without {counted}"
+        return f"with {names} {counted}" if names != "0" else f"with no {counted}"
     if all(isinstance(level, int | float) and not isinstance(level, bool) for level in levels):
         return ""
     if f.over == "link":

@@ -7,6 +7,7 @@ whatever is known of waiting there, and the other way round.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -58,10 +59,11 @@ def support_of_part(part: RunGrid, scenario: Mapping[str, Any]) -> Support | Non
     runs = _loop_delays(part)
     if runs is None or not strategies:
         return None
-    delays = nan_mean(runs.reshape(*runs.shape[:-2], -1), axis=-1)
+    of_cells = runs.reshape(*runs.shape[:-2], -1)
+    delays = np.where(np.isinf(of_cells).any(axis=-1), math.inf, nan_mean(of_cells, axis=-1))
     own = str(get(scenario, STRATEGY))
     waits = _waiting(part, own, delays)
-    outside = np.isfinite(delays)
+    outside = ~np.isnan(delays)
     for name in strategies:
         covered = np.full(delays.shape, bool(ranges(name)))
         for steering, share in (("closed", 1.0 - waits), ("waiting", waits)):
@@ -71,18 +73,23 @@ def support_of_part(part: RunGrid, scenario: Mapping[str, Any]) -> Support | Non
 
 
 def _loop_delays(part: RunGrid) -> Floats | None:
-    """Delay of each run's loop without the person [s]; None where no part of it is measured."""
+    """Delay of each run's loop without the person [s]; None where no part of it is measured.
+
+    Nan where nobody drives; infinite where no command or no picture arrives.
+    """
     if part.has(LOOP):
         return part.grid(LOOP) - sum(np.nan_to_num(part.grid(column)) for column in PERSONAL)
     if all(map(part.has, LEGS)):
-        return sum((part.grid(leg) for leg in LEGS), start=np.zeros(1))
+        legs = sum((part.grid(leg) for leg in LEGS), start=np.zeros(1))
+        return np.where(np.isnan(legs), math.inf, legs)
     return None
 
 
 def _waiting(part: RunGrid, own: str, delays: Floats) -> Floats:
     """Share of the driving time that each cell's persons moved and waited.
 
-    Where it is not measured, only persons of that strategy move and wait.
+    Where it is not measured, all others but those of that strategy count as steering all the
+    time, so that too many cells are marked rather than too few.
     """
     if part.has(WAITING):
         shares = part.grid(WAITING)

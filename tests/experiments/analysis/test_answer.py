@@ -93,7 +93,7 @@ IN_WORDS = {
     ),
     "counts of one and of none": (
         finding([0.0, 9.0], over="crowd", levels=("0", "1")),
-        ["with 1 TCP flow each way", "without TCP flows"],
+        ["with 1 TCP flow each way", "with no TCP flows each way"],
     ),
     "a filter": (
         finding([0.0, 9.0], over="phone.filter", levels=("none", "one_pole")),

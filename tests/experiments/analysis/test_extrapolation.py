@@ -51,6 +51,9 @@ def test_a_loop_that_is_measured_in_two_legs_is_their_sum():
     two = table | {name: np.full(6, age) for name, age in legs.items()}
     found = support_of_part(RunGrid(two, "drive", part.factors), {})
     np.testing.assert_allclose(found.delays, 1.25)
+    none = two | {"age_in_force_mean_s": np.array([0.05, 0.05, *[np.nan] * 4])}
+    found = support_of_part(RunGrid(none, "drive", part.factors), {})
+    assert found.outside[1:].all()
     assert support_of_part(RunGrid(table, "drive", part.factors), {}) is None
 
 
