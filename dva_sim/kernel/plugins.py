@@ -259,12 +259,6 @@ def word_of(name: object) -> str:
     return name if isinstance(name, str) else getattr(name, "__qualname__", repr(name))
 
 
-def stamp_of(name: str) -> int:
-    """Return when the file of `file.py:Class` was last changed [ns]; 0 without a file."""
-    file = Path(name.rpartition(":")[0])
-    return file.stat().st_mtime_ns if file.is_file() else 0
-
-
 def error_text(error: BaseException) -> str:
     """An error in one line."""
     text = " ".join(str(error).split())

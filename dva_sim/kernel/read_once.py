@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from functools import lru_cache, wraps
 from pathlib import Path
 from typing import ParamSpec, TypeVar
@@ -11,7 +10,7 @@ from typing import ParamSpec, TypeVar
 Asked = ParamSpec("Asked")
 Read = TypeVar("Read")
 
-_Version = tuple[str, int, int]
+Version = tuple[str, tuple[int, ...]]
 
 
 def read_once(
@@ -26,23 +25,28 @@ def read_once(
 
     def keep(read: Callable[Asked, Read]) -> Callable[Asked, Read]:
         @lru_cache(maxsize=most)
-        def kept(_: tuple[_Version, ...], *arguments: Asked.args, **named: Asked.kwargs) -> Read:
+        def kept(_: tuple[Version, ...], *arguments: Asked.args, **named: Asked.kwargs) -> Read:
             return read(*arguments, **named)
 
         @wraps(read)
         def current(*arguments: Asked.args, **named: Asked.kwargs) -> Read:
-            return kept(_versions(files(arguments[0])), *arguments, **named)  # type: ignore[arg-type]
+            first = next(iter((*arguments, *named.values())))
+            return kept(tuple(map(version_of, files(first))), *arguments, **named)  # type: ignore[arg-type]
 
         return current
 
     return keep
 
 
-def _versions(files: Iterable[Path]) -> tuple[_Version, ...]:
-    """Path, time of the last change [ns] and size [B] of each file that is there."""
-    found = []
-    for file in files:
-        with suppress(OSError, ValueError):  # whoever reads it says so
-            status = file.stat()
-            found.append((str(file), status.st_mtime_ns, status.st_size))
-    return tuple(found)
+def version_of(file: Path) -> Version:
+    """Path of a file, and numbers that are others after any change of it; none if it is not there.
+
+    The time of the last change of its status is among them, since that of its contents can be set
+    back, as tools do that copy or unpack.
+    """
+    path = file.absolute()
+    try:
+        status = path.stat()
+    except (OSError, ValueError):  # whoever reads it says so
+        return str(path), ()
+    return str(path), (status.st_ino, status.st_ctime_ns, status.st_mtime_ns, status.st_size)

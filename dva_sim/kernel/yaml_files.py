@@ -96,8 +96,13 @@ def with_named_files(path: Path) -> list[Path]:
         data = load_yaml(path).data
     except ConfigError:  # whatever it is, it is no document that names files
         return [path]
-    beside = (path.parent / text for text in texts_in(data) if "." in text)
+    beside = (path.parent / file_in(text) for text in texts_in(data) if "." in text)
     return [path, *filter(resources.is_file, beside)]
+
+
+def file_in(name: str) -> str:
+    """The file of a name, which may be that of a class in it: `file.py:Class`."""
+    return name.rpartition(":")[0] if ".py:" in name else name
 
 
 def texts_in(data: object) -> Iterator[str]:

@@ -7,11 +7,11 @@ import gzip
 import math
 import zlib
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.read_once import read_once
 
 _OF_RUN: Final = "cell", "person", "trial"  # columns that tell the runs of a study apart
 
@@ -44,8 +44,7 @@ def measured_runs(path: Path, where: Mapping[str, Any]) -> list[Run]:
         ConfigError: no row counts, or the file is not such a table.
     """
     try:
-        stamp = path.stat().st_mtime_ns
-        groups = _grouped(path, stamp, tuple(where))
+        groups = _grouped(path, tuple(where))
     except (OSError, EOFError, UnicodeError, csv.Error, zlib.error) as error:
         raise ConfigError(f"cannot be read as a table: {error}", path) from None
     except ValueError as error:
@@ -57,13 +56,12 @@ def measured_runs(path: Path, where: Mapping[str, Any]) -> list[Run]:
     return found
 
 
-@lru_cache(maxsize=2)
-def _grouped(path: Path, stamp: int, keys: tuple[str, ...]) -> _Runs:
+@read_once(lambda path: [path], most=2)
+def _grouped(path: Path, keys: tuple[str, ...]) -> _Runs:
     """The runs by the values of some columns. Thousands of drives use one table: it is read once.
 
     Args:
         path: The table.
-        stamp: Time of its last change, so that one that was written again is read again.
         keys: Columns to group by.
     """
     groups: dict[tuple[str, ...], dict[tuple[str | None, ...], list[SentCommand]]] = {}

@@ -11,7 +11,6 @@ a class derived from `Model` in a file or an installed package, named in a scena
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, Final, Generic, TypeVar
 
@@ -19,9 +18,10 @@ from dva_sim.kernel import config_overrides
 from dva_sim.kernel.config import Config, Fail
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Columns, names_of
-from dva_sim.kernel.plugins import Plugins, stamp_of
+from dva_sim.kernel.plugins import Plugins
+from dva_sim.kernel.read_once import read_once
 from dva_sim.kernel.suggestions import unknown
-from dva_sim.kernel.yaml_files import Document
+from dva_sim.kernel.yaml_files import Document, file_in
 from dva_sim.simulation import full, middleware, task, timed, transports
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import episode_measures as of_full
@@ -329,11 +329,11 @@ def model_named(name: str) -> Model[Any]:
     Raises:
         ConfigError: there is none, or it cannot be loaded or made.
     """
-    return MODELS[name] if name in MODELS else _loaded(name, stamp_of(name))
+    return MODELS[name] if name in MODELS else _loaded(name)
 
 
-@lru_cache(maxsize=32)
-def _loaded(name: str, stamp: int) -> Model[Any]:
+@read_once(lambda name: [Path(file_in(name))])
+def _loaded(name: str) -> Model[Any]:
     """One object for each state of a file, so that its scenarios are of one class."""
     model = PLUGINS.make(name, PLUGINS.find(name), {})
     model.name = name

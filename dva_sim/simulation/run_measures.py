@@ -8,13 +8,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Measure
-from dva_sim.kernel.plugins import FAILURES, Plugins, error_text, stamp_of
+from dva_sim.kernel.plugins import FAILURES, Plugins, error_text
+from dva_sim.kernel.read_once import read_once
+from dva_sim.kernel.yaml_files import file_in
 
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]{0,59}")
 
@@ -103,11 +104,11 @@ def load_measure(name: str, base: Path | None = None) -> RunMeasure:
         ConfigError: there is none, it cannot be made, or does not say what it is.
     """
     found = PLUGINS.located(name, base)
-    return _loaded(found, stamp_of(found))
+    return _loaded(found)
 
 
-@lru_cache(maxsize=64)
-def _loaded(name: str, stamp: int) -> RunMeasure:
+@read_once(lambda name: [Path(file_in(name))])
+def _loaded(name: str) -> RunMeasure:
     """One object for each state of a file; it keeps nothing from run to run."""
     made = PLUGINS.make(name, PLUGINS.find(name), {})
     about = getattr(made, "about", None)

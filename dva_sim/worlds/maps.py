@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -16,8 +16,9 @@ from pydantic import ConfigDict, Field, model_validator
 
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, validate
+from dva_sim.kernel.read_once import read_once
 from dva_sim.kernel.suggestions import guess
-from dva_sim.kernel.yaml_files import Document, load_yaml
+from dva_sim.kernel.yaml_files import Document, load_yaml, with_named_files
 from dva_sim.worlds.geo import Pose
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, 255
@@ -217,7 +218,7 @@ def load_ros_map(path: str | Path) -> OccupancyGrid:
     return OccupancyGrid(config.resolution, Pose(*config.origin), cells)
 
 
-@lru_cache(maxsize=16)
+@read_once(lambda path: with_named_files(resources.find(str(path), "worlds")))
 def doubts_of_map(path: str | Path) -> tuple[str, ...]:
     """Describe what in a valid map is probably a mistake, each in a sentence without full stop.
 

@@ -294,7 +294,7 @@ def _settled(site: Site, seed: int, robots: int, guards: int, radius: float) -> 
     return replace(site, robot_bases=bases, guard_posts=posts)
 
 
-@read_once(with_named_files, most=4)
+@read_once(with_named_files)
 def _bare_map(path: Path) -> Site:
     """All of a map's site that does not depend on the seed."""
     grid = load_ros_map(path)

@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
-from functools import cache, partial
+from functools import partial
 from typing import Any, ParamSpec, TypeVar
 
 from typing_extensions import override
@@ -190,7 +190,7 @@ async def _kind_at(address: str) -> str:
 def _checked(task: Callable[P, R], wanted: Versions, *args: P.args, **kwargs: P.kwargs) -> R:
     """Do the task on a worker, if it has the program wanted."""
     with _ONE_AT_A_TIME:
-        if other := differences(wanted, _mine()):
+        if other := differences(wanted, versions()):
             from distributed import get_worker
 
             raise OtherProgram(
@@ -205,12 +205,6 @@ def differences(wanted: Versions, found: Versions) -> str:
     names = [name for name in {**wanted, **found} if name not in _STATE]
     odd = [name for name in names if wanted.get(name) != found.get(name)]
     return ", ".join(f"{name} {found.get(name)} (here {wanted.get(name)})" for name in odd)
-
-
-@cache
-def _mine() -> Versions:
-    """Versions of this process when it started; files changed later are not loaded."""
-    return versions()
 
 
 def _line(error: Exception) -> str:

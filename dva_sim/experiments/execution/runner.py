@@ -27,7 +27,7 @@ from dva_sim.experiments.results.results import JOURNAL, MACHINE, MANIFEST, TABL
 from dva_sim.experiments.results.tables import design_row, write_tables
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.file_watch import FileWatch
-from dva_sim.experiments.study.hashing import edited_files
+from dva_sim.experiments.study.hashing import edited_files, files_of, folders_of_files
 from dva_sim.experiments.study.loading import Settings, pairs_of
 from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.experiments.study.stopping import is_enough, rounds
@@ -75,7 +75,8 @@ def run_study(
     """
     out, started, clock = Path(out), datetime.now(UTC), time.perf_counter()
     plan = StudyPlan.of(asked)
-    manifest = manifest_of(plan)
+    watch = FileWatch(lambda: (*files_of(plan.input_names), *edited_files()), folders_of_files)
+    manifest = manifest_of(plan)  # later: what it hashes is watched
     with ExitStack() as stack:
         workers = stack.enter_context(_workers(plan, jobs, scheduler))
         stack.enter_context(FolderLock(out))
@@ -83,7 +84,9 @@ def run_study(
         checkpoint.describe(manifest)
         own = tuple(plan.measures)
         simulate = episode or (partial(run_job, measures=own) if own else run_job)
-        session = _Session(plan, checkpoint, workers, simulate, progress, limit_s)
+        session = _Session(
+            plan, checkpoint, workers, simulate, progress=progress, limit_s=limit_s, watch=watch
+        )
         with session.explained_ends():
             carried_out, stopped = _run_rounds(plan.study, plan.jobs, session)
             with checkpoint.alone():
@@ -124,12 +127,14 @@ class _Session:
         checkpoint: Checkpoint,
         workers: Workers,
         episode: Simulate,
+        *,
         progress: Progress | None,
         limit_s: float,
+        watch: FileWatch,
     ) -> None:
         self.checkpoint = checkpoint
         self._workers, self._episode, self._limit_s = workers, episode, limit_s
-        self._watch = FileWatch([*plan.input_files, *edited_files()])
+        self._watch = watch
         self._tell = progress or (lambda *_: None)
         self._place = _at_random if plan.is_real_time else _as_designed
         keys = {job.key for job in plan.jobs}

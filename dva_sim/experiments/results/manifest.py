@@ -19,7 +19,7 @@ from dva_sim.experiments.study.cell_grid import RunKey, StudyRun
 from dva_sim.experiments.study.hashing import (
     fingerprint,
     fingerprint_of_judges,
-    hash_of_file,
+    hashes_of,
     program_state,
     stable_hash,
 )
@@ -47,7 +47,7 @@ def manifest_of(plan: StudyPlan) -> dict[str, Any]:
         },
         "set": list(study.settings),
         "changes": dict(study.changes),
-        "inputs": {name: hash_of_file(path) for name, path in plan.input_files},
+        "inputs": hashes_of(plan.input_names),
         "cells": [
             {"part": c.part, "cell": c.index, "config": c.config, "levels": dict(c.levels)}
             for c in cells

@@ -19,7 +19,7 @@ from typing import Any
 import dva_sim
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config
-from dva_sim.kernel.yaml_files import texts_in, with_named_files
+from dva_sim.kernel.yaml_files import file_in, texts_in, with_named_files
 
 
 def stable_hash(data: Any) -> str:
@@ -34,33 +34,37 @@ def digest(data: Any) -> str:
 
 
 def inputs(scenarios: Iterable[Config], others: Iterable[str] = ()) -> dict[str, str]:
-    """Hashes of the contents of `input_files`, by name."""
-    return {name: hash_of_file(path) for name, path in input_files(scenarios, others)}
-
-
-def input_files(
-    scenarios: Iterable[Config], others: Iterable[str] = ()
-) -> Iterator[tuple[str, Path]]:
-    """Name and path of each file that scenarios name (maps, traces), and that these name.
+    """Hashes of the files that scenarios name (maps, traces), and that these name.
 
     Args:
         scenarios: Scenarios of the runs.
         others: Other files that the runs depend on, as `file.py:Class`.
     """
+    return hashes_of(input_names(scenarios, others))
+
+
+def input_names(scenarios: Iterable[Config], others: Iterable[str] = ()) -> list[str]:
+    """Texts of scenarios, and others, that may name files; see `inputs`."""
     dumps = (scenario.model_dump(mode="json") for scenario in scenarios)
-    names = sorted({*others, *(text for dump in dumps for text in texts_in(dump) if "." in text)})
+    return sorted({*others, *(text for dump in dumps for text in texts_in(dump) if "." in text)})
+
+
+def hashes_of(names: Iterable[str]) -> dict[str, str]:
+    """64 bits over the contents of each of the `files_of` some names."""
+    return {
+        name: hashlib.sha256(path.read_bytes()).hexdigest()[:16] for name, path in files_of(names)
+    }
+
+
+def files_of(names: Iterable[str]) -> Iterator[tuple[str, Path]]:
+    """Name and path of each file of some names, as it would be found now, and that these name."""
     for name in names:
         yield from _files_of(name)
 
 
-def hash_of_file(path: Path) -> str:
-    """64 bits over the contents of a file."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
-
-
 def _files_of(name: str) -> Iterator[tuple[str, Path]]:
     """The file of a name, which may be a shipped trace, and those that it names: a map's image."""
-    path = Path(name.rpartition(":")[0] if ".py:" in name else name)
+    path = Path(file_in(name))
     shipped = (root / _TRACES / path for root in resources.roots())
     found = next(filter(resources.is_file, (path, *shipped)), None)
     if found is None:
@@ -100,18 +104,29 @@ _SUFFIXES = {".yaml", ".geojson", ".xsd", ".pgm", ".png", ".py"}
 
 def fingerprint() -> str:
     """64 bits over the simulating code and every profile, site and schema within reach."""
-    return _hash_of((*_code(_CODE), *edited_files()))
+    return _hash_of((*_simulating_code(), *_digests(edited_files())))
+
+
+@cache
+def _simulating_code() -> tuple[tuple[str, bytes], ...]:
+    """The program at the first call: what changes later in its files is not loaded."""
+    return tuple(_digests(_code(_CODE)))
 
 
 def fingerprint_of_judges() -> str:
     """64 bits over the code that comes from tables of runs to verdicts."""
-    return _hash_of(_code(_JUDGES))
+    return _hash_of(_digests(_code(_JUDGES)))
 
 
-def _hash_of(files: Iterable[tuple[str, Path]]) -> str:
-    total = hashlib.sha256()
+def _digests(files: Iterable[tuple[str, Path]]) -> Iterator[tuple[str, bytes]]:
     for name, path in files:
-        total.update(name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+        yield name, hashlib.sha256(path.read_bytes()).digest()
+
+
+def _hash_of(digests: Iterable[tuple[str, bytes]]) -> str:
+    total = hashlib.sha256()
+    for name, digest_of_file in digests:
+        total.update(name.encode() + b"\0" + digest_of_file)
     return total.hexdigest()[:16]
 
 
@@ -126,14 +141,27 @@ def _code(parts: Iterable[str]) -> Iterator[tuple[str, Path]]:
 
 
 def edited_files() -> Iterator[tuple[str, Path]]:
-    """Profiles, sites and schemas within reach: each name once, from the nearest folder."""
+    """Profiles, sites and schemas within reach: each name once, from the nearest folder.
+
+    No run reads pictures.
+    """
     seen: dict[str, Path] = {}
     for root in resources.roots():
-        for folder in _EDITED:
-            for path in sorted((root / folder).rglob("*")):
-                if path.suffix in _SUFFIXES and path.is_file():
-                    seen.setdefault(path.relative_to(root).as_posix(), path)
+        for part in _EDITED:
+            for path in sorted((root / part).rglob("*")):
+                name = path.relative_to(root)
+                if path.suffix in _SUFFIXES and "pictures" not in name.parts and path.is_file():
+                    seen.setdefault(name.as_posix(), path)
     yield from sorted(seen.items())
+
+
+def folders_of_files() -> Iterator[Path]:
+    """Folders in which a new file would be one of the `edited_files`, or be found by its name."""
+    for root in resources.roots():
+        yield from (root, root / _TRACES)
+        for part in _EDITED:
+            yield root / part
+            yield from (path for path in sorted((root / part).rglob("*")) if path.is_dir())
 
 
 @cache

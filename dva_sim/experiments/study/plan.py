@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.cell_grid import DesignCell, StudyJob
 from dva_sim.experiments.study.factor_levels import Traits
-from dva_sim.experiments.study.hashing import input_files
+from dva_sim.experiments.study.hashing import input_names
 from dva_sim.experiments.study.inputs import StudyInputs
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import TunedValues, TuningBasis
@@ -70,9 +69,9 @@ class StudyPlan:
         return any(model_for(scenario).is_real_time for scenario in self.scenarios.values())
 
     @cached_property
-    def input_files(self) -> Sequence[tuple[str, Path]]:
-        """Name and path of each file that the scenarios and measures name."""
-        return list(input_files((cell.scenario for cell in self.cells), self.measures))
+    def input_names(self) -> Sequence[str]:
+        """Texts of scenarios and measures that may name files."""
+        return input_names((cell.scenario for cell in self.cells), self.measures)
 
     @cached_property
     def jobs(self) -> list[StudyJob]:

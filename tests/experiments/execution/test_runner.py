@@ -149,15 +149,17 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path, plain, starte
     assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)) == plain
 
 
+def changed_and_back(trace):
+    trace.write_text("1\n2\n3\n")
+    trace.write_text("1\n2\n")
+
+
 @pytest.mark.parametrize(
-    ("disturb", "problem"),
-    [
-        (lambda trace: trace.write_text("1\n2\n3\n"), "has changed since the study began"),
-        (Path.unlink, "has gone since the study began"),
-    ],
-    ids=["changed", "gone"],
+    "disturb",
+    [lambda trace: trace.write_text("1\n2\n3\n"), changed_and_back, Path.unlink],
+    ids=["changed", "changed and back", "gone"],
 )
-def test_no_run_is_kept_that_may_have_read_another_file_than_the_others(tmp_path, disturb, problem):
+def test_no_run_is_kept_that_may_have_read_another_file_than_the_others(tmp_path, disturb):
     trace = tmp_path / "cell.up"
     trace.write_text("1\n2\n")
     study, out = kit.study_in(tmp_path, f"link.trace_up={trace}"), tmp_path / "out"
@@ -166,7 +168,7 @@ def test_no_run_is_kept_that_may_have_read_another_file_than_the_others(tmp_path
         if done == 5:
             disturb(trace)
 
-    with pytest.raises(ConfigError, match=problem):
+    with pytest.raises(ConfigError, match=r"cell\.up has changed since the study began"):
         run_study(study, out, jobs=1, episode=kit.cheap, progress=edit)
     trace.write_text("1\n2\n")
     assert dry_run(study, out).done == 5
@@ -174,6 +176,21 @@ def test_no_run_is_kept_that_may_have_read_another_file_than_the_others(tmp_path
     finished = kit.files(run_study(study, out, jobs=1, episode=kit.cheap))
     whole = run_study(study, tmp_path / "whole", jobs=1, episode=kit.cheap)
     assert finished == kit.files(whole)
+
+
+def test_a_new_profile_that_hides_a_shipped_one_is_a_change(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    mine = tmp_path / "agents/robots/servrobot.yaml"
+
+    def hide(done: int, _: int) -> None:
+        if done == 5:
+            mine.parent.mkdir(parents=True)
+            mine.write_text("mass_kg: 5\n")
+
+    with pytest.raises(ConfigError, match=r"servrobot\.yaml has changed"):
+        run_study(
+            kit.study_in(tmp_path), tmp_path / "out", jobs=1, episode=kit.cheap, progress=hide
+        )
 
 
 @pytest.mark.system

@@ -114,6 +114,10 @@ def test_so_is_a_shipped_trace_and_what_a_named_file_names(tmp_path, monkeypatch
     assert found[0].keys() == {"plan.yaml", "plan.yaml: plan.png"}
     assert found[0] != found[1]
 
+    (tmp_path / "robot.yaml").write_text("drive: motors.py:Mine\n")
+    (tmp_path / "motors.py").write_text("class Mine: pass\n")
+    assert list(inputs((), ["robot.yaml"])) == ["robot.yaml", "robot.yaml: motors.py"]
+
 
 def test_seeds_are_what_they_always_were(tmp_path):
     """Results that were begun with an older program go on, and old answers can be run again."""
