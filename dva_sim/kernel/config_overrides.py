@@ -93,12 +93,10 @@ def blame(
 
     if not changes or mistake({}) is not None:
         return error
-    keys = [k for k in changes if mistake({o: v for o, v in changes.items() if o != k}) is None]
-    for key, value in changes.items() if not keys else ():
-        own = mistake({key: value})
-        if own is not None:  # one of several: the others can wait
-            error, keys = own, [key]
-            break
+    without = {k: mistake({o: v for o, v in changes.items() if o != k}) for k in changes}
+    keys = [key for key, left in without.items() if left is None]
+    if not keys:  # there are several mistakes, or keys that are wrong together
+        keys = [key for key, left in without.items() if left and left.problem != error.problem]
     is_here = isinstance(source, Document) and error.file == str(source.file)
     place = (None, None, None) if is_here else (error.file, error.line, error.column)
     return ConfigError(error.problem, *place, tuple(keys) or tuple(changes))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import gzip
 import math
+import re
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -13,6 +14,8 @@ from typing import Any, Final, NamedTuple
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.read_once import read_once
 
+_TIMES: Final = "made_s", "arrived_s"
+_NUMBER: Final = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?|", re.IGNORECASE)
 _OF_RUN: Final = "cell", "person", "trial"  # columns that tell the runs of a study apart
 
 
@@ -65,14 +68,42 @@ def _grouped(path: Path, keys: tuple[str, ...]) -> _Runs:
         keys: Columns to group by.
     """
     groups: dict[tuple[str, ...], dict[tuple[str | None, ...], list[SentCommand]]] = {}
+    labels: dict[tuple[str, ...], dict[str, str]] = {}
     opened = gzip.open if path.suffix == ".gz" else open
     with opened(path, "rt", encoding="utf-8", newline="") as lines:
-        for row in _rows(csv.reader(lines), {"made_s", "arrived_s", *keys}, path):
-            runs = groups.setdefault(tuple(row[key] for key in keys), {})
+        for row in _rows(csv.reader(lines), {*_TIMES, *keys}, path):
+            values = tuple(row[key] for key in keys)
+            _refuse_another(labels.setdefault(values, _labels(row)), row, path)
+            runs = groups.setdefault(values, {})
             run = runs.setdefault(tuple(row.get(key) for key in _OF_RUN), [])
             if row["made_s"]:
-                run.append(SentCommand(float(row["made_s"]), float(row["arrived_s"] or math.nan)))
+                run.append(_command(row, path))
     return {values: [tuple(run) for run in runs.values()] for values, runs in groups.items()}
+
+
+def _labels(row: Mapping[str, str]) -> dict[str, str]:
+    """What tells in words, or by the number of a cell, of what a command is one."""
+    return {
+        key: value for key, value in row.items() if key == "cell" or not _NUMBER.fullmatch(value)
+    }
+
+
+def _refuse_another(labels: Mapping[str, str], row: Mapping[str, str], path: Path) -> None:
+    """Refuse commands of several middlewares or links as if they were of one."""
+    for key, value in labels.items():
+        if row[key] != value and key not in _TIMES:
+            problem = f"commands of {key} {value} and {row[key]} are mixed; choose one by `where`"
+            raise ConfigError(problem, path)
+
+
+def _command(row: Mapping[str, str], path: Path) -> SentCommand:
+    made, arrived = float(row["made_s"]), float(row["arrived_s"] or math.nan)
+    if not math.isfinite(made) or math.isinf(arrived):
+        raise ConfigError("times should be finite; an empty cell is a command that was lost", path)
+    if arrived < made:
+        problem = f"a command of {made:g} s arrived at {arrived:g} s, before it was sent"
+        raise ConfigError(f"{problem}: the two clocks differ", path)
+    return SentCommand(made, arrived)
 
 
 def _rows(table: Any, needed: set[str], path: Path) -> Iterator[dict[str, str]]:

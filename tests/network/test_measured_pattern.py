@@ -124,6 +124,24 @@ def test_a_damaged_table_is_refused_in_a_line(tmp_path, name, damage):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("rows", "where", "problem"),
+    [
+        ("a,x,1,0.9\n", {}, "before it was sent"),
+        ("a,x,nan,1\n", {}, "should be finite"),
+        ("a,x,1,inf\n", {}, "should be finite"),
+        ("a,x,1,2\na,y,1,2\n", {"middleware": "a"}, "link x and y are mixed"),
+        ("a,x,one,2\n", {}, "should be numbers"),
+        ("", {}, "no command was measured"),
+    ],
+)
+def test_a_table_that_would_drive_otherwise_than_meant_is_refused(tmp_path, rows, where, problem):
+    file = tmp_path / "commands.csv"
+    file.write_text(HEAD + rows)
+    with pytest.raises(ConfigError, match=problem):
+        load_pattern(NAME, {"file": str(file), "where": where})()
+
+
 def test_a_run_in_which_nothing_arrived_is_silence_of_its_length(tmp_path):
     file = tmp_path / "commands.csv"
     rows = [f"{person},{at},{at + 0.1 if person else ''}" for person in (0, 1) for at in (0, 1, 2)]

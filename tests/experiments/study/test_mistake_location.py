@@ -74,6 +74,18 @@ def test_settings_that_exclude_each_other_are_told_together(tmp_path):
     assert str(set_by(pairs, caught.value)).startswith("--set robot.count=0: ")
 
 
+@pytest.mark.parametrize("turn", [1, -1])
+def test_settings_that_need_each_other_are_told_together_with_what_is_wrong_of_both(tmp_path, turn):
+    settings = ["pattern=measured.py:Measured", "pattern_options={file: nowhere.csv}"][::turn]
+    path = tmp_path / "one.yaml"
+    path.write_text("horizon_s: 60\n")
+    with pytest.raises(ConfigError) as caught, mistakes_of(str(path), settings, 1):
+        played(EpisodeRequest(str(path), set=["robot.count=1", *settings]))
+    told = *(f"--set {each}" for each in settings), "nowhere.csv' not found"
+    assert unnamed(str(caught.value), *told) == []
+    assert "robot.count" not in str(caught.value)
+
+
 def test_a_mistake_of_the_file_itself_stays_there_whatever_is_set(tmp_path):
     text = STUDY.replace("persons: 3", "persons: none")
     with pytest.raises(ConfigError, match=r"study\.yaml:3:1: persons: "):
