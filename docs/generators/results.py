@@ -133,6 +133,7 @@ def _answered(answer: KeptAnswer, folder: Path) -> Iterator[str]:
     first, rest = first_and_rest(answer.answer)
     yield f"**{prose(first)}** {prose(rest)}"
     yield _picture(answer.study)
+    yield from _map(answer)
     yield _band(answer)
     if judged := [*answer.hypotheses, *answer.predictions]:
         yield "## Predictions"
@@ -142,12 +143,22 @@ def _answered(answer: KeptAnswer, folder: Path) -> Iterator[str]:
     yield "The answer holds for these models and settings."
     yield table(["", ""], _conditions(manifest))
     yield "## Run"
+    remarks = "".join(f"; {remark}" for remark in manifest["status"]["why"])
     yield (
-        f"{capital(_status(answer))}. dva-sim {answer.version}, commit {code(answer.commit[:12])}, "
-        f"{answer.date}, seed {answer.seed}, {answer.persons} persons, {answer.runs} runs, "
-        f"{_duration(answer.cpu_s)} of CPU time."
+        f"{capital(_status(answer))}{prose(remarks)}. dva-sim {answer.version}, "
+        f"commit {code(answer.commit[:12])}, {answer.date}, seed {answer.seed}, "
+        f"{answer.persons} persons, {answer.runs} runs, {_duration(answer.cpu_s)} of CPU time."
     )
     yield shell(_calls(answer.study))
+
+
+def _map(answer: KeptAnswer) -> Iterator[str]:
+    """Yield the table of a choice map, and what runs are like in each of its cells."""
+    for title, found in (("The map", answer.map), ("What drives are like", answer.beside)):
+        if found:
+            heads, *rows = ([prose(cell) for cell in row] for row in found)
+            yield f"## {title}"
+            yield table(heads, rows)
 
 
 def _duration(seconds: float) -> str:

@@ -28,10 +28,11 @@ if TYPE_CHECKING:
 def answers(studies: list[str], keep: list[str], mark: bool, jobs: int | None) -> None:
     """Check which published answers this version still gives.
 
-    A few runs of each study are repeated and compared with the answers kept beside the studies.
+    Each study, its scenarios and its files are compared with those of the answer that is kept,
+    and a few runs are repeated: every level of every factor, once.
 
     Examples:
-        dva-sim answers  # all of them: a minute or two
+        dva-sim answers  # all of them: a few minutes
         dva-sim answers --keep results/filters  # keep what a study has answered
     """
     folder = _folder()
@@ -68,11 +69,13 @@ def _compare(folder: Path, studies: list[str], mark: bool, jobs: int | None) -> 
     if missing := [name for name in studies if name not in {answer.study for answer in kept}]:
         known = [answer.study for answer in kept_answers.all_kept(folder)]
         raise ConfigError(f"no answer of {missing[0]!r} is kept; {hint(missing[0], known, 'kept')}")
+    others = {answer.study: _changed(answer.study, folder) for answer in kept}
     now = _sampled([answer.study for answer in kept if answer.sampled], jobs)
     code = ExitCode.OK
     for answer in kept:
         runs = now.get(answer.study, {})
-        lines, is_stale = _described(answer, {key: run.digest for key, run in runs.items()})
+        digests = {key: run.digest for key, run in runs.items()}
+        lines, is_stale = _described(answer, digests, others[answer.study])
         print(f"{answer.study}: {lines}. {first_and_rest(answer.answer)[0]}")
         if is_stale and not answer.stale_since:
             if mark:
@@ -82,15 +85,23 @@ def _compare(folder: Path, studies: list[str], mark: bool, jobs: int | None) -> 
     return code
 
 
-def _described(answer: KeptAnswer, now: dict[str, str]) -> tuple[str, bool]:
-    """Describe whether an answer is still given; and whether it is stale."""
+def _described(answer: KeptAnswer, now: dict[str, str], changed: str) -> tuple[str, bool]:
+    """Describe whether an answer is still given; and whether it is stale.
+
+    Args:
+        answer: The answer.
+        now: Digests of the few runs.
+        changed: Name of what the study asks for otherwise; empty if nothing.
+    """
     dated = f"{answer.status}, {answer.version}, {answer.date}"
+    since = f", marked since {answer.stale_since}" if answer.stale_since else ""
+    if changed:
+        return f"no longer given: {changed} has changed ({dated}{since})", True
     if not answer.sampled:
         return f"measured in real time, so not compared ({dated})", False
     same = sum(answer.sampled.get(key) == digest for key, digest in now.items())
     if same == len(answer.sampled) == len(now):
         return f"still given ({dated})", False
-    since = f", marked since {answer.stale_since}" if answer.stale_since else ""
     return f"no longer given: {same} of {len(now)} runs are the same ({dated}{since})", True
 
 
@@ -98,6 +109,13 @@ def _mark(answer: KeptAnswer, folder: Path) -> None:
     from dva_sim.experiments.report import kept_answers  # late: start-up
 
     kept_answers.mark_stale(answer, __version__, folder)
+
+
+def _changed(name: str, folder: Path) -> str:
+    from dva_sim.experiments.report import kept_answers  # late: start-up
+    from dva_sim.experiments.study.file_kinds import open_study  # late: start-up
+
+    return kept_answers.changed_since(name, open_study(name), folder)
 
 
 def _sampled(names: list[str], jobs: int | None) -> dict[str, SampledRuns]:

@@ -82,7 +82,7 @@ def _grouped(path: Path, keys: tuple[str, ...]) -> _Runs:
 
 
 def _labels(row: Mapping[str, str]) -> dict[str, str]:
-    """What tells in words, or by the number of a cell, of what a command is one."""
+    """Columns in words, and the number of a cell: a command of another value is of another kind."""
     return {
         key: value for key, value in row.items() if key == "cell" or not _NUMBER.fullmatch(value)
     }

@@ -1,13 +1,14 @@
 """A few runs of a study, and their digests: enough to tell whether the program still gives them.
 
-The first, the middle and the last configuration of each part are run once, by the first person.
+Of each part so many configurations are run once, by the first person, that every level of every
+factor is among them.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from typing import Any, NamedTuple
@@ -31,8 +32,17 @@ def sampled_jobs(study: Study) -> Iterator[tuple[int, StudyJob]]:
     first = [job for job in jobs(study, cells(study)) if job.person == 0 and job.trial == 0]
     for part in dict.fromkeys(job.part for job in first):
         of_part = [job for job in first if job.part == part]
-        for index in sorted({0, len(of_part) // 2, len(of_part) - 1}):
+        for index in _covering([set(job.cell) for job in of_part]):
             yield index, of_part[index]
+
+
+def _covering(cells: Sequence[set[tuple[str, Any]]]) -> list[int]:
+    """The first cell and, one by one, those with the most levels that none before has."""
+    chosen, left = [0], set().union(*cells) - cells[0]
+    while left:
+        chosen.append(max(range(len(cells)), key=lambda n: (len(cells[n] & left), -n)))
+        left -= cells[chosen[-1]]
+    return sorted(chosen)
 
 
 class SampledRun(NamedTuple):

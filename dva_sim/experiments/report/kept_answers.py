@@ -10,22 +10,37 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from dva_sim.experiments.analysis.choice_map import ChoiceMap
 from dva_sim.experiments.analysis.predictions import judge_all
 from dva_sim.experiments.execution.checkpoint import load_so_far
 from dva_sim.experiments.execution.sampled_runs import Digests, SampledRuns
+from dva_sim.experiments.report.cell_table import CellTable
+from dva_sim.experiments.report.choice_table import beside_table, choice_table
 from dva_sim.experiments.report.summary import Reading
-from dva_sim.experiments.results.manifest import status_of
+from dva_sim.experiments.results.manifest import manifest_of, status_of
 from dva_sim.experiments.study.parts import REPEATS
+from dva_sim.experiments.study.plan import StudyPlan
+from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.whole_files import write_whole
 
 FOLDER, HISTORY = "answers", "history.csv"
 _MANIFEST = ".manifest.json"
+
+
+Table = tuple[tuple[str, ...], ...]
+_ASKED = {
+    "study": "the study's file",
+    "scenarios": "a scenario",
+    "parameter_sets": "a model of the persons",
+    "tuned": "a tuned value",
+    "cells": "a configuration",
+}
 
 
 @dataclass(frozen=True)
@@ -63,6 +78,8 @@ class KeptAnswer:
         tables: SHA-256 of each table of results.
         sampled: Digests of a few runs; empty where runs are measured in real time.
         stale_since: Version that first gave something else; empty while it is still given.
+        map: Table of a choice map, its heads first; empty without one.
+        beside: Table of what runs are like in each of its cells, likewise.
     """
 
     study: str
@@ -85,6 +102,8 @@ class KeptAnswer:
     tables: Mapping[str, str]
     sampled: Digests = field(default_factory=dict)
     stale_since: str = ""
+    map: Table = ()
+    beside: Table = ()
 
 
 def answer_in(folder: Path) -> tuple[KeptAnswer, dict[str, Any]]:
@@ -129,8 +148,34 @@ def answer_in(folder: Path) -> tuple[KeptAnswer, dict[str, Any]]:
         runs=int(manifest["runs"]),
         cpu_s=float(machine["cpu_s"]),
         tables=dict(manifest["tables"]),
+        map=_table(reading, choice_table),
+        beside=_table(reading, beside_table),
     )
     return kept, manifest
+
+
+def _table(reading: Reading, of_map: Callable[[ChoiceMap, str], CellTable]) -> Table:
+    if reading.map is None:
+        return ()
+    found = of_map(reading.map, "")
+    return tuple(map(tuple, (found.heads, *found.rows)))
+
+
+def changed_since(name: str, study: Study, folder: Path) -> str:
+    """Name what a study asks for otherwise than when its answer was kept; empty if nothing.
+
+    Args:
+        name: Name of the study.
+        study: The study as its file is now.
+        folder: Folder of the kept answers.
+    """
+    before = json.loads((folder / f"{name}{_MANIFEST}").read_text(encoding="utf-8"))
+    now = json.loads(json.dumps(manifest_of(StudyPlan.of(study))))
+    for key, what in _ASKED.items():
+        if before[key] != now[key]:
+            return what
+    files = before["inputs"].keys() & now["inputs"].keys()
+    return next((f for f in sorted(files) if before["inputs"][f] != now["inputs"][f]), "")
 
 
 def refuse_other_runs(folder: Path, sampled: SampledRuns) -> None:
@@ -193,8 +238,9 @@ def keep(answer: KeptAnswer, manifest: Mapping[str, Any], folder: Path) -> Path:
 
 
 def _is_same(before: KeptAnswer, answer: KeptAnswer) -> bool:
-    """True if two answers differ in their wording at most."""
-    return replace(before, answer=answer.answer) == answer
+    """True if two answers of a version give the same numbers for the same contrast."""
+    names = "version", "status", "measure", "contrast", "over", "rows", "stale_since"
+    return all(getattr(before, name) == getattr(answer, name) for name in names)
 
 
 def _text(data: Mapping[str, Any]) -> str:
@@ -229,7 +275,8 @@ def read(file: Path) -> KeptAnswer:
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
         rows = tuple(AnswerRow(**row) for row in data["rows"])
-        pairs = {key: tuple(map(tuple, data[key])) for key in ("predictions", "hypotheses")}
+        lists = ("predictions", "hypotheses", "map", "beside")
+        pairs = {key: tuple(map(tuple, data.get(key, ()))) for key in lists}
         contrast = tuple(data["contrast"]) if data["contrast"] else None
         return KeptAnswer(**data | {"rows": rows, "contrast": contrast} | pairs)
     except OSError as error:

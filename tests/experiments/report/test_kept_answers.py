@@ -12,6 +12,8 @@ from dva_sim.cli import answers as command
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.execution.sampled_runs import SampledRun, sampled_jobs
 from dva_sim.experiments.report import kept_answers
+from dva_sim.experiments.results.manifest import manifest_of
+from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.kernel.errors import ConfigError, ExitCode
 from dva_sim.kernel.wording import first_and_rest
 
@@ -77,9 +79,41 @@ def test_an_answer_that_is_replaced_becomes_history(kept):
     ],
 )
 def test_whether_an_answer_is_still_given_is_told_by_its_runs(kept, sampled, now, words, is_stale):
-    text, found = command._described(replace(kept[0], sampled=sampled), now)
+    text, found = command._described(replace(kept[0], sampled=sampled), now, "")
     assert words in text
     assert found is is_stale
+
+
+def test_what_a_study_asks_for_otherwise_is_named_before_any_run(kept, tmp_path):
+    answer, manifest, folder = kept
+    trace = tmp_path / "cell.up"
+    trace.write_text("1\n2\n")
+    with_trace = f"link.trace_up={trace}"
+    traced = manifest_of(StudyPlan.of(study_in(tmp_path, with_trace)))
+    kept_answers.keep(answer, manifest, folder)
+
+    def changed(*settings):
+        study = study_in(tmp_path, *settings)
+        return kept_answers.changed_since(answer.study, study, folder)
+
+    assert changed() == ""
+    assert changed("persons=2") == "the study's file"
+    assert changed("robot.processing_s=0.3") == "a scenario"
+    kept_answers.keep(answer, traced, folder)
+    assert changed(with_trace) == ""
+    trace.write_text("1\n3\n")
+    assert changed(with_trace) == str(trace)
+    text, is_stale = command._described(answer, {}, "a scenario")
+    assert is_stale
+    assert "a scenario has changed" in text
+
+
+def test_every_level_is_among_the_few_runs(tmp_path):
+    study = study_in(tmp_path)
+    levels = {pair for _, job in sampled_jobs(study) for pair in job.cell}
+    assert levels == {(name, level) for name, some in study.factors.items() for level in some}
+    parts = [job.part for _, job in sampled_jobs(study)]
+    assert max(map(parts.count, parts)) <= 4
 
 
 def test_an_answer_that_is_no_longer_given_fails_the_gate_until_it_is_marked(kept, monkeypatch):
@@ -87,6 +121,7 @@ def test_an_answer_that_is_no_longer_given_fails_the_gate_until_it_is_marked(kep
     kept_answers.keep(replace(answer, sampled={"drive/0": "1"}), manifest, folder)
     changed = {answer.study: {"drive/0": SampledRun("2", {})}}
     monkeypatch.setattr(command, "_sampled", lambda names, jobs: changed)
+    monkeypatch.setattr(command, "_changed", lambda name, folder: "")
     assert command._compare(folder, [], False, 1) == ExitCode.GATE_FAILED
     assert command._compare(folder, [], True, 1) == ExitCode.OK
     assert command._compare(folder, [], False, 1) == ExitCode.OK
