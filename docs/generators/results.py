@@ -27,12 +27,17 @@ _FIXED = (
 """Keys whose values a page of results names, unless the study varies them."""
 _HEAD = """\
 What the shipped studies answered, by which version and when. Each answer is kept in
-`experiments/answers` with the manifest of its run. `dva-sim answers` repeats a few runs of each
-study and reports answers that this version no longer gives.
+`experiments/answers` with the manifest of its run. `dva-sim answers` compares that with the study
+as it is now, repeats some of its runs, and reports answers that this version no longer gives.
 
 *Declared* means run as the study's file says; *confirmatory* means registered before the run.
 Intervals describe the simulated persons. They hold for real people as far as the models do:
 [operators and assumptions](../explanation/operators.md) says how far that is."""
+_HOW_TO_READ = (
+    "What each choice costs beyond the best one on its link, from the least to the greatest over "
+    'the models of the persons. "=": no worse by what matters; "?": not settled; "never": not '
+    "done by anybody under some model."
+)
 
 
 def paths() -> list[str]:
@@ -154,10 +159,14 @@ def _answered(answer: KeptAnswer, folder: Path) -> Iterator[str]:
 
 def _map(answer: KeptAnswer) -> Iterator[str]:
     """Yield the table of a choice map, and what runs are like in each of its cells."""
-    for title, found in (("The map", answer.map), ("What drives are like", answer.beside)):
+    for title, words, found in (
+        ("The map", _HOW_TO_READ, answer.map),
+        ("What drives are like", "From the least to the greatest over the models.", answer.beside),
+    ):
         if found:
             heads, *rows = ([prose(cell) for cell in row] for row in found)
             yield f"## {title}"
+            yield words
             yield table(heads, rows)
 
 
