@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from dva_sim.cli.names import everything
-from dva_sim.experiments.report.kept_answers import HISTORY, KeptAnswer, all_kept
+from dva_sim.experiments.report.kept_answers import (
+    HISTORY,
+    KeptAnswer,
+    all_kept,
+    read_manifest,
+)
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import capital, first_and_rest, number
 from dva_sim.kernel.yaml_files import load_yaml
@@ -35,8 +39,8 @@ Intervals describe the simulated persons. They hold for real people as far as th
 [operators and assumptions](../explanation/operators.md) says how far that is."""
 _HOW_TO_READ = (
     "What each choice costs beyond the best one on its link, from the least to the greatest over "
-    'the models of the persons. "=": no worse by what matters; "?": not settled; "never": not '
-    "done by anybody under some model."
+    'the models of the persons. "=": as good as the best; "?": not settled; "never": under some '
+    "model no run was finished."
 )
 
 
@@ -133,7 +137,7 @@ def _open(study: str) -> Iterator[str]:
 
 
 def _answered(answer: KeptAnswer, folder: Path) -> Iterator[str]:
-    manifest = json.loads((folder / f"{answer.study}.manifest.json").read_text(encoding="utf-8"))
+    manifest = read_manifest(answer.study, folder)
     yield "## Answer"
     first, rest = first_and_rest(answer.answer)
     yield f"**{prose(first)}** {prose(rest)}"

@@ -53,8 +53,11 @@ def _folder() -> Path:
 
 def _keep(results: Path, folder: Path, jobs: int | None) -> None:
     from dva_sim.experiments.report import kept_answers  # late: start-up
+    from dva_sim.experiments.study.file_kinds import open_study  # late: start-up
 
     answer, manifest = kept_answers.answer_in(results)
+    if changed := kept_answers.changed_since(manifest, open_study(answer.study)):
+        raise ConfigError(f"{results}: {changed} has changed since; run the study again")
     sampled = _sampled([answer.study], jobs)[answer.study]
     kept_answers.refuse_other_runs(results, sampled)
     digests = {key: run.digest for key, run in sampled.items()}
@@ -115,7 +118,7 @@ def _changed(name: str, folder: Path) -> str:
     from dva_sim.experiments.report import kept_answers  # late: start-up
     from dva_sim.experiments.study.file_kinds import open_study  # late: start-up
 
-    return kept_answers.changed_since(name, open_study(name), folder)
+    return kept_answers.changed_since(kept_answers.read_manifest(name, folder), open_study(name))
 
 
 def _sampled(names: list[str], jobs: int | None) -> dict[str, SampledRuns]:

@@ -39,14 +39,14 @@ def read_once(
 
 
 def version_of(file: Path) -> Version:
-    """Path of a file, and numbers that are others after any change of it; none if it is not there.
+    """Path of a file, and numbers that differ after any change; no numbers if it does not exist.
 
-    The time of the last change of its status is among them, since that of its contents can be set
-    back, as tools do that copy or unpack.
+    They include the time of the last status change, since tools that copy or unpack files set the
+    modification time back.
     """
     path = file.absolute()
     try:
         status = path.stat()
-    except (OSError, ValueError):  # whoever reads it says so
+    except (OSError, ValueError):  # reported when the file is read
         return str(path), ()
     return str(path), (status.st_ino, status.st_ctime_ns, status.st_mtime_ns, status.st_size)

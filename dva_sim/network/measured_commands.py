@@ -73,7 +73,7 @@ def _grouped(path: Path, keys: tuple[str, ...]) -> _Runs:
     with opened(path, "rt", encoding="utf-8", newline="") as lines:
         for row in _rows(csv.reader(lines), {*_TIMES, *keys}, path):
             values = tuple(row[key] for key in keys)
-            _refuse_another(labels.setdefault(values, _labels(row)), row, path)
+            _refuse_mixture(labels.setdefault(values, _labels(row)), row, path)
             runs = groups.setdefault(values, {})
             run = runs.setdefault(tuple(row.get(key) for key in _OF_RUN), [])
             if row["made_s"]:
@@ -82,27 +82,27 @@ def _grouped(path: Path, keys: tuple[str, ...]) -> _Runs:
 
 
 def _labels(row: Mapping[str, str]) -> dict[str, str]:
-    """Columns in words, and the number of a cell: a command of another value is of another kind."""
+    """Return the columns that tell which middleware, link or cell a command belongs to."""
     return {
         key: value for key, value in row.items() if key == "cell" or not _NUMBER.fullmatch(value)
     }
 
 
-def _refuse_another(labels: Mapping[str, str], row: Mapping[str, str], path: Path) -> None:
+def _refuse_mixture(labels: Mapping[str, str], row: Mapping[str, str], path: Path) -> None:
     """Refuse commands of several middlewares or links as if they were of one."""
     for key, value in labels.items():
         if row[key] != value and key not in _TIMES:
-            problem = f"commands of {key} {value} and {row[key]} are mixed; choose one by `where`"
+            problem = f"mixes commands of {key} {value} and {row[key]}; choose one with `where`"
             raise ConfigError(problem, path)
 
 
 def _command(row: Mapping[str, str], path: Path) -> SentCommand:
     made, arrived = float(row["made_s"]), float(row["arrived_s"] or math.nan)
     if not math.isfinite(made) or math.isinf(arrived):
-        raise ConfigError("times should be finite; an empty cell is a command that was lost", path)
+        raise ConfigError("times should be finite; leave the cell of a lost command empty", path)
     if arrived < made:
-        problem = f"a command of {made:g} s arrived at {arrived:g} s, before it was sent"
-        raise ConfigError(f"{problem}: the two clocks differ", path)
+        problem = f"a command sent at {made:g} s arrived earlier, at {arrived:g} s"
+        raise ConfigError(f"{problem}; do the two clocks differ?", path)
     return SentCommand(made, arrived)
 
 

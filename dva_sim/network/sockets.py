@@ -191,17 +191,18 @@ BIND_AGAIN: Final = 0.05  # while a port is not free yet that was just closed [s
 RETRY: Final = 5.0  # after ZeroMQ gave up to connect [s]
 PORT_TRIES: Final = 50
 MOST_SOCKETS: Final = 60_000
-# A peer that loses its power disappears without closing its connections. Who only listens to it
-# would wait for ever, and the next request for its time-out; its own would be kept for good.
+# A peer that loses its power disappears without closing its connections. Without these options a
+# subscriber would wait for ever and a request for its time-out, and a listener would keep dead
+# connections.
 CLIENT: Final[Mapping[int, int]] = {
     zmq.TCP_KEEPALIVE: 1,
-    zmq.TCP_KEEPALIVE_IDLE: 2,  # silence after which the kernel asks for a sign of life [s]
-    zmq.TCP_KEEPALIVE_INTVL: 2,  # from one question to the next [s]
-    zmq.TCP_KEEPALIVE_CNT: 15,  # questions without an answer that end a connection
-    zmq.TCP_MAXRT: 30_000,  # time that sent bytes may stay unacknowledged [ms]
-    zmq.CONNECT_TIMEOUT: 10_000,  # before it starts anew: the kernel's pauses grow [ms]
+    zmq.TCP_KEEPALIVE_IDLE: 2,  # silence before the kernel probes the peer [s]
+    zmq.TCP_KEEPALIVE_INTVL: 2,  # between probes [s]
+    zmq.TCP_KEEPALIVE_CNT: 15,  # unanswered probes that end a connection
+    zmq.TCP_MAXRT: 30_000,  # how long sent bytes may stay unacknowledged [ms]
+    zmq.CONNECT_TIMEOUT: 10_000,  # before a new attempt: the kernel's own pauses double [ms]
 }
-# More patient, since a phone that sleeps and only listens would never connect again.
+# More patient: a phone that sleeps and only listens would never reconnect.
 LISTENER: Final[Mapping[int, int]] = {
     zmq.TCP_KEEPALIVE: 1,
     zmq.TCP_KEEPALIVE_IDLE: 30,

@@ -13,7 +13,7 @@ from client import DVA, field
 def listen(address):
     """Return a socket that gets the heartbeats of the DVA at that address."""
     socket = zmq.Context.instance().socket(zmq.SUB)
-    # Else nothing would show that the DVA's machine has lost its power and come back.
+    # Without probes a DVA whose machine lost its power and restarted would stay silent.
     socket.setsockopt(zmq.TCP_KEEPALIVE, 1)
     socket.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 2)
     socket.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)

@@ -13,7 +13,7 @@ from dva_sim.worlds.site import load_site
 
 
 def later(path, text):
-    """Write another file in the place of one, as editors do; it is never the same to the disk."""
+    """Replace a file by a new one, as editors do."""
     new = path.with_name("new")
     new.write_text(text)
     new.replace(path)

@@ -127,15 +127,15 @@ def test_a_damaged_table_is_refused_in_a_line(tmp_path, name, damage):
 @pytest.mark.parametrize(
     ("rows", "where", "problem"),
     [
-        ("a,x,1,0.9\n", {}, "before it was sent"),
+        ("a,x,1,0.9\n", {}, "arrived earlier"),
         ("a,x,nan,1\n", {}, "should be finite"),
         ("a,x,1,inf\n", {}, "should be finite"),
-        ("a,x,1,2\na,y,1,2\n", {"middleware": "a"}, "link x and y are mixed"),
+        ("a,x,1,2\na,y,1,2\n", {"middleware": "a"}, "mixes commands of link x and y"),
         ("a,x,one,2\n", {}, "should be numbers"),
         ("", {}, "no command was measured"),
     ],
 )
-def test_a_table_that_would_drive_otherwise_than_meant_is_refused(tmp_path, rows, where, problem):
+def test_a_table_with_impossible_or_mixed_commands_is_refused(tmp_path, rows, where, problem):
     file = tmp_path / "commands.csv"
     file.write_text(HEAD + rows)
     with pytest.raises(ConfigError, match=problem):

@@ -36,16 +36,16 @@ class ChoiceMap:
     """The regret of each choice in each situation, under each model of the persons.
 
     Attributes:
-        measure: Column in which the loss is counted; where more of it is better, the loss is its
-            negative.
+        measure: Column in which the loss is counted; its negative is the loss where more of it is
+            better.
         choice: Factor of the choices, `c` levels.
         given: Factor of the situations, `g` levels.
         models: Factor of the models of persons, `m` levels.
-        mean: Mean loss, `(g, c, m)`.
+        mean: Mean of the measure, `(g, c, m)`.
         regret: Mean loss beyond the least one, `(g, c, m)`; 0 for the best choice.
         is_clear: True where the 95 % band of the regret lies above 0 and the regret above
-            `smallest`, `(g, c, m)`. The band, paired by person and trial, holds every difference
-            of two choices in a situation at once, so whichever was found to be best.
+            `smallest`, `(g, c, m)`. The band, paired by person and trial, is simultaneous for all
+            differences in a situation, so it stays valid for the best choice found.
         is_same: True where that band excludes a regret above `smallest`, `(g, c, m)`.
         smallest: Smallest difference that matters; 0 where none was declared.
         most: Value of runs that never ended; infinite if the measure is unbounded.
@@ -85,7 +85,7 @@ class ChoiceMap:
 
     @cached_property
     def worst(self) -> Floats:
-        """Greatest regret over the models, `(g, c)`; infinite where runs of others end alone."""
+        """Greatest regret over the models, `(g, c)`; infinite where another finishes runs alone."""
         fails = (self.never & ~self.never.all(axis=1, keepdims=True)).any(axis=2)
         return np.where(fails, np.inf, self.regret.max(axis=2))
 
@@ -154,18 +154,18 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
     cells = _cells(view.part, view.part.grid(view.measure), axes)  # (g, c, m, persons, trials)
     is_loss = measure_called(view.measure).better == "small"
     losses = cells if is_loss else -cells
-    mean = nan_mean(nan_mean(losses, axis=-1), axis=-1)
-    if not np.isfinite(mean).all():
+    loss = nan_mean(nan_mean(losses, axis=-1), axis=-1)
+    if not np.isfinite(loss).all():
         return None
     smallest = view.smallest_effect or 0.0
-    is_clear, is_same = _judged(losses, mean.argmin(axis=1), smallest)
+    is_clear, is_same = _judged(losses, loss.argmin(axis=1), smallest)
     return ChoiceMap(
         measure=view.measure,
         choice=view.line,
         given=view.over,
         models=models,
-        mean=mean,
-        regret=mean - mean.min(axis=1, keepdims=True),
+        mean=loss if is_loss else -loss,
+        regret=loss - loss.min(axis=1, keepdims=True),
         is_clear=is_clear,
         is_same=is_same,
         smallest=smallest,

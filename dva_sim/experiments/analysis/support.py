@@ -88,8 +88,8 @@ def _loop_delays(part: RunGrid) -> Floats | None:
 def _waiting(part: RunGrid, own: str, delays: Floats) -> Floats:
     """Share of the driving time that each cell's persons moved and waited.
 
-    Where it is not measured, all others but those of that strategy count as steering all the
-    time, so that too many cells are marked rather than too few.
+    Where it is not measured, only persons of the strategy `move_and_wait` count as waiting. That
+    marks too many cells rather than too few.
     """
     if part.has(WAITING):
         shares = part.grid(WAITING)

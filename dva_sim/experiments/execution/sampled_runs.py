@@ -1,7 +1,6 @@
 """A few runs of a study, and their digests: enough to tell whether the program still gives them.
 
-Of each part so many configurations are run once, by the first person, that every level of every
-factor is among them.
+The first person runs as many configurations of each part as cover every level of every factor.
 """
 
 from __future__ import annotations

@@ -146,6 +146,9 @@ def lead_of(found: ChoiceMap) -> str:
         return f"No difference that matters was found on any {given} tried, {over}."
     if best:
         return f"Nothing is better than {listing(best)} on any {given} tried, {over}."
+    if np.isinf(found.overall).all():
+        what = factor_name(found.choice.name)
+        return f"Each {what} fails on some {given} on which another does not, {over}."
     if not found.is_worse.any():
         what = factor_name(found.choice.name)
         return f"The study is too small to tell which {what} is best on any {given} tried, {over}."
@@ -202,7 +205,7 @@ def _best(found: ChoiceMap, situation: int) -> str:
 
 
 def regret_number(value: float) -> str:
-    """Format a regret, which has room for no more; infinite if others end runs alone."""
+    """Format a regret, which has room for no more; infinite if another finishes runs alone."""
     if not math.isfinite(value):
         return "never" if math.isinf(value) else "–"
     return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"

@@ -161,21 +161,19 @@ def _table(reading: Reading, of_map: Callable[[ChoiceMap, str], CellTable]) -> T
     return tuple(map(tuple, (found.heads, *found.rows)))
 
 
-def changed_since(name: str, study: Study, folder: Path) -> str:
-    """Name what a study asks for otherwise than when its answer was kept; empty if nothing.
+def changed_since(manifest: Mapping[str, Any], study: Study) -> str:
+    """Name what has changed in a study since it was run; empty if nothing has.
 
     Args:
-        name: Name of the study.
+        manifest: Manifest of the run.
         study: The study as its file is now.
-        folder: Folder of the kept answers.
     """
-    before = json.loads((folder / f"{name}{_MANIFEST}").read_text(encoding="utf-8"))
     now = json.loads(json.dumps(manifest_of(StudyPlan.of(study))))
     for key, what in _ASKED.items():
-        if before[key] != now[key]:
+        if manifest.get(key) != now[key]:
             return what
-    files = before["inputs"].keys() & now["inputs"].keys()
-    return next((f for f in sorted(files) if before["inputs"][f] != now["inputs"][f]), "")
+    before, files = manifest.get("inputs", {}), now["inputs"]
+    return next((f for f in sorted(before.keys() & files) if before[f] != files[f]), "")
 
 
 def refuse_other_runs(folder: Path, sampled: SampledRuns) -> None:
@@ -283,6 +281,21 @@ def read(file: Path) -> KeptAnswer:
         raise ConfigError(f"{file} cannot be read: {error.strerror}") from None
     except (ValueError, TypeError, KeyError) as error:
         raise ConfigError(f"{file} is not a kept answer: {error}") from None
+
+
+def read_manifest(study: str, folder: Path) -> dict[str, Any]:
+    """Read the manifest that is kept beside the answer of a study.
+
+    Raises:
+        ConfigError: the file cannot be read, or is not a manifest.
+    """
+    file = folder / f"{study}{_MANIFEST}"
+    try:
+        return dict(json.loads(file.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise ConfigError(f"{file} cannot be read: {error.strerror}") from None
+    except (ValueError, TypeError) as error:
+        raise ConfigError(f"{file} is not a manifest: {error}") from None
 
 
 def mark_stale(answer: KeptAnswer, version: str, folder: Path) -> None:

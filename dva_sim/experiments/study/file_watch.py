@@ -1,4 +1,4 @@
-"""Files that runs read while a study is run: all runs are to read the same."""
+"""Watch on the files that the runs of a study read, so that all runs read the same contents."""
 
 from __future__ import annotations
 
@@ -12,14 +12,13 @@ Files = Callable[[], Iterable[tuple[str, Path]]]
 
 
 class FileWatch:
-    """Remembers files, and refuses runs made after one of them was written.
+    """Remembers the versions of files, and refuses runs made after a change.
 
-    A look costs a fifth of a millisecond while nothing has changed, neither in a file nor in a
-    folder that may get a new one.
+    A check takes 0.2 ms while no file, and no folder that may get a new one, has changed.
 
     Args:
-        files: Gives names for messages and paths of the files, as runs would find them now.
-        folders: Gives the folders in which a new file might be found in the place of one of them.
+        files: Returns the files' names for messages, and their paths as runs would find them now.
+        folders: Returns the folders in which a new file could hide one of them.
     """
 
     def __init__(self, files: Files, folders: Callable[[], Iterable[Path]]) -> None:
@@ -31,10 +30,10 @@ class FileWatch:
     def refuse_changes(self) -> None:
         """Do nothing while the files are as they were.
 
-        What was changed back meanwhile counts, too: some runs may have read it.
+        A file that was changed and restored also counts: some runs may have read the change.
 
         Raises:
-            ConfigError: one of them was written, has gone, or hides behind a new one.
+            ConfigError: a file was written or deleted, or a new one hides it.
         """
         if tuple(map(version_of, self._places)) == self._seen:
             return
@@ -44,8 +43,8 @@ class FileWatch:
         ]
         if changed:
             raise ConfigError(
-                f"{changed[0]} has changed since the study began, so what was under way is not "
-                "kept; run the same command again to resume, or give another folder with -o"
+                f"{changed[0]} has changed since the study began, so the runs under way were "
+                "discarded; run the same command again to resume, or give another folder with -o"
             )
 
     def _look(self) -> dict[str, Version]:

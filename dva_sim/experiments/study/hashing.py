@@ -50,14 +50,14 @@ def input_names(scenarios: Iterable[Config], others: Iterable[str] = ()) -> list
 
 
 def hashes_of(names: Iterable[str]) -> dict[str, str]:
-    """64 bits over the contents of each of the `files_of` some names."""
+    """Return 64 bits over the contents of each of the `files_of` these names."""
     return {
         name: hashlib.sha256(path.read_bytes()).hexdigest()[:16] for name, path in files_of(names)
     }
 
 
 def files_of(names: Iterable[str]) -> Iterator[tuple[str, Path]]:
-    """Name and path of each file of some names, as it would be found now, and that these name."""
+    """Yield name and path of the files of some names, as found now, and of those they name."""
     for name in names:
         yield from _files_of(name)
 
@@ -109,7 +109,7 @@ def fingerprint() -> str:
 
 @cache
 def _simulating_code() -> tuple[tuple[str, bytes], ...]:
-    """The program at the first call: what changes later in its files is not loaded."""
+    """Digests of the program at the first call; later changes of its files are not loaded."""
     return tuple(_digests(_code(_CODE)))
 
 

@@ -58,7 +58,7 @@ def test_a_loop_that_is_measured_in_two_legs_is_their_sum():
 
 
 @pytest.mark.parametrize(("strategy", "is_outside"), [("adaptive", False), ("move_and_wait", True)])
-def test_who_is_not_seen_to_wait_waits_by_strategy_alone(strategy, is_outside):
+def test_without_a_measured_share_the_strategy_decides_who_waits(strategy, is_outside):
     part = part_of()
     delays = {"loop_delay_mean_s": np.full(6, 0.1 + 0.3)}
     table = {name: column for name, column in part.treated.items() if "wait" not in name}

@@ -92,17 +92,16 @@ def test_what_a_study_asks_for_otherwise_is_named_before_any_run(kept, tmp_path)
     traced = manifest_of(StudyPlan.of(study_in(tmp_path, with_trace)))
     kept_answers.keep(answer, manifest, folder)
 
-    def changed(*settings):
-        study = study_in(tmp_path, *settings)
-        return kept_answers.changed_since(answer.study, study, folder)
+    def changed(before, *settings):
+        return kept_answers.changed_since(before, study_in(tmp_path, *settings))
 
-    assert changed() == ""
-    assert changed("persons=2") == "the study's file"
-    assert changed("robot.processing_s=0.3") == "a scenario"
-    kept_answers.keep(answer, traced, folder)
-    assert changed(with_trace) == ""
+    before = kept_answers.read_manifest(answer.study, folder)
+    assert changed(before) == ""
+    assert changed(before, "persons=2") == "the study's file"
+    assert changed(before, "robot.processing_s=0.3") == "a scenario"
+    assert changed(json.loads(json.dumps(traced)), with_trace) == ""
     trace.write_text("1\n3\n")
-    assert changed(with_trace) == str(trace)
+    assert changed(json.loads(json.dumps(traced)), with_trace) == str(trace)
     text, is_stale = command._described(answer, {}, "a scenario")
     assert is_stale
     assert "a scenario has changed" in text
@@ -164,6 +163,14 @@ def test_a_file_that_is_no_answer_is_named(tmp_path):
         file.write_text(text)
         with pytest.raises(ConfigError, match=r"x\.json"):
             kept_answers.read(file)
+
+
+def test_a_manifest_that_is_missing_or_none_is_named(tmp_path):
+    with pytest.raises(ConfigError, match=r"x\.manifest\.json cannot be read"):
+        kept_answers.read_manifest("x", tmp_path)
+    (tmp_path / "x.manifest.json").write_text("[1]")
+    with pytest.raises(ConfigError, match="is not a manifest"):
+        kept_answers.read_manifest("x", tmp_path)
 
 
 def test_results_in_another_size_than_the_file_has_are_not_kept(tmp_path):

@@ -75,7 +75,7 @@ def test_settings_that_exclude_each_other_are_told_together(tmp_path):
 
 
 @pytest.mark.parametrize("turn", [1, -1])
-def test_settings_that_need_each_other_are_told_together_with_what_is_wrong_of_both(tmp_path, turn):
+def test_settings_that_depend_on_each_other_are_reported_together(tmp_path, turn):
     settings = ["pattern=measured.py:Measured", "pattern_options={file: nowhere.csv}"][::turn]
     path = tmp_path / "one.yaml"
     path.write_text("horizon_s: 60\n")

@@ -27,7 +27,7 @@ def serve_as_robot() -> None:
     network.join("robot", HOST, PORT)
     network.serve("robot", lambda request: request.answer(b"heard"))
     clock.every(PERIOD_S, lambda: network.publish("robot", "status|", b"here", 4) or True)
-    clock.run()
+    clock.run(clock.now + PATIENCE_S)
 
 
 def ip(*words: str) -> None:
@@ -35,7 +35,7 @@ def ip(*words: str) -> None:
 
 
 def has_connections() -> bool:
-    """True if this network stack takes any connection for established."""
+    """True if any connection of this network stack passes for established."""
     rows = Path("/proc/net/tcp").read_text().splitlines()[1:]
     return any(row.split()[3] == "01" for row in rows)
 
@@ -45,7 +45,7 @@ class Machine:
 
     def __init__(self) -> None:
         own = Path("/proc/self/ns/net").readlink()
-        self._stack = subprocess.Popen(["unshare", "--net", "sleep", "inf"])
+        self._stack = subprocess.Popen(["unshare", "--net", "sleep", str(PATIENCE_S)])
         pid = str(self._stack.pid)
         self._inside = f"nsenter --target {pid} --net".split()
         self._programs = [self._stack]
@@ -60,12 +60,12 @@ class Machine:
         self._programs.append(subprocess.Popen(robot))
 
     def lose_power(self) -> None:
-        ip("link set cable down")  # no last word leaves
+        ip("link set cable down")  # before anything can say goodbye
         for process in self._programs:
             process.kill()
             process.wait()
         with suppress(subprocess.CalledProcessError):
-            ip("link del cable")  # unless it has gone with the machine
+            ip("link del cable")  # unless it disappeared with the machine
 
 
 class Operator:
@@ -81,7 +81,7 @@ class Operator:
         self._network.subscribe("operator", "robot", "status|", self._hear)
 
     def gives_up_connections(self) -> bool:
-        """True once no connection is taken for established that is none."""
+        """True once no dead connection passes for established."""
         return self._lives_until(lambda: not has_connections())
 
     def hears(self) -> bool:
