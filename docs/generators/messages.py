@@ -22,7 +22,7 @@ _SINCE = re.compile(r"since (\d+\.\d+)")
 _KINDS = ("EmergencyMsg", "HBMsg", "RegMsg", "SimpleMsg")
 _PAYLOADS = (
     *("RobotStatus", "PersonStatus", "Mission", "TeleOp", "Sensor", "DevSub"),
-    *("Access", "Event", "RobotHolder", "Dispatch", "Reply"),
+    *("Access", "Event", "RobotHolder", "Dispatch", "RobotEmergency", "Reply"),
 )
 _UNMARKED = {
     **dict.fromkeys(("PersonStatus", "Access", "Event", "SensorInfo", "Permission"), "1.1"),

@@ -29,6 +29,7 @@ from dva_sim.worlds.geo import GeoFrame
 HEARTBEAT = "heartbeat|"  # topics; the bar ends each, so that none begins another
 STATUS = "status|"
 HOLDER = "holder|"
+EMERGENCY = "emergency|"
 EVENT = "event|"
 AUDIT = "audit|"
 HEARTBEAT_PERIOD = 2.0  # design: [s]

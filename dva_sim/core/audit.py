@@ -25,7 +25,8 @@ class Fact:
         label: Label of the author: of the policy its name, of a rule `rule`.
         role: Role of the author, if it is a control room: `look`, `drive`, `dispatch`, `supervise`.
         action: Kind of decision: `acknowledge`, `assign`, `take_off`, `false_alarm`, `escalate`,
-            `note`, `set_dispatch`, `revoke`, `raise`, `take`, `take_over`, `give_back`, `expire`.
+            `note`, `set_dispatch`, `revoke`, `raise`, `take`, `take_over`, `give_back`, `expire`,
+            `emergency`, `release_emergency`.
         event: Number of the event that it is about.
         device: Id of the guard or robot that it is about.
         operator: Id of the device that drives that robot.

@@ -115,6 +115,8 @@ def _why_not(
 
 def _why_not_a_robot(dispatcher: Dispatcher, robot: str, event: Event, now: float) -> str:
     orders = dispatcher.orders
+    if orders.emergencies.holds(robot):
+        return "stopped by an emergency: release it first"
     if event.state is State.CONFIRMED:
         return "a robot cannot deal with it"
     if orders.sessions.is_held(robot):

@@ -36,6 +36,7 @@ NEEDS: Final[dict[type, tuple[ControlRoomRole, str]]] = {
     m.FalseAlarm: (R.DISPATCH, "false_alarm"),
     m.Escalate: (R.DISPATCH, "escalate"),
     m.AddNote: (R.DISPATCH, "note"),
+    m.ReleaseEmergency: (R.DISPATCH, "release_emergency"),
     m.SetDispatch: (R.SUPERVISE, "set_dispatch"),
     m.Revoke: (R.SUPERVISE, "revoke"),
 }
@@ -108,6 +109,8 @@ class ControlRooms:
                 return self._set_dispatch(body, sender, now)
             case m.Revoke():
                 return self._revoke(body, sender, now)
+            case m.ReleaseEmergency():
+                return self._release_emergency(body, sender, now)
         return self._about_event(body, sender, action, now)
 
     def may(self, sender: m.Device, need: ControlRoomRole, action: str) -> str | None:
@@ -238,6 +241,8 @@ class ControlRooms:
             self._may_look(body, event)
         else:
             self._may_act(body, event, device, task)
+        if self._orders.emergencies.holds(device.id_tag):
+            raise _Refused(m.BUSY, f"{device.label} is stopped by an emergency: release it first")
         engaged = self._orders.engaged.all(device.id_tag)
         if engaged:
             text = f"{device.label} is at event {engaged[0].number}: take it off there first"
@@ -367,6 +372,28 @@ class ControlRooms:
             sender, "revoke", now, device=body.device, cause=body.reason or "", outcome=words
         )
         return RoomAnswer(m.OK, words, None, (*sends, *self._dispatcher.decide(now)))
+
+    def _release_emergency(
+        self, body: m.ReleaseEmergency, sender: m.Device, now: float
+    ) -> RoomAnswer:
+        """Release a robot; it asks the DVA itself before it takes orders again."""
+        action = "release_emergency"
+        robot = self._orders.registry.entries.get(body.device)
+        if robot is None or robot.device.device_type != ROBOT:
+            text = f"no robot {body.device}"
+            return self._refuse(body, sender, action, m.UNKNOWN_DEVICE, text, now)
+        emergencies = self._orders.emergencies
+        if (release := emergencies.who_released(body.device)) is not None:
+            return RoomAnswer(m.OK, f"released by {release.label}, {now - release.time:.1f} s ago")
+        if not emergencies.holds(body.device):
+            text = f"no emergency of {robot.device.label} is known"
+            return self._refuse(body, sender, action, m.WRONG_MODE, text, now)
+        reason = body.reason or ""
+        choice = Choice(sender.id_tag, sender.label, action, now, reason, robot.device.label)
+        emergencies.release(body.device, choice)
+        self._note(sender, action, now, device=body.device, cause=reason)
+        notice = Send(body.device, m.ReleaseEmergency(body.device))
+        return RoomAnswer(m.OK, "", None, (notice, *self._dispatcher.decide(now)))
 
     # --- what is kept of it ------------------------------------------------------------
 

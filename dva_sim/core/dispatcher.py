@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dva_sim.core.assignments import Assignments
 from dva_sim.core.auctions import Auctions
 from dva_sim.core.audit import Fact
 from dva_sim.core.dispatch import MinEta
@@ -217,6 +216,10 @@ class Dispatcher:
         least = ControlRoomRole.DISPATCH
         return any(self.roles.of(room.device.id_tag).includes(least) for room in rooms)
 
+    def stopped(self, robot: str, now: float) -> list[Send]:
+        """Open what a robot was sent to for others, since an emergency holds it."""
+        return [*self.orders.abandon(robot, now), *self.decide(now)]
+
     def _note(self, event: Event, choice: Assignment, view: PolicyView, now: float) -> None:
         """The policy has decided: a fact, and what people are compared with later."""
         orders = self.orders
@@ -327,14 +330,14 @@ class Patrols:
     _idle_since: dict[str, float] = field(default_factory=dict)
     _on_round: set[str] = field(default_factory=set)
 
-    def set_out(
-        self, registry: Registry, sessions: Sessions, engaged: Assignments, now: float
-    ) -> list[Send]:
+    def set_out(self, orders: Orders, now: float) -> list[Send]:
         """Return the messages to robots that have rested long enough."""
         sends: list[Send] = []
-        for entry in self._with_a_beat(registry):
+        sessions = orders.sessions
+        for entry in self._with_a_beat(orders.registry):
             robot = entry.device.id_tag
-            if entry.mode != "Idle" or robot in engaged or sessions.is_held(robot):
+            busy = robot in orders.engaged or sessions.is_held(robot)
+            if entry.mode != "Idle" or busy or orders.emergencies.holds(robot):
                 self._idle_since.pop(robot, None)
             elif now - self._idle_since.setdefault(robot, now) >= REST:
                 self._idle_since[robot] = now

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from itertools import chain
+from typing import Literal
 
 import numpy as np
 
 from dva_sim.core.assignments import Rules
+from dva_sim.core.audit import Fact
 from dva_sim.core.control_rooms import ControlRooms
 from dva_sim.core.device_list import DeviceLister
 from dva_sim.core.dispatch import Policy
 from dva_sim.core.dispatcher import Dispatcher, Patrols
+from dva_sim.core.event_status import by_whom
 from dva_sim.core.events import Event, EventTable, State, apart
 from dva_sim.core.handovers import Handovers
 from dva_sim.core.orders import Orders
@@ -30,6 +33,7 @@ from dva_sim.core.travel_times import SiteKnowledge, Travel
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.control_room import ControlRoomBody
 
+ReleasedBy = Literal["person", "drive"]
 Reaction = tuple[m.Reply, list[Send]]
 FOUND_WITHIN = 20.0  # of its event a finding has to be [m]
 
@@ -52,11 +56,14 @@ class Dva:
         ask_first: True if the policy asks a person before it sends anybody.
         policy_name: Name of the policy.
         audit: True to keep facts about decisions.
+        release: Who releases a robot after an emergency; None: a person if one who may is
+            registered, else a new start by its driver.
 
     Attributes:
         registry: Registered devices.
         events: Events.
         orders: Current orders.
+        emergencies: Robots that an emergency holds.
         dispatcher: Dispatcher that chooses responders.
         control_rooms: Answers those where people decide.
         trail: Decisions, to be taken by a recorder.
@@ -81,11 +88,14 @@ class Dva:
         ask_first: bool = False,
         policy_name: str = "",
         audit: bool = True,
+        release: ReleasedBy | None = None,
     ) -> None:
         self.sessions, self.access = sessions, access or Access()
         self.registry, self.events = Registry(), EventTable(rules.merge_distance)
         self.orders = Orders(rules, self.registry, self.events, sessions)
         self.trail, self.roles = self.orders.trail, roles or Roles()
+        self.emergencies = self.orders.emergencies
+        self._release_rule = release
         self.trail.keeps = audit
         self.dispatcher = Dispatcher(
             policy=policy,
@@ -171,6 +181,8 @@ class Dva:
             self.sessions.permissions.end(send.session)  # it may have restarted
         elif isinstance(body, m.HandoverRequest):
             sends = self.handovers.answered(send, False, now)
+        elif isinstance(body, m.Emergency):
+            sends = [send] if self.emergencies.holds(send.to) and self._is_there(send.to) else []
         else:
             self.sessions.undelivered(send)
         return self._and_revocations(sends)
@@ -188,7 +200,8 @@ class Dva:
         self.handovers.lapse(now)
         sends += self.sensing.renew(self.registry, self.sessions, now)
         sends += self.dispatcher.decide(now)
-        sends += self._patrols.set_out(self.registry, self.sessions, self.orders.engaged, now)
+        sends += self._patrols.set_out(self.orders, now)
+        self.emergencies.lapse(now, lambda robot: self.registry.entries[robot].last_heard)
         return self._and_revocations(sends)
 
     def next_deadline(self) -> float:
@@ -243,6 +256,8 @@ class Dva:
                 return self._give_back(message, entry, body, now)
             case m.GetGrant():
                 return self._grant_of(message, entry, body)
+            case m.RobotEmergency():
+                return self._emergency(message, entry, body, now)
             case m.GetDeviceList():
                 return self._ok(message, [], self._devices.listed())
             case m.GetSensorInfo():
@@ -284,6 +299,8 @@ class Dva:
             return self._refuse(message, m.BUSY, text)
         if known is not None and known.is_new_life(message.message_id, message.timestamp):
             sends = self._gone(message.source, now)  # it knows nothing of what it held
+            if self.emergencies.holds(message.source):
+                sends.append(Send(message.source, m.Emergency()))  # nor that it is stopped
             self.sessions.forget(message.source)  # nor which orders of a session it has obeyed
         if known is not None and known.device.address != body.address:
             self.sessions.forget(message.source)  # its holder has to ask for the new address
@@ -327,12 +344,17 @@ class Dva:
         return sends
 
     def _with_nothing_open(self, devices: Iterable[str]) -> Iterator[str]:
-        kept, engaged = self.sessions.with_something_open(), self.orders.engaged
+        kept, engaged = self.with_something_open(), self.orders.engaged
         return (d for d in devices if d not in kept and d not in engaged)
+
+    def with_something_open(self) -> set[str]:
+        """Return the robots that the DVA must not forget: held, to be told, or stopped."""
+        return self.sessions.with_something_open() | self.emergencies.stopped().keys()
 
     def _forget(self, device: str) -> None:
         self.sessions.forget(device)
         self._patrols.forget(device)
+        self.emergencies.forget(device)
         self.registry.forget(device)
 
     # --- who may do what ---------------------------------------------------------------
@@ -437,6 +459,27 @@ class Dva:
             grant.holder, grant.level, grant.session, grant.address, grant.sensors
         )
         return self._ok(message, [], permission)
+
+    def _emergency(
+        self, message: m.Message, robot: DeviceEntry, body: m.RobotEmergency, now: float
+    ) -> Reaction:
+        """Tell a robot how its emergency ends, and send others where it was going."""
+        if robot.device.device_type != ROBOT:
+            return self._refuse(message, m.NOT_SUPPORTED, "only a robot reports its emergency")
+        source, sends = message.source, list[Send]()
+        was_stopped = self.emergencies.holds(source)
+        stop = self.emergencies.hear(source, body, now)
+        if not was_stopped and stop.released is None:
+            stopped_by = body.stopped_by or source
+            label = self.orders.label_of(stopped_by)
+            fact = Fact(time=now, author=stopped_by, label=label, action="emergency", device=source)
+            self.trail.note(fact)
+            sends = self.dispatcher.stopped(source, now)
+        rule = self._release_rule
+        if rule is None:
+            rule = "person" if self.dispatcher.somebody_decides() else "drive"
+        content = m.EmergencyRelease(body.tick, rule, by_whom(stop.released, now))
+        return self._ok(message, sends, content)
 
     def check_access(self, now: float) -> None:
         """Permissions in use end with the rule that allowed them."""
@@ -585,7 +628,7 @@ class Dva:
     def _ok(
         message: m.Message,
         sends: list[Send],
-        content: m.DeviceList | m.Permission | m.SensorList | None = None,
+        content: m.DeviceList | m.Permission | m.SensorList | m.EmergencyRelease | None = None,
     ) -> Reaction:
         return m.Reply(message.message_id, m.OK, "", content), sends
 

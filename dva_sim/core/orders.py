@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from dva_sim.core.assignments import MOVE, SET_OUT, Assignments, Promise, Promises, Rules
 from dva_sim.core.audit import AuditTrail, Fact
+from dva_sim.core.emergencies import Emergencies
 from dva_sim.core.events import NEXT, Event, EventTable, State, apart
 from dva_sim.core.handling import Choice
 from dva_sim.core.registry import Registry
@@ -26,6 +27,7 @@ class Orders:
         engaged: Current task of each device.
         counters: Counters by name.
         trail: Trail of decisions.
+        emergencies: Robots that cannot be sent, as an emergency holds them.
     """
 
     rules: Rules
@@ -35,6 +37,7 @@ class Orders:
     engaged: Assignments = field(default_factory=Assignments)
     counters: Counter[str] = field(default_factory=Counter)
     trail: AuditTrail = field(default_factory=AuditTrail)
+    emergencies: Emergencies = field(default_factory=Emergencies)
     _pauses: list[float] = field(default_factory=list)
     _from_afar: set[tuple[str, int]] = field(default_factory=set)  # who said so, of which event
     _promises: Promises = field(init=False)

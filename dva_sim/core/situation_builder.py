@@ -148,11 +148,13 @@ class SituationBuilder:
     def _free(self, entries: Iterable[DeviceEntry], now: float) -> list[DeviceEntry]:
         """Those who may be given an order, in order of registration."""
         is_held, engaged = self.orders.sessions.is_held, self.orders.engaged
+        is_stopped = self.orders.emergencies.holds
         free = [
             e
             for e in entries
             if not e.silent and e.free_from <= now
             if e.device.id_tag not in engaged and not is_held(e.device.id_tag)
+            if not is_stopped(e.device.id_tag)
         ]
         return sorted(free, key=_place)
 

@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from dva_sim.core.dva import Dva
+from dva_sim.core.emergencies import Stop
 from dva_sim.core.events import KEPT_CLOSED, Event, State
 from dva_sim.core.handling import Choice, Handling
 from dva_sim.core.registry import DeviceEntry
@@ -32,8 +33,8 @@ from dva_sim.core.sessions import Grant
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol.messages import Device, PermissionRevocation, Position
 
-FORMAT = 2
-OLDER = 1  # times by the wall clock
+FORMAT = 3
+OLDER = 1, 2  # times by the wall clock; without emergencies
 MICROSECONDS = 1e6
 OPEN_WITHIN = 1.0  # that long somebody else may have the file to itself when it is opened [s]
 KEEPS_TIME = 1.0  # how often it is written how late it is while events are open [s]
@@ -47,6 +48,7 @@ CREATE TABLE IF NOT EXISTS events (number INTEGER PRIMARY KEY, open INTEGER, dat
 CREATE TABLE IF NOT EXISTS devices (id TEXT PRIMARY KEY, data TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS grants (session TEXT PRIMARY KEY, data TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS untold (session TEXT PRIMARY KEY, data TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS stops (robot TEXT PRIMARY KEY, data TEXT NOT NULL);
 INSERT OR REPLACE INTO about VALUES ('format', {FORMAT});
 COMMIT;
 """
@@ -77,7 +79,7 @@ class Store:
         self.past, self.keeps_time = 0.0, KEEPS_TIME
         self.between_writes: Callable[[], object] = lambda: None
         self._time_kept_at = -math.inf  # by the DVA's time
-        self._sessions: dict[str, dict[str, str]] = {"grants": {}, "untold": {}}
+        self._sessions: dict[str, dict[str, str]] = {table: {} for table in _KEYS}
         self._session_changes, self._asks = 0, False
         self._held: dict[int, Grant] = {}  # by session, as the DVA was last seen
         self._events: dict[int, Event] = {}
@@ -102,7 +104,7 @@ class Store:
         try:
             (tables,) = self._file.execute("SELECT count(*) FROM sqlite_master").fetchone()
             found = self._about("format") if tables else None
-            is_ours = found in (None, OLDER, FORMAT)
+            is_ours = found in (None, *OLDER, FORMAT)
         except (sqlite3.OperationalError, ValueError) as error:
             if "no such" not in str(error):
                 raise self._useless(error) from None
@@ -145,7 +147,7 @@ class Store:
         if not (self._events or self._devices or changed_sessions or self._time_is_due(dva, now)):
             return None
         sessions = self._sessions if changes == self._session_changes else _of_sessions(dva)
-        lasting = dva.sessions.with_something_open()
+        lasting = dva.with_something_open()
         entries = dva.registry.entries
         self._devices |= {i: entries[i] for i in lasting ^ self._lasting if i in entries}
         try:
@@ -210,7 +212,7 @@ class Store:
         for table, held in sessions.items():
             before = self._sessions[table]
             gone = before.keys() - held.keys()
-            put(f"DELETE FROM {table} WHERE session = ?", ((s,) for s in gone))
+            put(f"DELETE FROM {table} WHERE {_KEYS[table]} = ?", ((s,) for s in gone))
             new = held.items() - before.items()
             put(f"INSERT OR REPLACE INTO {table} VALUES (?, ?)", sorted(new))
         count = dva.sessions.permissions.count
@@ -257,7 +259,7 @@ class Store:
             for name in kept["engaged"]:
                 dva.orders.engaged.begin(name, event)
         dva.events.total = sum(dva.events.counts.values())
-        self._recall_sessions(dva)
+        self._recall_sessions(dva, now)
         if self._is_about("ask_first"):
             self._asks = dva.dispatcher.questions.asks = bool(self._about("ask_first"))
         dva.registry.changes()
@@ -281,16 +283,20 @@ class Store:
         )
         return {State(state): count for state, count in rows}
 
-    def _recall_sessions(self, dva: Dva) -> None:
+    def _recall_sessions(self, dva: Dva, now: float) -> None:
         permissions = dva.sessions.permissions
         for table, kept in self._sessions.items():
-            kept |= self._file.execute(f"SELECT session, data FROM {table} ORDER BY rowid")
+            columns = f"{_KEYS[table]}, data"
+            kept |= self._file.execute(f"SELECT {columns} FROM {table} ORDER BY rowid")
         for data in self._sessions["grants"].values():
             permissions.restore(_grant(json.loads(data)))
         for data in self._sessions["untold"].values():
             dva.sessions.tell_robot(PermissionRevocation(*json.loads(data)))
+        for robot, data in self._sessions["stops"].items():
+            stopped_by, tick = json.loads(data)
+            dva.emergencies.restore(robot, Stop(stopped_by, tick, now))
         self._session_changes, self._held = _session_changes(dva), _held(dva)
-        self._lasting = dva.sessions.with_something_open()
+        self._lasting = dva.with_something_open()
         permissions.count = max(permissions.count, self._about("sessions"))
 
     def _is_about(self, name: str) -> bool:
@@ -302,6 +308,7 @@ class Store:
         return int(row[0]) if row else 0
 
 
+_KEYS = {"grants": "session", "untold": "session", "stops": "robot"}
 # Renewed in its place: the order of registration is to last.
 _PUT_DEVICE = """
 INSERT INTO devices VALUES (?, ?) ON CONFLICT (id) DO UPDATE SET data = excluded.data
@@ -385,7 +392,7 @@ def _choice(kept: list[Any] | None, past: float) -> Choice | None:
 
 
 def _session_changes(dva: Dva) -> int:
-    return dva.sessions.permissions.changes + dva.sessions.changes
+    return dva.sessions.permissions.changes + dva.sessions.changes + dva.emergencies.changes
 
 
 def _held(dva: Dva) -> dict[int, Grant]:
@@ -400,7 +407,7 @@ def _is_same_right(one: Grant, other: Grant) -> bool:
 
 
 def _of_sessions(dva: Dva) -> dict[str, dict[str, str]]:
-    """Return valid sessions, and robots that have not heard of ended ones, by session."""
+    """Return valid sessions, ended ones of which robots have not heard, and stopped robots."""
     grants = dva.sessions.permissions.all()
     unacknowledged = [(s, send.body) for s, send in dva.sessions.unacknowledged.items()]
     return {
@@ -409,6 +416,10 @@ def _of_sessions(dva: Dva) -> dict[str, dict[str, str]]:
             str(session): json.dumps(_plain(body))
             for session, body in unacknowledged
             if isinstance(body, PermissionRevocation)
+        },
+        "stops": {
+            robot: json.dumps([stop.stopped_by, stop.tick])
+            for robot, stop in dva.emergencies.stopped().items()
         },
     }
 

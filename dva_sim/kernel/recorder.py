@@ -108,7 +108,8 @@ class ByHand(NamedTuple):
     Attributes:
         robot: Id of the robot.
         who: The hand.
-        what: `takes`, `drives`, `lets go`, or `stops` by the emergency button.
+        what: `takes`, `drives`, `lets go`, `stops` by the emergency button, `releases` after
+            that, or `stands`, which the robot does by itself.
         time: Now [s].
     """
 

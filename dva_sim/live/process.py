@@ -167,6 +167,7 @@ def _run_part(
         stage = Stage(
             *(scenario, options.seed, network, recorder, joining, _time_of_day(clock)),
             cameras=cameras,
+            attended=True,
         )
         if options.dva is not None and name != "dva":
             network.introduce(DVA, options.dva)

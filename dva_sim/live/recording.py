@@ -302,7 +302,7 @@ class Keeper:
     ) -> None:
         self._target, self.path = target, target.with_name(target.name + PART)
         start = {"format": FORMAT, "scenario": scenario.model_dump(mode="json"), "seed": seed}
-        start[HELD_TO] = terms_of(scenario).about_robots()
+        start[HELD_TO] = terms_of(scenario, attended=True).about_robots()
         self.problem: str | None = None
         self._room = MOST_BYTES
         self._file = _emptied(self.path)
@@ -375,7 +375,7 @@ class RunKeeping:
         scenario: Scenario,
         also: Callable[[bytes], object] | None = None,
     ) -> None:
-        self._judge = LiveJudge(terms_of(scenario))
+        self._judge = LiveJudge(terms_of(scenario, attended=True))
         self._keeper: Keeper | None = None
         self._inlets = Inlets(judge=self._judge, also=also)
         if options.records_run and options.record is not None:

@@ -147,6 +147,7 @@ def stage_of(
     return Stage(
         *(scenario, options.seed, network, recorder, join, (since_midnight, True)),
         cameras=cameras,
+        attended=True,
     )
 
 

@@ -141,6 +141,21 @@ class Revoke:
 
 
 @dataclass(frozen=True, slots=True)
+class ReleaseEmergency:
+    """Let a robot that an emergency has stopped take orders again.
+
+    The DVA sends the same to the robot, which asks the DVA before it believes that.
+
+    Attributes:
+        device: Id of the robot.
+        reason: Reason in words.
+    """
+
+    device: str
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class ByWhom:
     """Device that did something, its label, and how long ago that was [s], up to 1e6."""
 
@@ -346,6 +361,7 @@ ControlRoomBody = (
     | AddNote
     | GetProposal
     | Revoke
+    | ReleaseEmergency
     | EventStatus
     | DispatchStatus
     | AuditRecord

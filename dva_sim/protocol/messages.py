@@ -31,6 +31,7 @@ from dva_sim.protocol.control_room import (
     LastDecision,
     Proposal,
     Proposed,
+    ReleaseEmergency,
     Revoke,
     SetDispatch,
     TakeOff,
@@ -156,6 +157,39 @@ class RobotHolder:
     label: str | None
     held_for: float
     code: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RobotEmergency:
+    """Emergency that holds a robot: published by the robot, and sent to the DVA for a release.
+
+    Attributes:
+        stopped_by: Id of the device that stopped it first; None: its own button.
+        stopped_for: Time since then [s], up to 1e6.
+        tick: The robot's own clock at the newest emergency [ms]; a release is for that one.
+        released: Person who has released it; None: it is still stopped.
+    """
+
+    stopped_by: str | None
+    stopped_for: float
+    tick: int
+    released: ByWhom | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class EmergencyRelease:
+    """Answer of the DVA to a `RobotEmergency`: how that ends, or that it has ended.
+
+    Attributes:
+        tick: As in the request.
+        released_by: `person`: a permitted person has to release the robot. `drive`: nobody is
+            registered who could, so a new `StartTeleOp` of its holder does.
+        released: Person who has released it; None: nobody has.
+    """
+
+    tick: int
+    released_by: str
+    released: ByWhom | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -474,6 +508,7 @@ Content = (
     | Holder
     | SessionFloor
     | SensorList
+    | EmergencyRelease
     | ControlRoomContent
 )
 
@@ -504,6 +539,7 @@ Body = (
     | StopTeleOp
     | RobotStatus
     | RobotHolder
+    | RobotEmergency
     | PersonStatus
     | GoTo
     | Patrol

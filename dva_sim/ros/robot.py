@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any, Final
 
 from dva_sim.agents.robot.controller import Limits, RobotController
+from dva_sim.agents.robot.emergency_latch import EmergencyLatch
 from dva_sim.agents.robot.field_of_view import FieldOfView
 from dva_sim.agents.robot.robot import RobotAgent, RobotSetup
 from dva_sim.agents.robot.sensors import SensorPort
@@ -98,6 +99,7 @@ class RosRobot:
             Limits(limits.watchdog_s, limits.max_age_s),
             camera_url=stage.cameras.url(device.label, device.address),
             clock_offset=offset,
+            latch=EmergencyLatch(stage.release),
         )
         return RobotAgent(
             device,

@@ -6,9 +6,12 @@ from dataclasses import replace
 from typing import Any, Final
 
 from dva_sim.agents.robot.controller import Decision, Mode
+from dva_sim.core.emergencies import Stop
 from dva_sim.core.events import State
+from dva_sim.core.handling import Choice
 from dva_sim.core.handovers import Step
 from dva_sim.protocol import messages as m
+from dva_sim.simulation.full.stage import DVA
 from dva_sim.storms.planting import (
     RIGHT,
     Bug,
@@ -22,6 +25,7 @@ from dva_sim.storms.planting import (
 from dva_sim.worlds.bodies import TickTarget
 
 _CONTROLLER = "dva_sim.agents.robot.controller:RobotController"
+_LATCH = "dva_sim.agents.robot.emergency_latch:EmergencyLatch"
 LEAKED = 200  # things that are kept for ever until that shows in the number of acts
 
 
@@ -62,6 +66,50 @@ def _ready_at_once(original: Original, bug: Bug) -> Original:
         if known is not None and known.step is Step.STOPPING:
             bug.act(f"{robot} is handed over at {status.speed:.2f} m/s in mode {status.mode}")
             known.step, known.until = Step.READY, now + 30.0
+
+    return wrong
+
+
+def _ignores_latch(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, arrived: float, moving: bool, is_start: bool = False) -> Any:
+        was_held = self.latch.holds
+        self.latch.holds = False
+        refusal = original(self, arrived, moving, is_start)
+        self.latch.holds = was_held
+        if was_held and refusal is None:
+            bug.act(f"{self.id_tag} takes an order though nobody has released it")
+        return refusal
+
+    return wrong
+
+
+def _forgets_latch(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, clock_offset: float, now: float) -> None:
+        original(self, clock_offset, now)
+        if self.latch.holds:
+            bug.act(f"{self.id_tag} restarts, and is stopped no longer")
+            self.latch.release(None)
+
+    return wrong
+
+
+def _takes_any_release(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, answer: m.EmergencyRelease) -> None:
+        if self.holds and answer.released is not None and answer.tick != self.tick:
+            bug.act(f"a release of {answer.tick} ends the emergency of {self.tick}")
+            answer = replace(answer, tick=self.tick)
+        original(self, answer)
+
+    return wrong
+
+
+def _releases_unasked(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, robot: str, emergency: m.RobotEmergency, now: float) -> Stop:
+        stop: Stop = original(self, robot, emergency, now)
+        if stop.released is None:
+            bug.act(f"{robot} is released by nobody")
+            return replace(stop, released=Choice(DVA, "dva", "release_emergency", now))
+        return stop
 
     return wrong
 
@@ -176,8 +224,48 @@ LATER_MUTANTS: Final[dict[str, Mutant]] = {
     "button-ignored": Mutant(
         "S3",
         "the button at a robot stops nothing",
-        f"{_CONTROLLER}.press_emergency",
-        instead(lambda self, now: Decision(m.OK) if self.mode is not Mode.IDLE else RIGHT),
+        f"{_CONTROLLER}.stop",
+        instead(
+            lambda self, now, stopped_by=None: (
+                Decision(m.OK) if stopped_by is None and self.mode is not Mode.IDLE else RIGHT
+            )
+        ),
+    ),
+    "policy-drives-on": Mutant(
+        "S3",
+        "the DVA sends a robot out again that nobody has released",
+        "dva_sim.core.emergencies:Emergencies.holds",
+        afterwards(lambda self, holds, robot: False if holds else None),
+    ),
+    "latch-forgotten": Mutant(
+        "S3",
+        "a stopped robot takes orders that nobody has released it for",
+        f"{_CONTROLLER}._begin",
+        _ignores_latch,
+    ),
+    "start-releases": Mutant(
+        "S3",
+        "a new start releases a robot though a person should",
+        f"{_LATCH}.starts",
+        afterwards(lambda self, may: None if may else True),
+    ),
+    "restart-releases": Mutant(
+        "S3",
+        "a robot that restarts forgets that it is stopped",
+        f"{_CONTROLLER}.restart",
+        _forgets_latch,
+    ),
+    "earlier-release-counts": Mutant(
+        "S3",
+        "a release of an earlier emergency ends the newest one",
+        f"{_LATCH}.take_answer",
+        _takes_any_release,
+    ),
+    "releases-unasked": Mutant(
+        "S3",
+        "the DVA releases a robot that nobody has asked it to release",
+        "dva_sim.core.emergencies:Emergencies.hear",
+        _releases_unasked,
     ),
     "emergency-by-name-only": Mutant(
         "S3",

@@ -209,9 +209,9 @@ def _emergency_of_the_holder_only(original: Original, bug: Bug) -> Original:
 def _resumes(original: Original, bug: Bug) -> Original:
     """Robot that resumes after an emergency at the next request of any kind."""
 
-    def wrong(self: Any, now: float) -> Any:
+    def wrong(self: Any, now: float, stopped_by: str | None = None) -> Any:
         mode, owner = self.mode, self.owner
-        decision = original(self, now)
+        decision = original(self, now, stopped_by)
         if mode is Mode.TELEOPERATION:
             bug.act(f"{self.id_tag} is still driven by {owner} after an emergency")
             self.mode, self.owner = mode, owner
@@ -445,9 +445,9 @@ def _counts_from_now(original: Original, bug: Bug) -> Original:
 def _mission_goes_on(original: Original, bug: Bug) -> Original:
     """An emergency stops a robot for a moment; its mission is not over."""
 
-    def wrong(self: Any, now: float) -> Any:
+    def wrong(self: Any, now: float, stopped_by: str | None = None) -> Any:
         kept = self.mode, self.owner, self.mission, self.mission_status
-        decision = original(self, now)
+        decision = original(self, now, stopped_by)
         if kept[0] is Mode.MISSION:
             bug.act(f"{self.id_tag} has its mission still after an emergency")
             self.mode, self.owner, self.mission, self.mission_status = kept
@@ -614,9 +614,11 @@ MUTANTS: Final[dict[str, Mutant]] = {
     "emergency-forgotten": Mutant(
         "S3",
         "an emergency is answered, and changes nothing",
-        f"{_ROBOT}._emergency",
+        f"{_ROBOT}.stop",
         instead(
-            lambda self, now: Decision(m.OK, "stopped") if self.mode is not Mode.IDLE else RIGHT
+            lambda self, now, stopped_by=None: (
+                Decision(m.OK, "stopped") if self.mode is not Mode.IDLE else RIGHT
+            )
         ),
     ),
     "emergency-of-holder-only": Mutant(
@@ -626,7 +628,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
         _emergency_of_the_holder_only,
     ),
     "emergency-resumes": Mutant(
-        "S3", "the drive goes on after an emergency", f"{_ROBOT}._emergency", _resumes
+        "S3", "the drive goes on after an emergency", f"{_ROBOT}.stop", _resumes
     ),
     "emergency-leaves-orders": Mutant(
         "S3",
@@ -797,7 +799,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
         skipped(),
     ),
     "mission-survives-emergency": Mutant(
-        "S3", "a mission goes on after an emergency", f"{_ROBOT}._emergency", _mission_goes_on
+        "S3", "a mission goes on after an emergency", f"{_ROBOT}.stop", _mission_goes_on
     ),
     "turns-too-fast": Mutant(
         "S4",

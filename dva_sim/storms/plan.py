@@ -17,6 +17,8 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.scenario import Scenario
+from dva_sim.storms.releaser import LABEL as RELEASER
+from dva_sim.storms.releaser import ROLE as RELEASER_ROLE
 
 RECOVERS_WITHIN: Final = 120.0
 """From the end of the last fault to the probes that must succeed (S8) [s].
@@ -88,7 +90,13 @@ class StormPlan:
         Raises:
             ConfigError: it makes no sense.
         """
-        scenario = scenarios.build(dict(self.scenario), {"horizon_s": self.horizon_s})
+        rooms = {**self.scenario.get("dva", {}).get("control_rooms", {}), RELEASER: RELEASER_ROLE}
+        changes = {
+            "horizon_s": self.horizon_s,
+            "emergency.release": "person",
+            "dva.control_rooms": rooms,
+        }
+        scenario = scenarios.build(dict(self.scenario), changes)
         assert isinstance(scenario, Scenario)
         return scenario
 

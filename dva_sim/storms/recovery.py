@@ -1,7 +1,8 @@
 """S8: when faults cease, everything recovers within a stated time, shown by doing it.
 
 Some time after the last fault somebody new does what anybody could do before: reports an event,
-asks for each robot in turn, drives it, stops it by an emergency, sends it out and calls it back;
+asks for each robot in turn, drives it, stops it by an emergency; a person who may releases it, and
+it is sent out and called back;
 and the DVA lists everybody, for a while, and hears the heartbeats of everybody. What does not
 succeed has not recovered. Nobody is asked how it is.
 """
@@ -17,6 +18,7 @@ from dva_sim.simulation.full.safety_checks import MOVING
 from dva_sim.simulation.full.stage import DVA, Stage
 from dva_sim.storms.intruder import NUMBER, Intruder
 from dva_sim.storms.plan import PROBES_LAST, RECOVERS_WITHIN
+from dva_sim.storms.releaser import Releaser
 
 AGAIN = 1.0  # between two attempts of a probe [s]
 USED_LATELY = 30.0  # a robot that obeyed somebody so lately needs no probe [s]
@@ -34,6 +36,7 @@ class RecoveryProbes:
         recorder: Recorder of what has not recovered.
         motion_of: Function that returns the motion of a robot now, by its id.
         calm: End of the last fault [s].
+        releaser: Person who releases robots after emergencies.
     """
 
     def __init__(
@@ -42,9 +45,11 @@ class RecoveryProbes:
         recorder: Recorder,
         motion_of: Callable[[str], RobotMotion],
         calm: float,
+        releaser: Releaser,
     ) -> None:
         self._stage, self._recorder, self._motion_of = stage, recorder, motion_of
         self._calm, self._clock = calm, stage.clock
+        self._releaser = releaser
         self._probe = Intruder(stage, BYSTANDER, "probe")
         self._open: dict[str, str] = {}
         self._used: dict[str, float] = {}
@@ -213,8 +218,21 @@ class RecoveryProbes:
 
     def _look(self, robot: str) -> None:
         if abs(self._motion_of(robot).speed) < MOVING:
-            self._open[robot] = "does not go where it is sent"
-            self._send_out(robot)
+            self._open[robot] = "is not released after an emergency"
+            self._release(robot)
+
+    def _release(self, robot: str) -> None:
+        def again() -> None:
+            self._clock.call_after(AGAIN, self._release, robot)
+
+        def answered(reply: m.Reply) -> None:
+            if reply.code == m.OK:
+                self._open[robot] = "does not go where it is sent"
+                self._send_out(robot)
+            else:
+                again()
+
+        self._releaser.release(robot, answered, again)
 
     def _send_out(self, robot: str) -> None:
         """Send a robot on a mission, and call it back; a permission that was lost is asked for."""

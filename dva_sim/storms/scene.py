@@ -27,6 +27,7 @@ from dva_sim.storms.dva_lives import DvaLives
 from dva_sim.storms.interference import Interference, PassingMessage
 from dva_sim.storms.intruder import NUMBER, Intruder
 from dva_sim.storms.plan import StormPlan
+from dva_sim.storms.releaser import Releaser
 
 FLOODER = NUMBER + 1  # holds nothing, ever
 FITS = 0.8  # around a place to which robots are sent [m]
@@ -53,6 +54,7 @@ class StormScene:
         interference: Control over the delivery of messages.
         intruder: Does what no honest device does.
         flooder: Sends more than anybody can take, and is given nothing.
+        releaser: Releases robots after emergencies.
         dva: Kills and restarts the DVA.
         robots: All robots.
         guards: Ids of the guards.
@@ -82,6 +84,9 @@ class StormScene:
         run.network.interference = self.interference
         self.intruder = Intruder(run.stage)
         self.flooder = Intruder(run.stage, FLOODER, "intruder-2")
+        chance = random.Random(f"{plan.seed} releaser")
+        self.releaser = Releaser(run.stage, run.field.robots, chance)
+        self.releaser.start()
         self._sessions: dict[str, list[int]] = {}
 
     def _make_drivers(self) -> Iterator[BusyDriver]:

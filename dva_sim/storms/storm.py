@@ -99,7 +99,9 @@ class Storm(StormScene):
         )
         run.network.taps |= {node: self._answers.tap(node) for node in nodes}
         self._nodes = frozenset(nodes)
-        self._recovery = RecoveryProbes(run.stage, self.recorder, self._motion, plan.calm_s)
+        self._recovery = RecoveryProbes(
+            run.stage, self.recorder, self._motion, plan.calm_s, self.releaser
+        )
         self._digest = hashlib.blake2b(digest_size=12)
         self.begun: Counter[str] = Counter()
         run.observe(_Witness(self))

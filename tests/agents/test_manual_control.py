@@ -108,6 +108,8 @@ def test_an_emergency_wins_and_the_robot_has_to_be_taken_again(in_hand):
     in_hand.drive_by_hand(HERE, 0.4, 0.0, 1.0)
     assert say(in_hand, ANA, m.Emergency(), 2.0).set_point == STAND
     assert in_hand.drive_by_hand(HERE, 0.4, 0.0, 2.1).code == m.WRONG_MODE
+    assert in_hand.take_by_hand(HERE, 2.5, moving=False).code == m.BUSY
+    assert in_hand.release_by_hand("warden").code == m.OK
     assert in_hand.take_by_hand(HERE, 3.0, moving=False).code == m.OK
     assert in_hand.drive_by_hand(HERE, 0.4, 0.0, 3.1).code == m.OK
 

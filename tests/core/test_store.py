@@ -349,16 +349,16 @@ def test_the_database_of_something_else_is_no_memory_and_stays_as_it_is(file):
         other.execute("CREATE TABLE events (title TEXT)")
     other.close()
     before = file.read_bytes()
-    assert refusal(file).endswith("memory of format 2")
+    assert refusal(file).endswith("memory of format 3")
     assert file.read_bytes() == before
 
 
-@pytest.mark.parametrize("value", [0, 3])
+@pytest.mark.parametrize("value", [0, 4])
 def test_a_memory_of_another_format_is_refused(file, value):
     memory = Store(file)
     memory._file.execute("UPDATE about SET value = ? WHERE name = 'format'", (value,))
     memory.close()
-    assert refusal(file).endswith("memory of format 2")
+    assert refusal(file).endswith("memory of format 3")
 
 
 def test_a_file_that_another_holds_cannot_be_opened(file, monkeypatch):

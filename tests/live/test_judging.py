@@ -97,7 +97,7 @@ def test_an_honest_run_holds_every_rule_whichever_part_is_read_first(seed):
 
 @pytest.mark.invariant("S3")
 def test_a_robot_that_answers_an_emergency_and_drives_on_is_found_out(monkeypatch):
-    monkeypatch.setattr(RobotController, "_emergency", lambda *_: Decision(m.OK, "stopped"))
+    monkeypatch.setattr(RobotController, "stop", lambda *_: Decision(m.OK, "stopped"))
     run = drive()
     found = judged(run, lines_by_part(run))
     assert {rule for rule, state in found.items() if state == "broken"} == {"S3"}

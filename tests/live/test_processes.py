@@ -88,7 +88,7 @@ DEAF = f"""{BRIEFLY}
 from dva_sim.agents.robot.controller import Decision, RobotController
 from dva_sim.protocol import messages as m
 
-RobotController._emergency = lambda *_: Decision(m.OK, "stopped")
+RobotController.stop = lambda *_: Decision(m.OK, "stopped")
 """
 
 

@@ -37,19 +37,24 @@ NEW = {
         *("set-dispatch", "take-off"),
     },
     "1.6": {"get-grant-of-a-reader", "get-grant-of-the-holder"},
+    "1.7": {
+        *("release-emergency", "reply-emergency-release"),
+        *("robot-emergency", "robot-emergency-button", "robot-emergency-released"),
+    },
 }
 OLD = {
     version: etree.XMLSchema(file=str(TESTS / "data" / f"dva-{version}.xsd"))
-    for version in ("1.3", "1.4", "1.5")
+    for version in ("1.3", "1.4", "1.5", "1.6")
 }
 
 
 @pytest.mark.parametrize(
     ("version", "added"),
     [
-        ("1.3", NEW["1.4"] | NEW["1.5"] | NEW["1.6"]),
-        ("1.4", NEW["1.5"] | NEW["1.6"]),
-        ("1.5", NEW["1.6"]),
+        ("1.3", NEW["1.4"] | NEW["1.5"] | NEW["1.6"] | NEW["1.7"]),
+        ("1.4", NEW["1.5"] | NEW["1.6"] | NEW["1.7"]),
+        ("1.5", NEW["1.6"] | NEW["1.7"]),
+        ("1.6", NEW["1.7"]),
     ],
 )
 def test_an_older_peer_understands_all_samples_but_those_of_what_was_added_since(version, added):

@@ -58,7 +58,7 @@ def test_a_broken_rule_is_told_with_when_by_whom_and_how_and_makes_it_invalid(
 ):
     path = recorded(tmp_path / "honest.mcap", also=emergency)
     assert checked(path)[:2] == (0, dict.fromkeys(RULES, "held"))
-    monkeypatch.setattr(RobotController, "_emergency", lambda *_: Decision(m.OK, "stopped"))
+    monkeypatch.setattr(RobotController, "stop", lambda *_: Decision(m.OK, "stopped"))
     path = recorded(tmp_path / "deaf.mcap", also=emergency)
     code, rules, lines = checked(path)
     assert code == 1

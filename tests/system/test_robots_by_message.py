@@ -171,7 +171,7 @@ def test_a_new_mission_right_after_an_emergency_is_driven_by_one_loop_alone():
     send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
     send(run, 12.0, m.GoTo((place(run, 30.0, 12.0),)))
     send(run, 12.05, m.Emergency(), session=0)
-    run.clock.call_at(12.055, setattr, robot.controller, "awaits_person", False)  # one had it since
+    run.clock.call_at(12.055, robot.controller.release_by_hand, "warden")
     send(run, 12.06, m.GoTo((place(run, 12.0, 12.0),)))
     run.clock.run(14.0)
     assert robot.controller.mode == "Mission"

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NamedTuple
 
+from dva_sim.agents.robot.emergency_latch import EmergencyLatch
 from dva_sim.agents.robot.inquiry import Inquiry
 from dva_sim.kernel.makers import maker
 from dva_sim.protocol import messages as m
@@ -101,8 +102,7 @@ class RobotController:
         observers: Those to read its sensors, by device, likewise.
         inquiry: Open questions to the DVA.
         by_hand: Person who drives it by hand, at the robot itself; None: nobody does.
-        awaits_person: True from an emergency on until a person has had the robot: the DVA's own
-            missions wait for that.
+        latch: Latch that an emergency closes; while it holds, no order moves the robot.
     """
 
     id_tag: str
@@ -125,7 +125,7 @@ class RobotController:
     future_ticks: int = 0
     inquiry: Inquiry = field(default_factory=Inquiry)
     by_hand: str | None = None
-    awaits_person: bool = False
+    latch: EmergencyLatch = field(default_factory=EmergencyLatch)
     _numbered: int = 0  # the session that `last_order_id` and `last_set_id` are of
 
     def tick(self, now: float) -> int:
@@ -162,7 +162,9 @@ class RobotController:
             case m.SetTeleOp():
                 return self._set(message, body, arrived, now)
             case m.Emergency():
-                return self._emergency(now)
+                return self.stop(now, message.source)
+            case m.ReleaseEmergency():
+                return self._released(message)
             case m.PermissionGrant():
                 return self._granted(message, body)
             case m.PermissionRevocation():
@@ -243,10 +245,13 @@ class RobotController:
             return Decision(m.BUSY, f"held by {self.grant.holder}")
         if self.inquiry.is_open and now < self.inquiry.asked_at + PATIENCE:
             return Decision(m.BUSY, "the DVA is being asked who holds it")
-        refusal = self._begin(math.inf, moving)
+        refusal = self._begin(math.inf, moving, is_start=True)
         if refusal is not None:
             return refusal
-        self.by_hand, self.last_valid, self.awaits_person = who, now, False
+        if self.latch.holds:
+            self.latch.release(None)
+        self.by_hand = who
+        self.last_valid = now
         return Decision(m.OK, set_point=STAND)
 
     def drive_by_hand(self, who: str, speed: float, turn_rate: float, now: float) -> Decision:
@@ -266,9 +271,30 @@ class RobotController:
         point = TimedSetPoint(speed, turn_rate, now + self.limits.watchdog)
         return Decision(m.OK, set_point=point)
 
-    def press_emergency(self, now: float) -> Decision:
-        """The button at the robot itself: as an emergency that somebody sends."""
-        return self._emergency(now)
+    def stop(self, now: float, stopped_by: str | None = None) -> Decision:
+        """Stop and stand idle until released; nothing that was received before moves it (S3).
+
+        Args:
+            now: Time [s].
+            stopped_by: Id of the device that sent the emergency; None: the button at the robot.
+        """
+        self._idle("emergency")
+        self.emergency_at = now
+        self.latch.close(stopped_by, now, self.tick(now))
+        return Decision(m.OK, "stopped", STAND)
+
+    def stand(self, now: float) -> Decision:
+        """Stop and forget all orders of before; unlike an emergency, the next order moves it."""
+        self._idle("stopped")
+        self.emergency_at = now
+        return Decision(m.OK, "stopped", STAND)
+
+    def release_by_hand(self, label: str) -> Decision:
+        """Release the robot after an emergency: somebody stands beside it and sees that it may."""
+        if not self.latch.holds:
+            return Decision(m.WRONG_MODE, "no emergency has stopped it")
+        self.latch.release(m.ByWhom(self.id_tag, label, 0.0))
+        return Decision(m.OK, "released")
 
     def let_go(self, who: str) -> Decision:
         """The hand that drove gives the robot up; another one's word changes nothing."""
@@ -300,11 +326,13 @@ class RobotController:
             self.mission_status = m.MissionStatus(status.mission_id, "failed", left, why)
         self.mode, self.owner, self.mission, self.by_hand = IDLE, None, None, None
 
-    def _emergency(self, now: float) -> Decision:
-        """Stop and stand idle; whatever was received before this moment moves nothing (S3)."""
-        self._idle("emergency")
-        self.emergency_at, self.awaits_person = now, True
-        return Decision(m.OK, "stopped", STAND)
+    def _released(self, message: m.Message) -> Decision:
+        """Accept a release as a reason to ask the DVA, which alone can say so."""
+        if message.source != self.dva:
+            return Decision(m.NOT_PERMITTED, "only the DVA releases: send it the request")
+        if not self.latch.holds:
+            return Decision(m.OK, "no emergency has stopped it")
+        return Decision(m.OK, "takes effect when the DVA has confirmed it")
 
     def _granted(self, message: m.Message, body: m.PermissionGrant) -> Decision:
         """A grant is a reason to ask the DVA: it takes effect when that has confirmed it (S2)."""
@@ -338,6 +366,9 @@ class RobotController:
 
         "Nobody holds it" does not end a drive: a DVA that has lost its memory may say so.
         """
+        if isinstance(body.content, m.EmergencyRelease):
+            self.latch.take_answer(body.content)
+            return Decision(m.OK)
         asked, permission = self.inquiry.answered(body), body.content
         if asked is None:
             return Decision(m.OK, waits=True)
@@ -361,8 +392,6 @@ class RobotController:
     def _is_held(self, grant: m.PermissionGrant | None) -> Decision:
         """Replace the holder, or leave the robot without one; the current driver is stopped."""
         held, self.grant = self.grant, grant
-        if grant is not None and grant.holder != self.dva and grant != held:
-            self.awaits_person = False
         if grant is not None and held is not None and grant.session == held.session:
             return Decision(m.OK)  # the holder may have moved
         if grant is not None and grant.session != self._numbered:
@@ -394,13 +423,15 @@ class RobotController:
     @property
     def free(self) -> bool:
         """True if it is idle and nobody holds it: then it can be sent somewhere."""
-        idle = self.mode is IDLE and self.by_hand is None
+        idle = self.mode is IDLE and self.by_hand is None and not self.latch.holds
         return idle and self.owner is None and self.grant is None
 
     def _auction(self, message: m.Message) -> Decision:
         """A task is on offer, or was won. An award moves nothing: an operator has to drive."""
         if message.source != self.dva:
             return Decision(m.NOT_PERMITTED, "only the DVA holds auctions")
+        if isinstance(message.body, m.TaskAward) and self.latch.holds:
+            return Decision(m.BUSY, self.latch.refusal)
         if isinstance(message.body, m.TaskAward) and not self.free:
             return Decision(m.BUSY, f"in mode {self.mode}, held by {self._holder()}")
         return Decision(m.OK)
@@ -443,10 +474,18 @@ class RobotController:
         self.last_order_id = message.message_id
         return None
 
-    def _begin(self, arrived: float, moving: bool) -> Decision | None:
-        """Return why no new activity may begin now, or None."""
+    def _begin(self, arrived: float, moving: bool, is_start: bool = False) -> Decision | None:
+        """Return why no new activity may begin now, or None.
+
+        Args:
+            arrived: Arrival time of the order [s].
+            moving: True while the robot's wheels still turn.
+            is_start: True for a person's start, which releases the robot where nobody else can.
+        """
         if arrived <= self.emergency_at:
             return Decision(m.STALE, "sent before the emergency")
+        if self.latch.holds and not (is_start and self.latch.starts()):
+            return Decision(m.BUSY, self.latch.refusal)
         if self.mode is not IDLE:
             return Decision(m.BUSY, f"in mode {self.mode}")
         if self.by_hand is not None:
@@ -460,14 +499,17 @@ class RobotController:
         if refusal is not None:
             return refusal._replace(waits=not self.knows(message))
         again = self.mode is TELEOPERATION and self.owner == message.source
-        refusal = None if again else self._begin(arrived, moving)
+        refusal = None if again else self._begin(arrived, moving, is_start=True)
         refusal = refusal or self._order(message)
         if refusal is not None:
             return refusal
         self.last_set_id = max(self.last_set_id, message.message_id)
         if again:
             return Decision(m.OK, "already started")
-        self.mode, self.owner, self.awaits_person = TELEOPERATION, message.source, False
+        if self.latch.holds:
+            self.latch.release(None)
+        self.mode = TELEOPERATION
+        self.owner = message.source
         self.last_valid = now
         return Decision(m.OK, set_point=STAND)
 
@@ -514,12 +556,9 @@ class RobotController:
         refusal = self._refusal(message, "missions")
         if refusal is not None:
             return refusal._replace(waits=not self.knows(message))
-        if self.awaits_person and message.source == self.dva:
-            return Decision(m.BUSY, "stopped by an emergency; a person has to take it first")
         refusal = self._begin(arrived, moving) or self._order(message)
         if refusal is not None:
             return refusal
-        self.awaits_person = False
         self.mode, self.owner, self.mission = MISSION, message.source, body
         left = len(body.waypoints) if isinstance(body, m.GoTo | m.Patrol) else 1
         self.mission_status = m.MissionStatus(message.message_id, "under_way", left, "")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from dva_sim.agents.robot.controller import Decision, Limits, RobotController, TimedSetPoint
+from dva_sim.agents.robot.emergency_latch import DRIVE, EmergencyLatch
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
@@ -16,6 +17,9 @@ from dva_sim.protocol.errors import ProtocolError
 
 LEASE_ENDS, MISSION_ENDS = "lease ends", "mission ends"
 TAKEN_BY_HAND, LET_GO, PRESSED = "taken by hand", "let go", "emergency pressed"
+RELEASED_BY_HAND = "released by hand"
+RELEASES_UNKNOWN = "the DVA knows no releases"
+STANDS = "stands"
 HANGS = "hangs"
 ASKS, NO_ANSWER = "asks the DVA", "no answer of the DVA"
 HAND = "hand"  # whose that was is no matter of a trace
@@ -43,6 +47,7 @@ class DecisionLog:
             "camera_url": controller.camera_url,
             "sensors": [asdict(sensor) for sensor in controller.sensors],
             "clock_offset": controller.clock_offset,
+            "release": controller.latch.rule,
         }
         self._write(start)
 
@@ -137,6 +142,7 @@ def _controller(start: dict[str, Any]) -> RobotController:
         camera_url=start["camera_url"],
         sensors=tuple(m.Sensor(**sensor) for sensor in start["sensors"]),
         clock_offset=start["clock_offset"],
+        latch=EmergencyLatch(start.get("release", DRIVE)),  # absent before there was a latch
     )
 
 
@@ -156,7 +162,13 @@ def _again(
     elif happened == LET_GO:
         controller.let_go(HAND)
     elif happened == PRESSED:
-        controller.press_emergency(now)
+        controller.stop(now)
+    elif happened == RELEASED_BY_HAND:
+        controller.release_by_hand(HAND)
+    elif happened == RELEASES_UNKNOWN:
+        controller.latch.take_refusal()
+    elif happened == STANDS:
+        controller.stand(now)
     elif happened == HANGS:
         controller.hang()
     elif happened == ASKS:

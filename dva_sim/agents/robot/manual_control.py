@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 from dva_sim.agents.robot.controller import Decision, RobotController
-from dva_sim.agents.robot.decision_log import LET_GO, PRESSED, TAKEN_BY_HAND
+from dva_sim.agents.robot.decision_log import (
+    LET_GO,
+    PRESSED,
+    RELEASED_BY_HAND,
+    TAKEN_BY_HAND,
+)
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.kernel.recorder import ByHand
 from dva_sim.protocol import messages as m
@@ -57,16 +62,29 @@ class ManualControl:
         return decision
 
     def press_emergency(self) -> None:
-        """Press the button at the robot itself: it stands until the next order."""
+        """Press the button at the robot itself: it stands until it is released."""
         robot, now = self._robot, self._robot.device.clock.now
         before = self._controller.mode
-        decision = self._controller.press_emergency(now)
+        decision = self._controller.stop(now)
         self._done("", "stops", decision, now)
         if robot.trace is not None:
             robot.trace.happened(PRESSED, now)
         robot.device.tell("is stopped by its own emergency button", "mode")
         if self._controller.mode is not before:
             robot.mode_changed("")
+        robot.latch_changed()
+
+    def release(self, who: str) -> Decision:
+        """Release the robot at the robot itself, after an emergency."""
+        robot = self._robot
+        decision = self._controller.release_by_hand(who)
+        if decision.text == "released":
+            now = robot.device.clock.now
+            self._done(who, "releases", decision, now)
+            if robot.trace is not None:
+                robot.trace.happened(RELEASED_BY_HAND, now)
+            robot.latch_changed()
+        return decision
 
     def _done(self, who: str, what: str, decision: Decision, now: float) -> None:
         """Apply a decision to the motors, and tell the safety audit."""

@@ -6,7 +6,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
-from dva_sim.agents.device import HOLDER, LONGEST_BID, STATUS, AgentDevice, command_topic
+from dva_sim.agents.device import (
+    EMERGENCY,
+    HOLDER,
+    LONGEST_BID,
+    STATUS,
+    AgentDevice,
+    command_topic,
+)
 from dva_sim.agents.observation import FRAME, CameraFrame, Observation, make_frame, make_observation
 from dva_sim.agents.robot import command_queue as queue
 from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter, Standing
@@ -26,8 +33,11 @@ from dva_sim.agents.robot.decision_log import (
     LEASE_ENDS,
     MISSION_ENDS,
     PRESSED,
+    RELEASES_UNKNOWN,
+    STANDS,
     DecisionLog,
 )
+from dva_sim.agents.robot.emergency_latch import DRIVE
 from dva_sim.agents.robot.field_of_view import FieldOfView, HazardSpot
 from dva_sim.agents.robot.loops import CollisionGuardedDrive, MissionLoop, Surrounded
 from dva_sim.agents.robot.sensors import SensorPort, SensorSubscriptions
@@ -40,7 +50,13 @@ from dva_sim.worlds.physics import World
 from dva_sim.worlds.planning import Planner
 
 HOLDERS_ONLY = m.StartTeleOp | m.StopTeleOp | m.SetTeleOp | Mission | m.CancelMission
-DVAS_ONLY = m.PermissionGrant | m.PermissionRevocation | m.TaskAnnouncement | m.TaskAward
+DVAS_ONLY = (
+    m.PermissionGrant
+    | m.PermissionRevocation
+    | m.ReleaseEmergency
+    | m.TaskAnnouncement
+    | m.TaskAward
+)
 RESTRICTED = HOLDERS_ONLY | DVAS_ONLY
 DRIVING = m.StartTeleOp, m.SetTeleOp
 LONGEST_HELD = 1e6  # [s]
@@ -164,6 +180,9 @@ class RobotAgent:
             device, self.sensors, controller.tick, controller.may_read
         )
         controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
+        self._latch_published = (False, 0)
+        self._asks_release = False
+        self._asks_release_again = False
         self._pattern = setup.pattern
         self._commands: Subscription | None = None
         self._encoding = False
@@ -244,6 +263,8 @@ class RobotAgent:
         before = self.controller.mode
         self.controller.hang()
         self._confirmations.forget()
+        self._asks_release = False
+        self._asks_release_again = False
         self.device.silent = True
         if self.controller.mode is not before:
             self.mode_changed("")
@@ -280,11 +301,11 @@ class RobotAgent:
         self.controller.emergency_at += WAKES_UP  # until then it reads what has waited
 
     def _stand(self) -> None:
-        """Stand idle until a new order, as after an emergency, and say so."""
+        """Stand idle until a new order, and publish that."""
         before, now = self.controller.mode, self.device.clock.now
-        decision = self.controller.press_emergency(now)
-        self.device.recorder.on_hand(ByHand(self.device.id_tag, "", "stops", now))
-        self._happened(PRESSED)
+        decision = self.controller.stand(now)
+        self.device.recorder.on_hand(ByHand(self.device.id_tag, "", "stands", now))
+        self._happened(STANDS)
         if decision.set_point is not None:
             self.move(decision.set_point)
         if self.controller.mode is not before:
@@ -383,7 +404,7 @@ class RobotAgent:
         now, moving = self.device.clock.now, self.is_moving
         controller, is_command = self.controller, isinstance(message.body, m.SetTeleOp)
         before, mission = controller.mode, controller.mission_status
-        unable = self._unable(message.body)
+        unable = self._unable(message)
         if unable is None:
             decision = controller.handle(message, arrived, now, moving, waited)
         else:
@@ -409,13 +430,17 @@ class RobotAgent:
         self._note_holder(message, decision.code)
         if not is_command:
             self._confirmations.ask()
+            if isinstance(message.body, m.ReleaseEmergency):
+                self._ask_for_release()
+            self.latch_changed()
         return decision
 
-    def _unable(self, body: m.Body) -> Decision | None:
+    def _unable(self, message: m.Message) -> Decision | None:
         """Return why the robot cannot fulfil a request of any sender; None if it can.
 
         It obeys an emergency as far as it reaches the motors, and does not promise more.
         """
+        body = message.body
         if isinstance(body, m.SetTeleOp) and self.refuses is not None:
             return Decision(self.refuses, "refuses all commands")
         if isinstance(body, Mission) and not self.takes_missions:
@@ -423,7 +448,7 @@ class RobotAgent:
         if self.unfit and isinstance(body, m.StartTeleOp | Mission):
             return Decision(m.BUSY, self.unfit)
         if self.unfit and isinstance(body, m.Emergency):
-            stop = self.controller.press_emergency(self.device.clock.now)
+            stop = self.controller.stop(self.device.clock.now, message.source)
             self._happened(PRESSED)
             return stop._replace(code=m.BUSY, text=f"told to stop, but {self.unfit}")
         return None
@@ -464,6 +489,58 @@ class RobotAgent:
         held = min(self.device.clock.now - self._held_since, LONGEST_HELD)
         if network.ready(me, HOLDER, WHATEVER_WAITS):
             self.device.publish(HOLDER, m.RobotHolder(self._holder, None, held, fares or None))
+
+    # --- emergency ---------------------------------------------------------------------
+
+    def latch_changed(self) -> None:
+        """Publish that an emergency holds the robot, or was released, and ask for a release."""
+        latch = self.controller.latch
+        state = latch.holds, latch.tick
+        if state == self._latch_published:
+            return
+        was_held, _ = self._latch_published
+        self._latch_published = state
+        if was_held and not latch.holds:
+            released_by = latch.released.label if latch.released else "a new start"
+            self.device.tell(f"is released after an emergency by {released_by}", "mode")
+        self.device.clock.call_after(0.0, self._announce_emergency)  # once this is answered
+
+    def _announce_emergency(self) -> None:
+        """Publish the latch, and ask the DVA for a release."""
+        self._publish_emergency()
+        self._ask_for_release()
+
+    def _publish_emergency(self) -> None:
+        network, me = self.device.network, self.device.id_tag
+        if network.ready(me, EMERGENCY, WHATEVER_WAITS):
+            self.device.publish(EMERGENCY, self.controller.latch.message(self.device.clock.now))
+
+    def _ask_for_release(self) -> None:
+        """Ask the DVA whether somebody has released the robot; one request is under way at most."""
+        latch = self.controller.latch
+        if not latch.holds or latch.rule == DRIVE:
+            return
+        if self._asks_release:
+            self._asks_release_again = True
+            return
+        self._asks_release = True
+        emergency = latch.message(self.device.clock.now)
+        self.device.ask(self.device.dva, emergency, self._release_answered, self._release_over)
+
+    def _release_answered(self, reply: m.Reply) -> None:
+        if not self.device.silent and isinstance(reply.content, m.EmergencyRelease):
+            self._dva_answered(reply)
+        elif not self.device.silent and reply.code in (m.BAD_MESSAGE, m.NOT_SUPPORTED):
+            self.controller.latch.take_refusal()
+            self._happened(RELEASES_UNKNOWN)
+        self._release_over()
+
+    def _release_over(self) -> None:
+        asks_again = self._asks_release_again
+        self._asks_release = False
+        self._asks_release_again = False
+        if asks_again:
+            self._ask_for_release()
 
     def _follow_up(self, message: m.Message, decision: Decision) -> Decision:
         """Apply a decision to everything but the motors."""
@@ -572,6 +649,8 @@ class RobotAgent:
         self.device.publish(STATUS, body)
         if self._holder is not None:
             self._publish_holder()
+        if self.controller.latch.holds:
+            self._announce_emergency()
 
     def _publish_mission(self) -> None:
         self.device.publish(MISSION, self.controller.mission_status)

@@ -121,6 +121,7 @@ class RobotWorld:
             lambda kind, number: host,
             self.sockets.time_of_day(),
             cameras=cameras,
+            attended=True,
         )
         self.field = Field(self.stage)
         team = TeamBuilder(self.stage, self.field.world, self.field)
@@ -135,7 +136,7 @@ class RobotWorld:
         self.feed = Feed(self)
         self.recorder.robots = {id_tag}
         self.audit = SafetyAudit(
-            *(self.recorder, terms_of(self.scenario)),
+            *(self.recorder, terms_of(self.scenario, attended=True)),
             lambda _: motion_of(robot),
             self.field.place_of,
         )

@@ -34,7 +34,7 @@ MOST_FEATURES = 20_000
 RULES = {
     "S1": "A robot moves only by a command that came within the watchdog.",
     "S2": "One robot obeys one holder at a time.",
-    "S3": "An emergency stop stops, and nothing sent before it moves the robot again.",
+    "S3": "An emergency stops a robot until a permitted person releases it.",
 }
 
 

@@ -89,7 +89,9 @@ class ConsoleWorld(PublishingWorld):
         self.clock, self.recorder = clock or PacedClock(), ConsoleRecorder()
         cameras = Cameras(lambda label, _: camera_url("http:///", label), topic_of)
         self.sockets = sockets(scenario, self.clock, self.recorder) if sockets else None
-        watched = Watched(self.clock, self.recorder, cameras, PEOPLE, measured, self.sockets)
+        watched = Watched(
+            self.clock, self.recorder, cameras, PEOPLE, measured, self.sockets, attended=True
+        )
         try:
             self.run = Run(scenario, seed, watched=watched)
         except DvaSimError:

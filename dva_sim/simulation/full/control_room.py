@@ -95,6 +95,7 @@ def make_core(stage: Stage, permissions: Permissions) -> Dva:
         roles=Roles(control_rooms_of(stage.scenario)),
         ask_first=dispatch.mode == "ask_first",
         policy_name=dispatch.policy.rpartition(":")[2],
+        release=stage.release,
     )
 
 

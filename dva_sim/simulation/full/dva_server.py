@@ -30,7 +30,7 @@ FIRST_BEAT = 1.27  # after the start, when hardly anything else happens at the s
 MOST_TURNED_AWAY = 1000  # devices that were not registered, of which that was told
 TICK = 1.0  # how often the core looks at deadlines [s]
 NOTHING_TO_KEEP: Final = (
-    *(m.Registration, m.TaskBid, m.GetGrant, m.GetDeviceList, m.GetSensorInfo),
+    *(m.Registration, m.TaskBid, m.GetGrant, m.GetDeviceList, m.GetSensorInfo, m.RobotEmergency),
     *(m.GetEventList, m.GetDispatch, m.GetProposal),
 )
 """Requests that are answered with OK even while nothing can be written: a registration is renewed

@@ -226,7 +226,7 @@ class _Again:
         _refuse_own_code(scenario)
         # A core talks to nobody, and no command is sent.
         plain = scenario.model_copy(update={"pattern": "req-rep", "pattern_options": {}})
-        stage = Stage(plain, start["seed"], cast(Any, None), Recorder())
+        stage = Stage(plain, start["seed"], cast(Any, None), Recorder(), attended=True)
         self._bits: deque[int] = deque()
         permissions = Permissions(self._draw, count=start["sessions"])
         self._core, self._sends = make_core(stage, permissions), list[Send]()

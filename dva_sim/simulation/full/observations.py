@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, Protocol
 
 from dva_sim.agents.robot.command_queue import mean_of
+from dva_sim.agents.robot.emergency_latch import DRIVE, ReleasedBy
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import Event, EventTable, State
@@ -20,7 +21,7 @@ from dva_sim.kernel.recorder import Accepted, ByHand, Sent
 from dva_sim.protocol.messages import Position
 from dva_sim.simulation.full.control_room import at_event_m
 from dva_sim.simulation.full.dva_server import DvaAgent
-from dva_sim.simulation.full.stage import DVA, id_of, label_of
+from dva_sim.simulation.full.stage import DVA, id_of, label_of, release_of
 from dva_sim.simulation.scenario import Scenario, robot_profiles
 from dva_sim.worlds.bodies import GRIP
 
@@ -47,6 +48,7 @@ class SafetyTerms:
         motors: Limits of the robots by id.
         labels: Names by id, for what is said of somebody.
         dva: Id of the DVA.
+        release: How robots are released after an emergency; None: as the DVA says.
     """
 
     watchdog: float
@@ -57,19 +59,24 @@ class SafetyTerms:
     motors: dict[str, MotorLimits] = field(default_factory=dict)
     labels: dict[str, str] = field(default_factory=dict)
     dva: str = DVA
+    release: ReleasedBy | None = DRIVE
 
     def about_robots(self) -> dict[str, Any]:
         """Return the limits that stand in the profiles of the robots, and not in the scenario."""
         motors = {robot: list(limits) for robot, limits in self.motors.items()}
-        return {"processing_s": self.processing, "motors": motors}
+        release = {} if self.release == DRIVE else {"release": self.release}
+        return {"processing_s": self.processing, "motors": motors, **release}
 
 
-def terms_of(scenario: Scenario, robots: Mapping[str, Any] | None = None) -> SafetyTerms:
+def terms_of(
+    scenario: Scenario, robots: Mapping[str, Any] | None = None, attended: bool = False
+) -> SafetyTerms:
     """Return the limits for a run of a scenario.
 
     Args:
         scenario: The scenario.
         robots: From `about_robots`; None: the profiles of the robots are read.
+        attended: As in `Stage`, where nothing comes from `robots`.
 
     Raises:
         ConfigError: a profile of a robot that cannot be read.
@@ -77,11 +84,13 @@ def terms_of(scenario: Scenario, robots: Mapping[str, Any] | None = None) -> Saf
     rules = replace(scenario.dispatch.rules(), operator_span=scenario.operator.span)
     limits = scenario.robot.watchdog_s, scenario.robot.max_age_s
     terms = SafetyTerms(*limits, rules, at_event_m(scenario), labels={DVA: label_of("dva", 1)})
+    terms.release = release_of(scenario, attended)
     for kind in ("robot", "guard", "operator"):
         count = getattr(scenario, kind).count
         terms.labels |= {id_of(kind, n): label_of(kind, n) for n in range(1, count + 1)}
     if robots is not None:
         terms.processing = float(robots["processing_s"])
+        terms.release = robots.get("release", DRIVE)
         terms.motors = {robot: MotorLimits(*of) for robot, of in robots["motors"].items()}
         return terms
     profiles = robot_profiles(scenario)

@@ -130,6 +130,7 @@ class Watched:
         memory: State that survives the DVA.
         time_of_day: Time of day at the start, and exactness of timestamps; see `AgentDevice`.
             Devices that restart need exact ones.
+        attended: True if people at a console may release robots after an emergency.
     """
 
     clock: Clock
@@ -140,6 +141,7 @@ class Watched:
     real: RealLinks | None = None
     memory: Store | None = None
     time_of_day: tuple[float, bool] = (NOON, False)
+    attended: bool = False
 
 
 class Run:
@@ -184,7 +186,10 @@ class Run:
         self.dispatcher = add_dispatcher(self.stage)
         self.field.schedule_incidents()
         self.audit = SafetyAudit(
-            self.recorder, terms_of(scenario), self._motion_of, self.field.place_of
+            self.recorder,
+            terms_of(scenario, attended=watched.attended),
+            self._motion_of,
+            self.field.place_of,
         )
         self.recorder.on_accepted, self.recorder.on_hand = self._accepted, self._by_hand
         self._log = self._keep_facts() if keep_traffic else None
@@ -213,11 +218,19 @@ class Run:
                 self.recorder,
                 time_of_day=watched.time_of_day,
                 cameras=watched.cameras,
+                attended=watched.attended,
             )
             return network, stage
         time_of_day, join = real.time_of_day(), real.join
         stage = Stage(
-            scenario, seed, real.network, self.recorder, join, time_of_day, cameras=watched.cameras
+            scenario,
+            seed,
+            real.network,
+            self.recorder,
+            join,
+            time_of_day,
+            cameras=watched.cameras,
+            attended=watched.attended,
         )
         return real.network, stage
 

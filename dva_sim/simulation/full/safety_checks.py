@@ -18,6 +18,7 @@ from typing import Any, Final, NamedTuple
 
 from dva_sim.agents.observation import CameraFrame
 from dva_sim.agents.robot.controller import Mode
+from dva_sim.agents.robot.emergency_latch import DRIVE, PERSON, ReleasedBy
 from dva_sim.kernel.recorder import Accepted, ByHand, Recorder
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
@@ -41,6 +42,7 @@ ROUNDED = 0.002  # of ticks [s]
 RESTARTED = 10.0  # a robot whose clock has jumped that much [s]
 LEASE = 30.0  # a driver of whom nothing valid was heard for so long has the robot no longer [s]
 LEASE_SLACK = 2.0  # a robot looks at that once a second, the audit twice [s]
+TELLS_WITHIN = 2.0  # a stopped robot tells the DVA so each second [s]
 ENDLESS = 3600.0  # a set point that holds for so long has no end [s]
 MOST_COPIES = 8  # of one command, and registrations of a robot, that are told apart
 MOST_KEPT = 1000  # of the newest messages to a robot, of its sessions, and of events
@@ -57,7 +59,10 @@ CHECKED: Final = {
     f"end, or its program restarts, {OBEYS_WITHIN:g} s and ten messages, {LEASE_SLACK:g} s of "
     "silence; of each session that is over the robot is told; one that a supervisor takes stands "
     "and knows it before it is given",
-    "S3": "nothing that came before an emergency moves a robot after it; slack: as for S1 and S2",
+    "S3": "after an emergency nothing moves a robot until a person has asked the DVA to release it "
+    "from the newest one, and the DVA has told it so, or somebody has at the robot itself; where "
+    "the DVA knows nobody who may, until its holder starts it anew; nothing that came before moves "
+    "it then, and the DVA sends none out that tells it that it is stopped; slack: as for S1 and S2",
     "S4": "speed and turn rate, and what the motors are asked for, stay within their limits; "
     f"slack: {SLACK - 1:.0%}, and "
     f"{MOVING:g} m/s backwards",
@@ -79,6 +84,7 @@ CHECKED_IN_SHORT: Final = (
 
 Broken = tuple[str, str]
 _ID = re.compile(r"\b[0-9A-F]{2}(?::[0-9A-F]{2}){5}\b")
+_ORDERS_ROBOT = re.compile(b"<Order>|<GoTo>|<Patrol>|<Inspect>|<ReturnToBase")
 _ORDERS = m.StartTeleOp | m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
 
 
@@ -105,6 +111,21 @@ class Unanswered(NamedTuple):
     message: m.Message
     at: float
     source: str
+
+
+@dataclass
+class StopTold:
+    """What the DVA has heard of a robot's emergency.
+
+    Attributes:
+        at: Time at which the robot last said that it is stopped [s].
+        tick: Its own clock at the emergency [ms].
+        released: Tick of the emergency for which somebody has asked for a release [ms].
+    """
+
+    at: float = -math.inf
+    tick: int = -1
+    released: int | None = None
 
 
 class Doing(NamedTuple):
@@ -145,6 +166,11 @@ class Witness:
         asked: Time at which that request was first sent.
         hand: Person in manual control, until released.
         let_go: Time at which the last one released it.
+        latched: True from an emergency on until it is released.
+        released_by: How that ends: `person` or `drive`; None: the DVA has not said.
+        emergency: Clock of the robot at the newest emergency, as it says [ms].
+        reported_at: Time at which it first said that [s].
+        questions: Numbers of its newest requests for a release.
         registrations: Its newest ones, by number and time stamp.
         reported: Number of its newest status.
         restarts: Number of restarts of its program that messages have shown.
@@ -180,6 +206,11 @@ class Witness:
     reported: int = 0
     restarts: int = 0
     restarts_shown: dict[str, int] = field(default_factory=dict)
+    latched: bool = False
+    released_by: ReleasedBy | None = None
+    emergency: int | None = None
+    reported_at: float = -math.inf
+    questions: deque[int] = field(default_factory=lambda: deque(maxlen=MOST_COPIES))
     registrations: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=MOST_COPIES))
 
     def given(self, session: int, held: Held) -> None:
@@ -252,9 +283,57 @@ class Witness:
                 _end(self, session, now)
         self.restarts_shown[sequence] = self.restarts
 
-    def note_stop(self, when: float) -> None:
-        """Note that an emergency has stopped it, or should have; no hand drives it any longer."""
-        self.stopped, self.hand = max(self.stopped, when), None
+    def note_stand(self, when: float) -> None:
+        """Note that nothing from before may move it; no hand drives it any longer."""
+        self.stopped = max(self.stopped, when)
+        self.hand = None
+
+    def note_stop(self, when: float, rule: ReleasedBy | None) -> None:
+        """Note that an emergency has stopped it, or should have, until it is released.
+
+        Args:
+            when: Time [s].
+            rule: How robots are released, where the DVA is not asked.
+        """
+        self.note_stand(when)
+        if not self.latched:
+            self.released_by = rule
+        self.latched = True
+
+    def reports_emergency(self, message: m.Message, now: float, rule: ReleasedBy | None) -> None:
+        """Note what it says of its emergency: a tick that is new means that it has obeyed one."""
+        body = message.body
+        if not isinstance(body, m.RobotEmergency):
+            return
+        self.questions.append(message.message_id)
+        if body.released is None and body.tick != self.emergency:
+            self.emergency = body.tick
+            self.reported_at = now
+            self.note_stop(now, rule)
+
+    def hears_release(self, answer: m.Reply) -> m.ByWhom | None:
+        """Take an answer of the DVA; return who has released the robot, if that takes effect."""
+        content = answer.content
+        if answer.answers not in self.questions:
+            return None
+        if answer.code in (m.BAD_MESSAGE, m.NOT_SUPPORTED) and self.released_by is None:
+            self.released_by = DRIVE
+        if not isinstance(content, m.EmergencyRelease) or content.tick != self.emergency:
+            return None
+        if content.released is None:
+            if content.released_by == PERSON or self.released_by is None:
+                self.released_by = PERSON if content.released_by == PERSON else DRIVE
+            return None
+        if self.reported_at < self.stopped - ROUNDED:
+            return None  # that was for an earlier emergency
+        self.latched = False
+        return content.released
+
+    def starts_anew(self) -> bool:
+        """Take an order that could release it; False if it stays stopped."""
+        if self.latched and self.released_by == DRIVE:
+            self.latched = False
+        return not self.latched
 
     def has_stood_since(self, when: float) -> bool:
         """Return True if an emergency that came then has been obeyed, though no answer was seen.
@@ -309,6 +388,11 @@ class SafetyAudit:
     ) -> None:
         self._recorder, self._motors, self._labels = recorder, terms.motors, terms.labels
         self._watchdog, self._max_age = terms.watchdog, terms.max_age
+        self._release = terms.release
+        self._asked_release: dict[tuple[str, str], float] = {}  # by robot and device: when last
+        self._hears_dva = False
+        self._told_stopped: dict[str, StopTold] = {}
+        self._orders_sent: deque[int] = deque(maxlen=MOST_KEPT)  # hashes; each may be sent again
         self._dva, self._obeys_within = terms.dva, OBEYS_WITHIN + 10 * terms.processing
         self._motion_of, self._deaf = motion_of, set[str]()
         self._ledger = EventLedger(terms.rules, terms.dva, place_of, terms.at_event, self._name_of)
@@ -347,9 +431,11 @@ class SafetyAudit:
                 self._reaches_robot(now, source, to, payload)
         elif to == self._dva and isinstance(payload, bytes):
             message = _read(payload)
+            self._hears_dva = True
             self._ledger.hears(source, message, now)
             if message is not None and message.source == source:
                 self._takeovers.hears(source, message)
+                self._dva_hears_of_stops(message, now)
 
     def knows_places(self, known: bool) -> None:
         """Note whether places are known; without them, any finding is taken as made there."""
@@ -368,6 +454,8 @@ class SafetyAudit:
         if message is None or isinstance(message.body, m.Heartbeat):
             return
         if isinstance(message.body, m.Reply):
+            if source == self._dva:
+                self._report([*self._released(robot, witness, message.body)], now, source)
             if source == self._dva and message.body.answers == witness.question:
                 found = [*_confirms_as_given(witness, message.body.content)]
                 self._report(found, now, source)
@@ -386,9 +474,46 @@ class SafetyAudit:
             grant = message.body
             witness.given(grant.session, Held(grant.holder, grant.level, grant.sensors))
 
+    def _dva_hears_of_stops(self, message: m.Message, now: float) -> None:
+        source, body = message.source, message.body
+        if isinstance(body, m.RobotEmergency) and source in self._motors:
+            told = self._told_stopped.setdefault(source, StopTold())
+            told.at = -math.inf if body.tick == told.released else now
+            told.tick = body.tick
+        elif isinstance(body, m.ReleaseEmergency) and body.device in self._motors:
+            told = self._told_stopped.setdefault(body.device, StopTold())
+            told.at = -math.inf
+            told.released = told.tick
+            self._asked_release[body.device, source] = now
+            if len(self._asked_release) > MOST_KEPT:
+                del self._asked_release[next(iter(self._asked_release))]
+
+    def _sends_stopped(self, to: str, data: bytes, now: float) -> Iterator[Broken]:
+        """Yield an order for a robot that has just told the DVA that an emergency holds it."""
+        is_new = hash(data) not in self._orders_sent
+        self._orders_sent.append(hash(data))
+        order = _read(data) if is_new else None
+        if order is None:
+            return
+        robot = order.body.device if isinstance(order.body, m.Order) else to
+        told = self._told_stopped.get(robot or "")
+        if told is not None and now - told.at < TELLS_WITHIN:
+            yield "S3", f"sends out {robot}, which has told it that an emergency holds it"
+
+    def _released(self, robot: str, witness: Witness, answer: m.Reply) -> Iterator[Broken]:
+        """Yield a release that nobody asked for since the emergency."""
+        released = witness.hears_release(answer)
+        if released is None:
+            return
+        asked = self._asked_release.get((robot, released.device), -math.inf)
+        if self._hears_dva and asked < witness.reported_at:
+            yield "S3", f"releases {robot} for {released.device}, who has not asked for that"
+
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:
         """Implement `Observer`."""
         if source == self._dva:
+            if isinstance(payload, bytes) and _ORDERS_ROBOT.search(payload) is not None:
+                self._report([*self._sends_stopped(to, payload, now)], now, source)
             if isinstance(payload, bytes) and self._ledger.waits_for(payload):
                 self._ledger.says(_read(payload))
             if self._takeovers.waits and isinstance(payload, bytes) and b"<reply>" in payload:
@@ -404,6 +529,8 @@ class SafetyAudit:
             witness.registers((message.message_id, message.timestamp), now)
         if b"<GetGrant" in payload and (question := _read(payload)) is not None:
             witness.asks(question.message_id, now)
+        if b"<RobotEmergency>" in payload and (report := _read(payload)) is not None:
+            witness.reports_emergency(report, now, self._release)
         if b"<RobotStatus>" in payload:
             _learn_from_status(witness, _read(payload), now)
         if b"<SensorValue>" in payload and (value := _read(payload)) is not None:
@@ -451,7 +578,7 @@ class SafetyAudit:
         message, body = asked.message, asked.message.body
         match body:
             case m.Emergency():  # it acts whenever it comes, though its bytes never change
-                witness.note_stop(now)
+                witness.note_stop(now, self._release)
             case m.PermissionRevocation() if asked.source == self._dva:
                 _end(witness, body.session, now)
         if code != m.OK:
@@ -497,6 +624,9 @@ class SafetyAudit:
             if motion.mode != Mode.IDLE:  # else it repeats what it once said
                 yield "S3", "obeys an order from before the emergency"
             return
+        is_refused = witness.latched if level == "missions" else not witness.starts_anew()
+        if is_refused:
+            yield "S3", f"obeys {message.source} before anybody has released it"
         if witness.in_hand(now) and motion.mode != Mode.IDLE:
             yield "S2", f"obeys {message.source} while it is driven by hand"
         another = witness.owner not in (None, message.source)
@@ -553,6 +683,8 @@ class SafetyAudit:
         if done.what == "takes":
             motion, limits = self._motion_of(done.robot), self._motors[done.robot]
             found = [*_taken_by_hand(witness, motion, limits, now)]
+            if not witness.starts_anew():
+                found.append(("S3", "is taken by hand before anybody has released it"))
             witness.hand = witness.owner = done.who
             witness.ordered = witness.heard = now
             witness.ends("teleoperation", now)
@@ -561,7 +693,11 @@ class SafetyAudit:
             witness.hand, witness.allowed = None, min(witness.allowed, now)
             witness.let_go = now
         elif done.what == "stops":
-            witness.note_stop(now)
+            witness.note_stop(now, self._release)
+        elif done.what == "stands":
+            witness.note_stand(now)
+        elif done.what == "releases":
+            witness.latched = False
         else:
             if witness.stopped > witness.ordered:
                 found.append(("S3", "obeys a hand after an emergency, before it is taken again"))
@@ -632,7 +768,7 @@ class SafetyAudit:
             body, by = message.body, at + witness.obeys_within
             if isinstance(body, m.Emergency):
                 if not witness.has_stood_since(at):
-                    witness.note_stop(by)
+                    witness.note_stop(by, self._release)
             elif source != self._dva:
                 pass
             elif isinstance(body, m.PermissionRevocation):

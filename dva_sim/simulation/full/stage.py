@@ -15,6 +15,7 @@ import shapely
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import OVER_ZMQ, Cameras
 from dva_sim.agents.operator.strategies import Reach
+from dva_sim.agents.robot.emergency_latch import DRIVE, ReleasedBy
 from dva_sim.core.registry import CONTROL_ROOM, DETECTOR, GUARD, OPERATOR, REMOTE, ROBOT
 from dva_sim.core.roles import ControlRoomRole
 from dva_sim.kernel.clock import Clock
@@ -80,6 +81,23 @@ def control_rooms_of(scenario: Scenario) -> dict[str, ControlRoomRole]:
     return known
 
 
+def release_of(scenario: Scenario, attended: bool) -> ReleasedBy | None:
+    """Return how robots are released after an emergency.
+
+    Args:
+        scenario: The scenario; the phone of the dissertation knows no release.
+        attended: True if people may join.
+
+    Returns:
+        None: by a person if one who may is registered, which the DVA knows.
+    """
+    configured = scenario.emergency.release
+    if configured is not None:
+        return configured
+    follows_dissertation = scenario.phone.profile.startswith("dissertation")
+    return None if attended and not follows_dissertation else DRIVE
+
+
 def label_of(kind: str, number: int) -> str:
     """Its name for people: `robot-1`; of the DVA there is but one."""
     return "dva" if kind == "dva" else f"{kind}-{number}"
@@ -115,6 +133,7 @@ class Stage:
         cameras: Addresses of the robots' pictures.
         devices: All that were made.
         pattern_names: Pattern of the commands for a robot, by its id, where it was changed.
+        attended: True if people may join, who could release a robot after an emergency.
 
     Raises:
         ConfigError: a map that cannot be read, or that the team does not fit on.
@@ -130,6 +149,7 @@ class Stage:
     cameras: Cameras = OVER_ZMQ
     devices: list[AgentDevice] = field(default_factory=list)
     pattern_names: dict[str, str] = field(default_factory=dict)
+    attended: bool = False
 
     def __post_init__(self) -> None:
         self.streams = Streams(self.seed)
@@ -157,6 +177,11 @@ class Stage:
     def clock(self) -> Clock:
         """The clock that everybody shares."""
         return self.network.clock
+
+    @property
+    def release(self) -> ReleasedBy | None:
+        """How robots are released after an emergency, as in `release_of`."""
+        return release_of(self.scenario, self.attended)
 
     def pattern_for(self, robot: str) -> Pattern:
         """Return the pattern of the next drive of a robot, by its id."""

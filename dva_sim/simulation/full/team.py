@@ -23,6 +23,7 @@ from dva_sim.agents.people.walking import Walking
 from dva_sim.agents.robot.battery import Battery
 from dva_sim.agents.robot.command_queue import service_times
 from dva_sim.agents.robot.controller import Limits, RobotController
+from dva_sim.agents.robot.emergency_latch import EmergencyLatch
 from dva_sim.agents.robot.field_of_view import FieldOfView
 from dva_sim.agents.robot.profile import RobotProfile
 from dva_sim.agents.robot.robot import RobotAgent, RobotSetup
@@ -93,6 +94,7 @@ class TeamBuilder:
             Limits(config.watchdog_s, config.max_age_s),
             camera_url=stage.cameras.url(device.label, device.address),
             clock_offset=float(stage.streams[f"{device.label}/clock"].uniform(10.0, 100_000.0)),
+            latch=EmergencyLatch(stage.release),
         )
         power = Power(profile, config.charge, body, base, stage.clock)
         setup = self._setup(profile, body, power)

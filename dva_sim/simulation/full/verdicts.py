@@ -19,7 +19,7 @@ from dva_sim.simulation.full.safety_checks import SafetyAudit
 RULES: Final = {
     "S1": "a robot moves only by a valid command in time, or a mission that holds",
     "S2": "a robot has one owner, and changes hands at a standstill",
-    "S3": "an emergency stops a robot until it gets a new order",
+    "S3": "an emergency stops a robot until a permitted person releases it",
     "S4": "motors stay within their limits",
     "S5": "nobody acts without a permission",
     "S6": "no event is lost, counted twice or left waiting",

@@ -457,6 +457,18 @@ class DvaConfig(Config):
     )
 
 
+class EmergencyConfig(Config):
+    """Emergencies.
+
+    Attributes:
+        release: How a robot that an emergency has stopped takes orders again. `person`: a control
+            room that may dispatch releases it. `drive`: its holder starts it anew. Left out: in the
+            console and in `live` a person, where one who may is registered; else a new start.
+    """
+
+    release: Literal["person", "drive"] | None = None
+
+
 class PatrolConfig(Config):
     """A round that the DVA sends a robot while nothing happens.
 

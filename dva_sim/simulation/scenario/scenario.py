@@ -28,6 +28,7 @@ from dva_sim.simulation.scenario.parts import (
     DispatchConfig,
     DisturbanceConfig,
     DvaConfig,
+    EmergencyConfig,
     EventConfig,
     GuardConfig,
     OperatorConfig,
@@ -48,6 +49,7 @@ NEWER = (
     ("disturbance",),
     ("dva",),
     ("dva", "control_rooms"),
+    ("emergency",),
 )
 """Keys that came after results were published: a part, or some keys of one."""
 
@@ -95,6 +97,7 @@ class Scenario(Config):
     dispatch: DispatchConfig = DispatchConfig()
     access: tuple[AccessConfig, ...] = ()
     dva: DvaConfig = DvaConfig()
+    emergency: EmergencyConfig = EmergencyConfig()
     patrols: tuple[PatrolConfig, ...] = ()
     horizon_s: Annotated[
         float,

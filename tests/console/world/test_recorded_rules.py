@@ -75,7 +75,7 @@ def test_hands_faults_and_a_dva_that_is_stopped_are_part_of_the_recording(
 ):
     """Driven by hand, stopped by its button, hung, slowed; then again, by a robot that is deaf."""
     if is_deaf:
-        monkeypatch.setattr(RobotController, "_emergency", lambda *_: Decision(m.OK, "stopped"))
+        monkeypatch.setattr(RobotController, "stop", lambda *_: Decision(m.OK, "stopped"))
     console = Recorded(monkeypatch, tmp_path / "run.mcap")
     window, page, run = console.world.windows.by_id[ROBOT], console.page, console.world.run
     page.let(5.0)

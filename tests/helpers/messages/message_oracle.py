@@ -45,6 +45,7 @@ NAMES = {
     "responder": "ResponderID",
     "sensor": "SensorName",
     "source": "SourceID",
+    "stopped_by": "StoppedByID",
     "values": "Value",
     "waypoints": "Waypoint",
 }

@@ -29,11 +29,11 @@ ids = st.from_regex(r"\A[0-9A-F]{2}(:[0-9A-F]{2}){5}\Z")
 clocks = st.from_regex(r"\A([01][0-9]|2[0-3])(:[0-5][0-9]){2}(\.[0-9]{1,9})?\Z")
 numbers = st.integers(1, UINT32)
 STRATEGIES: dict[str, st.SearchStrategy[Any]] = {
-    "actor advised author device holder id_tag operator responder": ids,
+    "actor advised author device holder id_tag operator responder stopped_by": ids,
     "action activity device_type label name policy sensor sensors unit": characters(1, 64),
     "note reason text": characters(0, 256),
     "age ago advised_in arrival_in bid_within closed_for decide_within held_for": real(0, 1e6),
-    "state_for": real(0, 1e6),
+    "state_for stopped_for": real(0, 1e6),
     "confidence severity": real(0, 1),
     "speed turn_rate": real(-100, 100),
     "frequency": real(0, 1000),
@@ -61,6 +61,7 @@ STRATEGIES: dict[str, st.SearchStrategy[Any]] = {
     "level": one_word("teleoperation missions both sensors"),
     "mission_state": one_word("none under_way waiting replanning done failed"),
     "mode": one_word("Idle Mission Teleoperation"),
+    "released_by": one_word("person drive"),
     "role": one_word("look drive dispatch supervise"),
     "state": one_word("accepted declined departed arrived failed done"),
     "takeover": one_word("no ask force"),

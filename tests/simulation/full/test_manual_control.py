@@ -154,7 +154,7 @@ def obeys_any_hand(self: RobotController, who: str, speed: float, turn: float, n
     return Decision(m.OK, set_point=TimedSetPoint(speed, turn, now + self.limits.watchdog))
 
 
-def does_not_begin(self: RobotController, arrived: float, moving: bool) -> None:
+def does_not_begin(self: RobotController, *_: object, **__: object) -> None:
     """Faulty robot: starts any drive, even while another driver has it."""
 
 

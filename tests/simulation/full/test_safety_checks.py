@@ -145,7 +145,7 @@ def ok(*_: Any) -> Decision:
     return Decision(m.OK, "stopped")
 
 
-def deaf(self: RobotController, now: float) -> Decision:
+def deaf(self: RobotController, now: float, stopped_by: str | None = None) -> Decision:
     """It says that it has heard of an emergency, or even does not remember one."""
     self.emergency_at = now
     return ok()
@@ -213,14 +213,14 @@ PLANTED: dict[str, tuple[Callable[[], Run], str, Callable[..., Any], set[str]]] 
         lambda: driven(50, (12.0, TURN), (47.0, TURN)),
         *("expire", lambda *_: False, {"S1", "S2"}),
     ),
-    "it forgets an emergency": (lambda: driven(45, *AFTER_AN_EMERGENCY), "_emergency", ok, {"S3"}),
+    "it forgets an emergency": (lambda: driven(45, *AFTER_AN_EMERGENCY), "stop", ok, {"S3"}),
     "it lies about an emergency": (
         lambda: driven(45, *AFTER_AN_EMERGENCY),
-        *("_emergency", deaf, {"S3"}),
+        *("stop", deaf, {"S3"}),
     ),
     "the watchdog ends an emergency": (
         lambda: driven(15, *LEFT_TO_THE_WATCHDOG, **{"robot.watchdog_s": 1.0}),
-        *("_emergency", ok, {"S3"}),
+        *("stop", ok, {"S3"}),
     ),
     "too fast": (lambda: driven(13, FAST), "drive", asks_for(0.6), {"S4"}),
     "no number": (lambda: driven(13, FAST), "drive", asks_for(float("nan")), {"S4"}),
@@ -298,7 +298,7 @@ def test_a_robot_that_changes_hands_while_it_moves_breaks_s2(monkeypatch):
         return run
 
     assert broken(handed_over()) == set()
-    monkeypatch.setattr(RobotController, "_begin", lambda *_: None)
+    monkeypatch.setattr(RobotController, "_begin", lambda *_, **__: None)
     assert "S2" in broken(handed_over())
 
 
@@ -370,7 +370,7 @@ def test_a_robot_that_moves_by_itself_after_an_emergency_breaks_s3(monkeypatch):
     ask(run, 12.0, m.GoTo((goal,)))
     ask(run, 20.0, m.Emergency(), session=0)
 
-    monkeypatch.setattr(RobotController, "_emergency", deaf)
+    monkeypatch.setattr(RobotController, "stop", deaf)
     run.clock.run(30.0)
     assert run.field.robots[ROBOT].controller.mode is Mode.MISSION
     assert broken(run) == {"S3"}
@@ -383,7 +383,7 @@ def test_an_emergency_whose_answer_is_lost_stops_a_robot_once(monkeypatch, is_de
     before = (10.0, m.PermissionGrant(DVA, "both", 5)), (11.0, m.StartTeleOp())
     run = staged()
     if is_deaf:
-        monkeypatch.setattr(RobotController, "_emergency", deaf)
+        monkeypatch.setattr(RobotController, "stop", deaf)
     again = () if is_deaf else ((22.0, m.StartTeleOp()), *every_second(23, 39, TURN))
     commands = every_second(12, 39 if is_deaf else 19, TURN)
     for time, body in (*before, *commands, *again):

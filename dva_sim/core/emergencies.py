@@ -1,0 +1,92 @@
+"""Robots that an emergency holds, as they say themselves, and who has released them.
+
+A robot obeys its own latch; what is kept here tells the DVA whom it cannot send, and stops a robot
+again whose program was replaced by one that knows nothing of its latch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+
+from dva_sim.core.handling import Choice
+from dva_sim.protocol import messages as m
+
+UNCONFIRMED_AFTER = 30.0  # a robot says each second that it is stopped, if it is [s]
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Emergency of one robot.
+
+    Attributes:
+        stopped_by: Id of the device that sent it; None: the robot's own button.
+        tick: The robot's own clock at the newest emergency [ms].
+        heard: Time at which the robot last said so [s].
+        released: Person who has released it.
+    """
+
+    stopped_by: str | None
+    tick: int
+    heard: float
+    released: Choice | None = None
+
+
+@dataclass
+class Emergencies:
+    """Emergencies by robot.
+
+    Attributes:
+        changes: Number of emergencies that began, were released or forgotten.
+    """
+
+    changes: int = 0
+    _stops: dict[str, Stop] = field(default_factory=dict)
+
+    def holds(self, robot: str) -> bool:
+        """Return True if a robot is stopped, and nobody has released it."""
+        stop = self._stops.get(robot)
+        return stop is not None and stop.released is None
+
+    def stopped(self) -> dict[str, Stop]:
+        """Return the robots that nobody has released."""
+        return {robot: stop for robot, stop in self._stops.items() if stop.released is None}
+
+    def hear(self, robot: str, emergency: m.RobotEmergency, now: float) -> Stop:
+        """Note what a robot says of its emergency; a newer one ends an earlier release."""
+        stop = self._stops.get(robot)
+        if stop is not None and stop.tick == emergency.tick:
+            stop = replace(stop, heard=now)
+        else:
+            stop = Stop(emergency.stopped_by, emergency.tick, now)
+            self.changes += 1
+        self._stops[robot] = stop
+        return stop
+
+    def restore(self, robot: str, stop: Stop) -> None:
+        """Take over an emergency of an earlier life of the DVA."""
+        self._stops[robot] = stop
+
+    def release(self, robot: str, choice: Choice) -> None:
+        """Note that a person has released a robot, which will ask."""
+        self._stops[robot] = replace(self._stops[robot], released=choice)
+        self.changes += 1
+
+    def who_released(self, robot: str) -> Choice | None:
+        """Return the release of a robot's newest emergency."""
+        stop = self._stops.get(robot)
+        return stop.released if stop is not None else None
+
+    def forget(self, robot: str) -> None:
+        """Forget a robot that is registered no longer."""
+        self.changes += self._stops.pop(robot, None) is not None
+
+    def lapse(self, now: float, last_heard: Callable[[str], float]) -> None:
+        """Forget emergencies of robots that are heard and no longer say that they are stopped."""
+        for robot in list(self._unconfirmed(now, last_heard)):
+            self.forget(robot)
+
+    def _unconfirmed(self, now: float, last_heard: Callable[[str], float]) -> Iterator[str]:
+        for robot, stop in self.stopped().items():
+            if now - stop.heard > UNCONFIRMED_AFTER and last_heard(robot) > stop.heard:
+                yield robot
