@@ -53,6 +53,8 @@ class BridgedRobot:
         message = decode(request.data)
         self.heard.append(message.body)
         reply = m.Reply(message.message_id, m.OK, "")
+        if isinstance(message.body, m.RobotEmergency):  # as a DVA of before version 1.7
+            reply = m.Reply(message.message_id, m.NOT_SUPPORTED, "not for the DVA")
         if isinstance(message.body, m.GetGrant):
             reply = replace(confirmation(self._grant), answers=message.message_id)
         request.answer(encode(m.Message(message.source, 1, DVA, "12:00:00", 0, reply)))
