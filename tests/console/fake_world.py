@@ -166,7 +166,7 @@ class FakeWorld(FakePhones, FakeControlRoom):
         try:
             text = getattr(self, f"do_{what}")(asked) or text
         except (KeyError, ValueError, AttributeError) as error:
-            ok, text = False, str(error)
+            ok, text, self.more = False, str(error), {"outcome": "refused"}
         if key is not None:
             more = {"tour": self.scene.tour()} if what == "tour" else self.more
             self.done[key] = {"k": "done", "id": key, "ok": ok, "text": text, **more}

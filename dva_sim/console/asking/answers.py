@@ -8,7 +8,7 @@ from typing import Final, Unpack
 
 from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.wire.kinds import BadMessage
-from dva_sim.console.wire.seats import Answered, DoneLine
+from dva_sim.console.wire.seats import REFUSAL, Answered, DoneLine
 from dva_sim.kernel.errors import DvaSimError
 
 SAME: Final = 1.0  # an emergency stop by two paths is one, if they arrive within this [s]
@@ -72,4 +72,4 @@ def answering(do: Callable[[OnResult], object], on_result: OnResult) -> None:
     try:
         do(on_result)
     except (Refused, BadMessage, DvaSimError) as error:
-        on_result(False, str(error))
+        on_result(False, str(error), outcome=REFUSAL)

@@ -11,12 +11,12 @@ from typing import Any, Final, Unpack
 from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.wire.actions import ACTIONS, Action, Asked, Audit
-from dva_sim.console.wire.seats import Answered
+from dva_sim.console.wire.seats import REFUSAL, Answered
 from dva_sim.core.audit import Fact
 from dva_sim.protocol import messages as m
 from dva_sim.recordings.audit_log import AuditEntry
 
-DONE, REFUSED = "done", "refused"
+DONE: Final = "done"
 _HEAD: Final = frozenset(["id", "do", "client", "role", "robots", "robot", "event", "reason"])
 SECRET: Final = frozenset(["server", "port"])
 
@@ -53,7 +53,7 @@ class Audited:
 
         def log_and_answer(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
             if self.is_noted(action):
-                outcome = more.get("outcome", DONE if ok else REFUSED)
+                outcome = more.get("outcome", DONE if ok else REFUSAL)
                 self._note(what, client, line, outcome, text)
             if action.stops:
                 on_result(ok, text, **more)
@@ -121,7 +121,7 @@ class Audited:
             event=fact.event,
             subject=(fact.device and self._label(fact.device)) or "",
             cause=fact.cause,
-            outcome=DONE if ok else REFUSED,
+            outcome=DONE if ok else REFUSAL,
             text=": ".join(text for text in answer_text if text),
             details=details,
         )

@@ -42,10 +42,10 @@ def check_role(role: Role, name: Any) -> None:
     Raises:
         NotAllowed: not by this address.
     """
-    if not role.acts:
-        raise NotAllowed("this address is view-only")
     least = ACTIONS[name].role if isinstance(name, str) and name in ACTIONS else Role.PHONE
     if role < least:
+        if not role.acts:
+            raise NotAllowed("this address is view-only; it may only press the emergency stop")
         own = "a phone's address" if role is Role.PHONE else "this address"
         raise NotAllowed(f"{own} may not {plain(name)}; an address {_FOR[least]} may")
 

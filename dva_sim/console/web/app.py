@@ -300,8 +300,8 @@ def make_app(
         Route("/api/logs/{name}", _for(Role.LOOK, logs.lines)),
         Route("/api/logs/{name}/export", _for(Role.DRIVE, logs.export)),
         Route("/api/logs/{name}/{number:int}", _for(Role.DRIVE, logs.entry)),
-        Route("/api/actions", _for(Role.PHONE, rest.action), methods=["POST"]),
-        Route(EMERGENCY, _for(Role.PHONE, rest.emergency), methods=["POST"]),
+        Route("/api/actions", rest.action, methods=["POST"]),
+        Route(EMERGENCY, rest.emergency, methods=["POST"]),
         WebSocketRoute("/ws/state", see),
         WebSocketRoute("/ws/drive", drive),
     ]

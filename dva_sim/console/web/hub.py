@@ -24,6 +24,7 @@ from dva_sim.console.wire.arguments import OfRobots
 from dva_sim.console.wire.kinds import BadMessage, read_arguments
 from dva_sim.console.wire.limits import DRIVES_BURST, DRIVES_RATE, LOOKS_BURST, LOOKS_RATE
 from dva_sim.console.wire.roles import Role
+from dva_sim.console.wire.seats import REFUSAL
 from dva_sim.serving.connection import wire_of
 
 TIDY = 10.0  # from one look at silent programs to the next [s]
@@ -128,8 +129,7 @@ class Hub:
         self.clients.leave(client)
         self._tell_looks()
         self.watching()
-        if client.role.acts:
-            self.simulation.send({"client": client.name, "do": "gone"})
+        self._stop_drive(client)
         task = asyncio.ensure_future(self._forget(client))
         self._later.add(task)
         task.add_done_callback(self._later.discard)
@@ -173,9 +173,8 @@ class Hub:
     async def drive(self, ws: WebSocket, role: Role) -> None:
         """Serve a driving socket until it closes; then its robots stop."""
         client = self.clients.find(ws.query_params.get("key", ""), role)
-        if not role.acts or client is None or not client.is_here:
-            why = "may only look" if role is Role.LOOK else "no open page has this key"
-            await ws.send_denial_response(PlainTextResponse(why, 403))
+        if client is None or not client.is_here:
+            await ws.send_denial_response(PlainTextResponse("no open page has this key", 403))
             return
         if await self._is_over(ws):
             return
@@ -194,13 +193,18 @@ class Hub:
         finally:
             if client.driver is driver:
                 client.driver = None
-                self.simulation.send({"client": client.name, "do": "gone"})
+                self._stop_drive(client)
 
     def _replace(self, client: Client) -> None:
         """A page has one driving socket; the newest counts, and begins at rest."""
         if client.driver is not None:
             client.driver.replaced = True
             client.driver.wake.set()
+            self._stop_drive(client)
+
+    def _stop_drive(self, client: Client) -> None:
+        """Stop what a page drives; a view-only one drives nothing."""
+        if client.role.acts:
             self.simulation.send({"client": client.name, "do": "gone"})
 
     def _hear_driver(self, client: Client, driver: Driver, text: str) -> None:
@@ -223,7 +227,7 @@ class Hub:
             self.simulation.ask(asked, lambda line: driver.answer(encode(line)))
         except BadMessage as error:
             line = {"k": "done", "id": key if isinstance(key, str) else None, "ok": False}
-            driver.answer(encode(line | {"text": str(error)}))
+            driver.answer(encode(line | {"text": str(error), "outcome": REFUSAL}))
 
     # --- both ----------------------------------------------------------------------------
 

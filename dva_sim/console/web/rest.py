@@ -126,11 +126,11 @@ class Rest:
         try:
             body, role = await body_of_request(request), request.scope[ROLE]
             name = body.get("action")
+            check_role(role, name)
             client = self._client(body, role)
             if name == "gone":
                 self._simulation.send({"do": "gone", "client": client})
                 return JSONResponse({"ok": True, "text": ""}, headers=NOT_KEPT)
-            check_role(role, name)
             asked = asked_of(name, body.get("arguments", {}), self._simulation.labels)
             key = id_of(body.get("id"))
             if ACTIONS[asked["do"]].seats and "key" not in body:
@@ -203,7 +203,7 @@ class Rest:
 
     def _answer(self, line: Answer) -> Response:
         body = {"id": line["id"], "ok": bool(line.get("ok")), "text": line.get("text", "")}
-        body |= {name: line[name] for name in ("client", "key") if name in line}
+        body |= {name: line[name] for name in ("client", "key", "outcome") if name in line}
         return JSONResponse(body, 504 if line.get("late") else 200, headers=NOT_KEPT)
 
 

@@ -18,6 +18,7 @@ from dva_sim.console.web.state import RunState
 from dva_sim.console.wire.actions import ACTIONS, Asked, Queueing
 from dva_sim.console.wire.kinds import Labels
 from dva_sim.console.wire.limits import MOST_ASKING, MOST_PENDING, SILENCE
+from dva_sim.console.wire.seats import REFUSAL
 from dva_sim.serving.pipes import Lines, WatchedEnd
 
 MOST_COMPLAINTS = 20
@@ -104,7 +105,8 @@ class Simulation:
         self.why = self.why or "the simulation has ended"
         self.ended.set()
         for key in list(self._pending):
-            self._answer({"k": "done", "id": key, "ok": False, "text": self.why})
+            line = {"k": "done", "id": key, "ok": False, "text": self.why, "outcome": REFUSAL}
+            self._answer(line)
 
     def _answer(self, line: Answer) -> None:
         for entry in self._pending.pop(str(line.get("id")), ()):
@@ -131,7 +133,7 @@ class Simulation:
             on_answer(line | {"id": given})
 
         if self.ended.is_set():
-            answered({"k": "done", "ok": False, "text": self.why})
+            answered({"k": "done", "ok": False, "text": self.why, "outcome": REFUSAL})
             return
         action = ACTIONS[asked["do"]]
         is_urgent = action.waits is Queueing.FIRST

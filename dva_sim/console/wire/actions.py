@@ -192,6 +192,7 @@ _LIST = (
         "stops robots before all else; one's own, or all",
         OfSome,
         at=_RUN | _HANDS,
+        role=Role.LOOK,
         stops=True,
         over_link=True,
         waits=Queueing.FIRST,

@@ -8,7 +8,7 @@ from enum import IntEnum
 class Role(IntEnum):
     """The permissions of a client, in ascending order.
 
-    A phone drives its own robot, or belongs to a guard. Drivers may change the link as well,
+    Every role may press the emergency stop, which can do no more than stop robots. A phone drives its own robot, or belongs to a guard. Drivers may change the link as well,
     dispatchers may send others, and supervisors may take robots from their holders.
     """
 
@@ -21,5 +21,5 @@ class Role(IntEnum):
 
     @property
     def acts(self) -> bool:
-        """True if it may do more than look."""
+        """True if it may do more than look and press the emergency stop."""
         return self >= Role.PHONE

@@ -1,6 +1,6 @@
 """Lines for people in seats: their drives, phones and guards; and answers to actions."""
 
-from typing import Literal
+from typing import Final, Literal
 
 from typing_extensions import TypedDict
 
@@ -152,6 +152,9 @@ class ProposalShown(TypedDict):
     arrival_s: float | None
     decide_within_s: float | None
     candidates: list[CandidateShown]
+
+
+REFUSAL: Final = "refused"  # outcome of what was not done, and never will be by asking again
 
 
 class Answered(TypedDict, total=False):

