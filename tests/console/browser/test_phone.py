@@ -289,10 +289,12 @@ def test_of_two_phones_the_second_is_told_who_drives(hand, world, visits):
     other.leave()
 
 
-def test_emergency_stop_works_from_every_screen_once_a_robot_is_chosen(hand):
+def test_emergency_stop_works_from_every_screen_first_of_all_robots_then_of_its_own(hand):
     stop = hand.page.get_by_role("button", name="Emergency stop")
-    expect(stop).to_be_disabled()
-    expect(hand.page.get_by_text("register first")).to_be_visible()
+    expect(hand.page.get_by_text("Stops all robots.")).to_be_visible()
+    with hand.page.expect_response("**/api/emergency") as answer:
+        stop.tap()
+    assert '"robots":"all"' in (answer.value.request.post_data or "")
     hand.hold()
     for screen in ("Main", "Authentication", "Calibration", "Instructions"):
         hand.go(screen)

@@ -12,9 +12,9 @@ export const hazards = signal({ hazards: [], fields: [] });
 export const events = signal([]);
 /**
  * Devices as the DVA reports them, while a page shows them.
- * @type {import('../vendor/preact.js').Signal<import('./lines.js').DeviceRow[]>}
+ * @type {import('../vendor/preact.js').Signal<Omit<import('./lines.js').Devices, 'k'>>}
  */
-export const devices = signal([]);
+export const deviceList = signal({ t: 0, devices: [] });
 /** @type {import('../vendor/preact.js').Signal<import('./lines.js').Happened[]>} */
 export const story = signal([]);
 /** @type {import('../vendor/preact.js').Signal<import('./lines.js').Seat | null>} */
@@ -34,8 +34,8 @@ export const guard = signal(null);
  * @type {import('../vendor/preact.js').Signal<import('./lines.js').Control | null>}
  */
 export const control = signal(null);
-/** @type {import('../vendor/preact.js').Signal<Omit<import('./lines.js').Alarms, 'k' | 't'>>} */
-export const alarmList = signal({ alarms: [], shelved: [], flood: false, rate: 0, left_out: 0 });
+/** @type {import('../vendor/preact.js').Signal<Omit<import('./lines.js').Alarms, 'k'>>} */
+export const alarmList = signal({ t: 0, alarms: [], shelved: [], flood: false, rate: 0, left_out: 0 });
 /**
  * State of the audit log; its rows are requested separately.
  * @type {import('../vendor/preact.js').Signal<import('./lines.js').Audit | null>}

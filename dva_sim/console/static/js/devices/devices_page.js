@@ -1,7 +1,8 @@
 /** Devices page: connected devices and their holders; fake devices can be added. */
 import { html, useState } from '../../vendor/preact.js';
-import { devices, isAttached, isPast, maySteer, maySupervise, rows } from '../store.js';
+import { deviceList, isAttached, isPast, maySteer, maySupervise, rows } from '../store.js';
 import { act } from '../net/actions.js';
+import { sinceSent } from '../net/world_time.js';
 import { useTable } from '../logs/looking.js';
 import { Icon } from '../ui/icon.js';
 import { isNumber } from '../ui/words.js';
@@ -17,7 +18,7 @@ const HEADS = /** @type {[string, string][]} */ ([
 export function DevicesPage() {
   useTable('devices');
   const [isAdding, setAdding] = useState(false);
-  const list = [...devices.value].sort(byKind);
+  const list = [...deviceList.value.devices].sort(byKind);
   return html`<main class="page devices-page" id="main" tabindex="-1">
     <h1 class="hidden">Devices</h1>
     <section class="panel" aria-label="Devices known to the DVA">
@@ -29,7 +30,7 @@ export function DevicesPage() {
         <table aria-label="Devices">
           <thead><tr>${HEADS.map(([head, unit]) => html`<th scope="col">${head || html`<span class="hidden">Actions</span>`}${
             unit && html`<small> ${unit}</small>`}</th>`)}</tr></thead>
-          <tbody>${list.map((device) => html`<${Row} key=${device.id} device=${device} />`)}</tbody>
+          <tbody class="reported">${list.map((device) => html`<${Row} key=${device.id} device=${device} />`)}</tbody>
         </table>
         ${!list.length && html`<p class="soft">${rows.value?.server?.own === false ? 'The DVA has not told its devices yet.' : 'No device is registered.'}</p>`}
       </div>
@@ -48,18 +49,19 @@ const byKind = (a, b) =>
 
 /** @param {{device: any}} props */
 function Row({ device }) {
+  const later = sinceSent(deviceList.value);
   return html`<tr class=${device.silent ? 'silent' : ''}>
     <th scope="row">${device.label}${device.fake && html` <span class="tag">fake</span>`}</th>
     <td>${device.type}</td><td>${device.id}</td><td>${device.address}</td>
     <td><${Health} device=${device} /></td>
     <td>${device.doing ?? (isAttached.value ? UNKNOWN : '–')}</td>
-    <td class="n">${number(device.heard_s, 1)}</td><td class="n">${number(device.beats_hz, 1)}</td>
+    <td class="n">${number(device.heard_s, 1, later)}</td><td class="n">${number(device.beats_hz, 1)}</td>
     <td class="n">${number(device.commands_hz, 1)}</td><td class="n">${number(device.refused, 0)}</td>
-    <td class="n">${number(device.picture_age_s, 1)}</td>
+    <td class="n">${number(device.picture_age_s, 1, later)}</td>
     <td class="n">${number(isNumber(device.round_trip_s) ? 1000 * device.round_trip_s : null, 0)}</td>
     <td>${holderOf(device)}</td>
     <td>${device.level ?? (device.holder ? UNKNOWN : '–')}</td>
-    <td>${endText(device)}</td>
+    <td>${endText(device, later)}</td>
     <td><div class="acts">${!isPast.value && device.holder && device.revocable !== false && html`<button type="button" disabled=${!maySteer.value || !maySupervise.value}
         aria-label=${`Revoke the permission for ${device.label}`} onClick=${() => act('revoke', { device: device.id })}>Revoke</button>`}
       ${device.fake && html`<button type="button" disabled=${!maySteer.value} aria-label=${`Remove ${device.label}`}
@@ -82,9 +84,10 @@ function Health({ device }) {
 /**
  * @param {number | null | undefined} value
  * @param {number} digits
+ * @param {number} [later] time to add, since the value was sent
  */
-function number(value, digits) {
-  if (isNumber(value)) return /** @type {number} */ (value).toFixed(digits);
+function number(value, digits, later = 0) {
+  if (isNumber(value)) return (/** @type {number} */ (value) + later).toFixed(digits);
   return isAttached.value ? UNKNOWN : '–';
 }
 
@@ -94,9 +97,9 @@ function holderOf(device) {
   return device.holder_known === false ? UNKNOWN : '–';
 }
 
-/** @param {any} device */
-function endText(device) {
+/** @param {any} device @param {number} later */
+function endText(device, later) {
   if (!device.holder) return '–';
   if (isAttached.value) return UNKNOWN;
-  return isNumber(device.ends_s) ? `in ${Math.max(0, Math.round(device.ends_s))} s` : 'when given back';
+  return isNumber(device.ends_s) ? `in ${Math.max(0, Math.round(device.ends_s - later))} s` : 'when given back';
 }

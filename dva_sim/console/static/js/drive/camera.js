@@ -1,7 +1,7 @@
 /** A robot's picture with its true age; an outdated picture is marked. */
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
 import { pictures, scene } from '../store.js';
-import { useEvery } from '../ui/every.js';
+import { isStale, pageAge } from '../net/world_time.js';
 import { secondsText } from '../ui/words.js';
 import { drawsNoMore, drew, pictureAge } from './drawn.js';
 import { play } from './mjpeg.js';
@@ -33,13 +33,13 @@ export function CameraPicture({ robot }) {
 
 /** @param {{robot: import('../lines.js').Thing, trouble: string}} props */
 function Age({ robot, trouble }) {
-  useEvery(100);
   const age = pictureAge(robot.i) / 1000;
   const period = 1 / (robot.camera?.rate_hz || 5);
   const known = Number.isFinite(age);
   const limit = Math.max(HATCHED_S, scene.value?.stale_s ?? 0);
-  const look = !known || age > limit ? 'hatched' : age > OLD_PERIODS * period ? 'old' : 'fresh';
-  const text = known ? `${secondsTo(age)} old` : pictures.value || trouble || 'waiting for the first picture';
+  const look = !known || age > limit || isStale.value ? 'hatched' : age > OLD_PERIODS * period ? 'old' : 'fresh';
+  const silence = isStale.value ? `, no data for ${secondsTo(pageAge())}` : '';
+  const text = known ? `${secondsTo(age)} old${silence}` : pictures.value || trouble || 'waiting for the first picture';
   return html`<div class=${`veil ${look}`}></div>
     <figcaption><span class=${`picture-age ${look}`}>${text}</span></figcaption>`;
 }

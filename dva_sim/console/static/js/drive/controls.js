@@ -69,7 +69,7 @@ function Mode(/** @type {{robots: Thing[]}} */ { robots }) {
     robots.length === 1
       ? modeOf(robots[0].i)
       : robots.map((robot) => `${robot.label} ${modeOf(robot.i)}`).join(', ');
-  return html`<span role="status" aria-label="Mode" class="mode-status">${text}</span>`;
+  return html`<span role="status" aria-label="Mode" class="mode-status reported">${text}</span>`;
 }
 
 const PHASES = /** @type {Record<string, string>} */ ({

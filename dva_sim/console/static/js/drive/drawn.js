@@ -1,5 +1,5 @@
 /** Newest picture of each robot that this page has drawn, and so its user has seen. */
-import { worldNow } from '../net/world_time.js';
+import { shownTime } from '../net/world_time.js';
 
 /** Capture times by robot, in simulation time [ms]. @type {Map<number, number>} */
 const drawn = new Map();
@@ -16,8 +16,7 @@ export const drawsNoMore = (robot) => void drawn.delete(robot);
 
 /** Age of the newest picture of a robot [ms]. @param {number} robot */
 export function pictureAge(robot) {
-  const at = drawn.get(robot);
-  return at === undefined ? NaN : Math.max(0, worldNow() - at);
+  return Math.max(0, shownTime() - (drawn.get(robot) ?? NaN));
 }
 
 /** Capture times sent with each input: the age of a command includes that of the picture behind it. */

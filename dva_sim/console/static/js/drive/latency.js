@@ -1,7 +1,7 @@
 /** Latency panel: ages of commands, replies and pictures of each driven robot. */
 import { html, useEffect, useMemo } from '../../vendor/preact.js';
 import { driveOf, floorMs, isModelled, rowOf } from '../store.js';
-import { worldNow } from '../net/world_time.js';
+import { isStale, worldNow } from '../net/world_time.js';
 import { Chart } from '../charts/chart.js';
 import { History } from '../charts/history.js';
 import { useEvery } from '../ui/every.js';
@@ -55,7 +55,7 @@ export function Latency({ robots }) {
   }));
   return html`<section class="latency panel" aria-label="Latency">
     <h2>Latency <${Floor} /></h2>
-    <div class="charts">${KINDS.map(
+    <div class="charts reported">${KINDS.map(
       (kind, n) => html`<div title=${kind.hint}>
         <${Chart} title=${kind.title} unit="ms" lines=${lines} least=${100}
           read=${() => histories[n].read()} />
@@ -67,7 +67,7 @@ export function Latency({ robots }) {
 
 /** @param {History[]} histories @param {Thing[]} robots */
 function sample(histories, robots) {
-  if (document.hidden) return;
+  if (document.hidden || isStale.peek()) return;
   const time = worldNow() / 1000;
   KINDS.forEach((kind, n) => histories[n].add(time, robots.map((robot) => kind.read(robot.i))));
 }
@@ -75,7 +75,7 @@ function sample(histories, robots) {
 /** Lower bound on the latency of a command, whatever the pattern. */
 function Floor() {
   const how = isModelled.value ? 'takes' : 'is processed for';
-  return html`<span class="count">a command ${how} at least ${msText(floorMs.value)}</span>`;
+  return html`<span class="count reported">a command ${how} at least ${msText(floorMs.value)}</span>`;
 }
 
 /**

@@ -17,7 +17,7 @@ export function OrderInHand() {
   const off = !maySteer.value || !mine;
   return html`<section class="panel order" aria-label="Order in hand">
     <h2>Order: event ${order.event}, ${plain(order.kind)}</h2>
-    <p>${capital(plain(order.kind))} reported ${placeOf(order)}. Drive ${robot} there, look, and say
+    <p class="reported">${capital(plain(order.kind))} reported ${placeOf(order)}. Drive ${robot} there, look, and say
       whether it is true.${mine ? '' : ' It waits for whoever takes control.'}</p>
     <div class="buttons">
       ${!here && html`<button type="button" class="go" disabled=${holds}

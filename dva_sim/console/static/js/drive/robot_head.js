@@ -1,16 +1,16 @@
 /** Header above each picture: the robot, its pattern, and counts of its commands. */
 import { html } from '../../vendor/preact.js';
 import { driveOf, modeOf, robots, rowOf, rows, seat } from '../store.js';
+import { sinceSent } from '../net/world_time.js';
 import { PatternSelect } from '../network/pattern_select.js';
 import { chooseRobots, driven } from '../shell/route.js';
 import { ModeMark } from '../ui/icon.js';
-import { useEvery } from '../ui/every.js';
 
 /** @param {{robot: import('../lines.js').Thing, place: number}} props */
 export function RobotHead({ robot, place }) {
   void rows.value;
   return html`<div class="robot-head">
-    <${ModeMark} mode=${modeOf(robot.i)} />
+    <span class="reported"><${ModeMark} mode=${modeOf(robot.i)} /></span>
     <${RobotSelect} robot=${robot} place=${place} />
     <${PatternSelect} robot=${robot} />
     ${place === 0 && driven.value.length < 2 && html`<${BesideButton} robot=${robot} />`}
@@ -49,21 +49,15 @@ function BesideButton({ robot }) {
     onClick=${() => chooseRobots([robot.label, other.label])}>+ ${other.label} beside it</button>`;
 }
 
-let heardAt = 0;
-/** @type {unknown} */
-let heardRows = null;
-
 /**
  * Time until the watchdog stops the robot without a command.
  * @param {{robot: import('../lines.js').Thing}} props
  */
 function Watchdog({ robot }) {
-  useEvery(100);
-  if (rows.value !== heardRows) [heardRows, heardAt] = [rows.value, performance.now()];
   const reported = rowOf(robot.i)?.watchdog_left_s;
-  if (reported === null || reported === undefined) return html`<span class="watchdog off">watchdog off</span>`;
-  const left = Math.max(0, reported - Math.min(0.5, (performance.now() - heardAt) / 1000));
-  return html`<span class=${left < 1 ? 'watchdog low' : 'watchdog'} title="The robot stops by itself if no command arrives for this long">
+  if (!rows.value || reported === null || reported === undefined) return html`<span class="watchdog off reported">watchdog off</span>`;
+  const left = Math.max(0, reported - sinceSent(rows.value));
+  return html`<span class=${`watchdog reported ${left < 1 ? 'low' : ''}`} title="The robot stops by itself if no command arrives for this long">
     <meter min="0" max="3" value=${left} aria-label=${`Watchdog of ${robot.label}`}></meter>watchdog ${left.toFixed(1)} s</span>`;
 }
 
@@ -74,5 +68,5 @@ function StopReason({ robot }) {
   const speed = row?.set_speed_mps ?? 0;
   const text = row?.stop_reason ? `Stopped: ${row.stop_reason}` : `Set point ${speed.toFixed(2)} m/s`;
   const counts = drive ? `${drive.sent} sent, ${drive.refused} refused, ${drive.timeouts} timed out` : '';
-  return html`<span class="stop-reason">${text} <span class="soft">${counts}</span></span>`;
+  return html`<span class="stop-reason reported">${text} <span class="soft">${counts}</span></span>`;
 }

@@ -2,9 +2,8 @@
 import { html, useState } from '../../vendor/preact.js';
 import { alarmList, mayDispatch, selection } from '../store.js';
 import { act } from '../net/actions.js';
-import { worldNow } from '../net/world_time.js';
+import { ageOf, sinceSent } from '../net/world_time.js';
 import { SeverityMark } from '../ui/icon.js';
-import { useEvery } from '../ui/every.js';
 import { ageText } from '../ui/words.js';
 
 const SHELF_S = 900;
@@ -13,7 +12,6 @@ const SHELF_S = 900;
 
 /** Active and shelved alarms. */
 export function AlarmList() {
-  useEvery(1000);
   const { alarms, shelved, flood, rate } = alarmList.value;
   const unseen = alarms.filter((alarm) => alarm.state !== 'acknowledged').length;
   return html`<section class="alarms-panel" aria-label="Alarms">
@@ -39,11 +37,11 @@ function Row({ alarm }) {
     if (alarm.event !== null) selection.value = { kind: 'event', key: alarm.event };
   };
   const seen = alarm.state === 'acknowledged';
-  return html`<li class=${`alarm ${alarm.state} ${alarm.is_new ? 'new' : ''}`}>
+  return html`<li class=${`alarm reported ${alarm.state} ${alarm.is_new ? 'new' : ''}`}>
     <${SeverityMark} severity=${alarm.priority} quiet=${seen} />
     <button type="button" class="plain text" onClick=${open} disabled=${alarm.event === null}>${alarm.text}</button>
     <span class="soft">${alarm.state}${alarm.seen_by ? ` by ${alarm.seen_by}` : ''}</span>
-    <b>${ageText(worldNow() - alarm.since_ms)}</b>
+    <b>${ageText(ageOf(alarm.since_ms))}</b>
     ${mayDispatch.value &&
     html`<span class="do">${!seen &&
       html`<button type="button" disabled=${busy} aria-label=${`Seen: ${alarm.text}`}
@@ -56,10 +54,11 @@ function Row({ alarm }) {
 
 /** @param {{alarm: AlarmRow}} props */
 function Shelved({ alarm }) {
+  const left = Math.max(0, (alarm.left_s ?? 0) - sinceSent(alarmList.value));
   const back = () => act('alarm_unshelve', { alarm: alarm.key });
-  return html`<li class="alarm shelved"><${SeverityMark} severity=${alarm.priority} quiet />
+  return html`<li class="alarm shelved reported"><${SeverityMark} severity=${alarm.priority} quiet />
     <span class="text">${alarm.text}</span>
-    <span class="soft">by ${alarm.shelved_by}, for another ${ageText(1000 * (alarm.left_s ?? 0))}</span>
+    <span class="soft">by ${alarm.shelved_by}, for another ${ageText(1000 * left)}</span>
     ${mayDispatch.value &&
     html`<button type="button" aria-label=${`Unshelve: ${alarm.text}`} onClick=${back}>Unshelve</button>`}
   </li>`;

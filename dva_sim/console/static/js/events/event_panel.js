@@ -2,11 +2,10 @@
 import { html, useRef, useState } from '../../vendor/preact.js';
 import { isAttached, mayDispatch, maySteer, maySupervise, modeOf, robots, rowOf, selection, thingNamed } from '../store.js';
 import { act } from '../net/actions.js';
-import { worldNow } from '../net/world_time.js';
+import { ageOf } from '../net/world_time.js';
 import { isOpen } from '../map/shown.js';
 import { chooseRobots } from '../shell/route.js';
 import { SeverityMark, StateMark } from '../ui/icon.js';
-import { useEvery } from '../ui/every.js';
 import { ageText, capital, plain } from '../ui/words.js';
 import { assignTo, nearestGuard, nearestRobot, ProposalPanel } from './proposal.js';
 import { inHand, reason } from './shared.js';
@@ -15,7 +14,6 @@ import { inHand, reason } from './shared.js';
 
 /** The panel. */
 export function EventPanel() {
-  useEvery(1000);
   const event = inHand.value;
   if (!event) {
     return html`<section class="panel" aria-label="Event in hand"><h2>No event</h2>
@@ -32,12 +30,11 @@ export function EventPanel() {
 
 /** @param {{event: SiteEvent}} props */
 function Facts({ event }) {
-  const now = worldNow();
   const seen = event.acknowledged;
   const last = event.decided;
-  return html`<dl class="facts">
-    <dt>State</dt><dd><${StateMark} state=${event.state} />${plain(event.state)} for ${ageText(now - event.since_ms)}</dd>
-    <dt>Reported</dt><dd>${ageText(now - event.reported_ms)} ago</dd>
+  return html`<dl class="facts reported">
+    <dt>State</dt><dd><${StateMark} state=${event.state} />${plain(event.state)} for ${ageText(ageOf(event.since_ms))}</dd>
+    <dt>Reported</dt><dd>${ageText(ageOf(event.reported_ms))} ago</dd>
     <dt>Acknowledged</dt><dd>${seen ? `by ${seen.label}, ${ageText(seen.at_ms - event.reported_ms)} after the report` : 'by nobody yet'}</dd>
     <dt>Sent</dt><dd>${event.assigned.join(', ') || 'nobody'}</dd>
     ${last && html`<dt>Decided</dt><dd>${plain(last.action)} by ${last.label}${last.reason ? `: ${last.reason}` : ''}</dd>`}

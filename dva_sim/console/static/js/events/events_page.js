@@ -1,7 +1,7 @@
 /** Events page: alarms, events, the current one with its actions, and how orders are given. */
 import { html, useEffect } from '../../vendor/preact.js';
 import { allowed, connection, control, isDispatcher, isPast, mayDispatch, maySupervise, you } from '../store.js';
-import { act, ask } from '../net/actions.js';
+import { act, ask, showRefusal } from '../net/actions.js';
 import { Choice, Field } from '../ui/fields.js';
 import { AlarmList } from './alarm_list.js';
 import { EventPanel } from './event_panel.js';
@@ -35,7 +35,8 @@ function keepJoining() {
   let over = false;
   const again = async () => {
     const done = await ask('room_join', { name: ownName.peek() });
-    if (!done.ok && !over) window.setTimeout(again, AGAIN_MS);
+    if (done.outcome === 'refused') showRefusal(done);
+    else if (!done.ok && !over) window.setTimeout(again, AGAIN_MS);
   };
   again();
   return () => {

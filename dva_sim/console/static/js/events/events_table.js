@@ -2,10 +2,9 @@
 import { html } from '../../vendor/preact.js';
 import { events, mayDispatch, maySteer, selection } from '../store.js';
 import { act } from '../net/actions.js';
-import { worldNow } from '../net/world_time.js';
+import { ageOf } from '../net/world_time.js';
 import { eventsInOrder, isOpen } from '../map/shown.js';
 import { SeverityMark, StateMark } from '../ui/icon.js';
-import { useEvery } from '../ui/every.js';
 import { ageText, capital, plain } from '../ui/words.js';
 import { assignTo, chosen } from './proposal.js';
 import { inHand } from './shared.js';
@@ -17,7 +16,6 @@ const ASIDE = ['Where', 'For', 'Seen by']; // left out where there is little roo
 
 /** The table. */
 export function EventsTable() {
-  useEvery(1000);
   const list = eventsInOrder();
   const open = list.filter(isOpen).length;
   return html`<section aria-labelledby="events-heading" class="events-table">
@@ -25,7 +23,7 @@ export function EventsTable() {
     <div class="scroll" tabindex="0" role="group" aria-label="Table of events">
     <table aria-label="Events"><thead><tr>
       ${HEADS.map((head) => html`<th scope="col" class=${ASIDE.includes(head) ? 'aside' : ''}>${head}</th>`)}</tr></thead>
-      <tbody>${list.map((event) => html`<${Row} key=${event.number} event=${event} />`)}
+      <tbody class="reported">${list.map((event) => html`<${Row} key=${event.number} event=${event} />`)}
       ${!list.length && html`<tr><td colspan=${HEADS.length} class="none">Nothing has been reported.</td></tr>`}</tbody>
     </table></div></section>`;
 }
@@ -42,7 +40,7 @@ function Row({ event }) {
       <small>${event.severity}</small></td>
     <td class="aside">${event.room || 'outdoors'}</td>
     <td><span class="pair"><${StateMark} state=${event.state} />${plain(event.state)}</span></td>
-    <td class="aside">${open ? ageText(worldNow() - event.since_ms) : ''}</td>
+    <td class="aside">${open ? ageText(ageOf(event.since_ms)) : ''}</td>
     <td>${event.assigned.join(', ')}</td>
     <td class="aside">${event.acknowledged?.label ?? ''}</td>
     <td class="do">${mine && open && mayDispatch.value && html`<${Steps} event=${event} />`}</td>

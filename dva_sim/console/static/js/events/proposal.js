@@ -2,6 +2,7 @@
 import { computed, html, signal, useEffect } from '../../vendor/preact.js';
 import { connection, mayDispatch } from '../store.js';
 import { act, ask as askQuietly } from '../net/actions.js';
+import { sinceSent, worldNow } from '../net/world_time.js';
 import { isOpen } from '../map/shown.js';
 import { secondsText } from '../ui/words.js';
 import { reason } from './shared.js';
@@ -12,7 +13,8 @@ import { reason } from './shared.js';
 const AGAIN_MS = 4000;
 const SOON_MS = 500; // where it could not be asked, as while the page connects
 
-const known = signal(/** @type {Proposal | null} */ (null));
+const known = signal(/** @type {Proposal & {t: number} | null} */ (null));
+const refusal = signal('');
 const wanted = signal('');
 
 /** Responder that Assign sends: the one picked, else the one proposed, else the first free one. */
@@ -55,14 +57,15 @@ export function ProposalPanel({ event }) {
   useEffect(() => keepAsking(event), [event.number, event.decisions, event.state, connection.value]);
   if (!isOpen(event)) return null;
   const proposal = known.value?.event === event.number ? known.value : null;
+  if (refusal.value) return html`<p class="warning" role="alert">No proposal: ${refusal.value}</p>`;
   if (!proposal) return html`<p class="none">Asking the policy …</p>`;
   const rival = proposal.candidates.find((who) => who.free && who.label !== proposal.label);
-  return html`<section class="proposal" aria-label="Proposal">
+  return html`<section class="proposal reported" aria-label="Proposal">
     <p><b>${proposal.label ? `${proposal.label}, ${timeText(proposal.arrival_s)}` : 'nobody'}</b>
       ${rival ? ` (${rival.label}: ${timeText(rival.arrival_s)}, ${rival.reason})` : ''}
       <small>${proposal.policy}: ${proposal.reason}</small></p>
     ${proposal.decide_within_s !== null &&
-    html`<p class="ask" role="status">The policy sends them by itself in ${secondsText(proposal.decide_within_s)} unless you decide.</p>`}
+    html`<p class="ask" role="status">The policy sends them by itself in ${secondsText(Math.max(0, proposal.decide_within_s - sinceSent(proposal)))} unless you decide.</p>`}
     <fieldset><legend>Whom to send</legend>
       ${proposal.candidates.map((who) => html`<${Candidate} key=${who.label} who=${who} />`)}
     </fieldset></section>`;
@@ -84,6 +87,7 @@ const timeText = (seconds) => (seconds === null ? '–' : secondsText(seconds));
 function keepAsking(event) {
   if (known.peek()?.event !== event.number) {
     known.value = null;
+    refusal.value = '';
     wanted.value = '';
   }
   if (!mayDispatch.peek() || connection.peek() !== 'open' || !isOpen(event)) return undefined;
@@ -91,8 +95,9 @@ function keepAsking(event) {
   const ask = async () => {
     const done = document.hidden ? null : await askQuietly('event_proposal', { event: event.number });
     if (over) return;
-    if (done?.ok && done.proposal) known.value = done.proposal;
-    window.setTimeout(ask, done?.ok ? AGAIN_MS : SOON_MS);
+    if (done?.ok && done.proposal) known.value = { ...done.proposal, t: done.t ?? worldNow() };
+    refusal.value = done?.outcome === 'refused' ? done.text : '';
+    if (!refusal.value) window.setTimeout(ask, done?.ok ? AGAIN_MS : SOON_MS);
   };
   ask();
   return () => {

@@ -1,11 +1,13 @@
 /** Guard page: the current order with its route, reports on it, and the guard's position. */
 import { html, render, useEffect, useState } from '../../vendor/preact.js';
-import { connection, guard, mayDrive, maySteer, notice, scene, tracks } from '../store.js';
+import { connection, guard, mayDrive, maySteer, scene, tracks } from '../store.js';
 import { act } from '../net/actions.js';
+import { resumeStops } from '../net/emergency.js';
 import { MapBox } from '../map/map_box.js';
 import { placeOf } from '../map/shown.js';
-import { Icon } from '../ui/icon.js';
+import { EmergencyFooter } from '../phone/emergency_footer.js';
 import { useEvery } from '../ui/every.js';
+import { Notices } from '../ui/notices.js';
 import { capital, plain } from '../ui/words.js';
 import { NO_PLAYED_GUARD, playedGuards } from './played.js';
 import { canLocate, locating, follow } from './position.js';
@@ -15,6 +17,7 @@ import { Report } from './report.js';
 export function showGuard(where) {
   where.replaceChildren();
   render(html`<${App} />`, where);
+  resumeStops();
 }
 
 function App() {
@@ -28,6 +31,7 @@ function App() {
         ? html`<${Field} me=${me} />`
         : html`<main id="main"><${Join} /></main>`
       : html`<main id="main"><p class="soft">Waiting for the console …</p></main>`}
+    <${EmergencyFooter} />
   </div>`;
 }
 
@@ -41,11 +45,8 @@ function Alerts() {
   const over = lost && connection.value !== 'lost' ? `The simulation has ended: ${connection.value}` : '';
   const texts = [lost && (over || 'link lost: the console cannot be reached. Trying again …'), guard.value?.alert];
   return html`<div class="alerts" role="alert">
+    <${Notices} others=${texts} />
     ${texts.filter(Boolean).map((text) => html`<p class="warning" key=${text}>${text}</p>`)}
-    ${notice.value &&
-    html`<p class="warning">${notice.value}
-      <button type="button" class="plain" aria-label="Dismiss" onClick=${() => (notice.value = '')}>
-        <${Icon} name="x" /></button></p>`}
   </div>`;
 }
 
@@ -101,7 +102,7 @@ const ways = () => (guard.peek()?.order?.way_m ? [/** @type {any} */ (guard.peek
 function Own({ me }) {
   useEvery(1000);
   const at = tracks.last(me.guard);
-  return html`<p>${at ? `You are ${placeOf({ x_m: at.x, y_m: at.y })}.` : 'Your position is unknown.'}</p>`;
+  return html`<p class="reported">${at ? `You are ${placeOf({ x_m: at.x, y_m: at.y })}.` : 'Your position is unknown.'}</p>`;
 }
 
 /** Distance beyond which an arrival has to be confirmed [m]: the event is hardly visible from there. */
@@ -135,11 +136,11 @@ function OrderCard({ me }) {
   };
   if (!order) {
     return html`<section class="panel" aria-label="Order" aria-live="polite"><h2>No order</h2>
-      <p>${me.doing ? `You: ${me.doing}.` : 'Wait for an order.'}</p>
+      <p class="reported">${me.doing ? `You: ${me.doing}.` : 'Wait for an order.'}</p>
       <${Help} me=${me} /></section>`;
   }
   const far = order.distance_m === null ? '' : `, ${Math.round(order.distance_m)} m`;
-  return html`<section class="panel order-card" aria-label="Order" aria-live="polite">
+  return html`<section class="panel order-card reported" aria-label="Order" aria-live="polite">
     <h2>${capital(plain(order.kind))} ${placeOf(order)}${far}</h2>
     <p>Event ${order.event}: ${plain(order.task)}. ${me.doing ? `You: ${me.doing}.` : ''}</p>
     ${!order.answered &&

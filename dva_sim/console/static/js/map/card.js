@@ -2,7 +2,7 @@
 import { html, useEffect } from '../../vendor/preact.js';
 import { doingOf, isAttached, modeOf, rowOf, rows, selection, thingAt, tracks } from '../store.js';
 import { watch } from '../net/sockets.js';
-import { worldNow } from '../net/world_time.js';
+import { ageOf } from '../net/world_time.js';
 import { chooseRobots } from '../shell/route.js';
 import { useEvery } from '../ui/every.js';
 import { Icon, ModeMark, SeverityMark, StateMark } from '../ui/icon.js';
@@ -17,7 +17,7 @@ export function Card() {
   if (!chosen) return null;
   const body = chosen.kind === 'event' ? eventCard(chosen.key) : thingCard(chosen.key);
   if (!body) return null;
-  return html`<aside class="card" aria-label="What is chosen">
+  return html`<aside class="card reported" aria-label="What is chosen">
     <button type="button" class="close" aria-label="Close" onClick=${() => (selection.value = null)}>
       <${Icon} name="x" /></button>${body}</aside>`;
 }
@@ -31,7 +31,7 @@ function eventCard(key) {
       <dt>State</dt><dd><${StateMark} state=${event.state} />${event.state}</dd>
       <dt>Severity</dt><dd>${event.severity}</dd>
       <dt>Place</dt><dd>${event.room || 'outdoors'} (${event.x_m.toFixed(1)} m, ${event.y_m.toFixed(1)} m)</dd>
-      <dt>Reported</dt><dd>${ageText(worldNow() - event.reported_ms)} min ago</dd>
+      <dt>Reported</dt><dd>${ageText(ageOf(event.reported_ms))} min ago</dd>
       <dt>Sent</dt><dd>${event.assigned.join(', ') || 'nobody'}</dd>
     </dl>`;
 }

@@ -1,9 +1,8 @@
 /** Events, robots and people as lists: the map for screen readers and keyboards. */
 import { html } from '../../vendor/preact.js';
 import { doingOf, events, modeOf, rowOf, rows, scene, selection } from '../store.js';
-import { worldNow } from '../net/world_time.js';
+import { ageOf } from '../net/world_time.js';
 import { ModeMark, SeverityMark, StateMark } from '../ui/icon.js';
-import { useEvery } from '../ui/every.js';
 import { ageText, capital, percentText, plain } from '../ui/words.js';
 import { eventsInOrder, isOpen, roomOf } from './shown.js';
 
@@ -12,7 +11,7 @@ import { eventsInOrder, isOpen, roomOf } from './shown.js';
 
 /** All of them. */
 export function Lists() {
-  return html`<div class="lists"><${Events} /><${Robots} /><${People} kind="guard"
+  return html`<div class="lists reported"><${Events} /><${Robots} /><${People} kind="guard"
     title="Guards" /><${People} kind="bystander" title="Bystanders" /></div>`;
 }
 
@@ -26,28 +25,24 @@ function choose(what) {
 const isChosen = (kind, key) => selection.value?.kind === kind && selection.value.key === key;
 
 function Events() {
-  useEvery(1000);
   const list = eventsInOrder();
   const open = list.filter(isOpen).length;
   return html`<section aria-label="Events">
     <h2>Events <span class="count">${open} open of ${list.length}</span></h2>
     ${list.length === 0 && html`<p class="none">Nothing has been reported.</p>`}
-    <ul class="rows">${list.map((event) => html`<${EventRow} key=${event.number} event=${event} age=${ageOf(event)} />`)}</ul>
+    <ul class="rows">${list.map((event) => html`<${EventRow} key=${event.number} event=${event} />`)}</ul>
   </section>`;
 }
 
-/** @param {SiteEvent} event */
-const ageOf = (event) => (isOpen(event) ? ageText(worldNow() - event.since_ms) : '');
-
-/** @param {{event: SiteEvent, age: string}} props a change in any of them redraws the row */
-function EventRow({ event, age }) {
+/** @param {{event: SiteEvent}} props */
+function EventRow({ event }) {
   const open = isOpen(event);
   return html`<li><button type="button" class=${open ? 'row' : 'row over'}
     aria-pressed=${isChosen('event', event.number)}
     onClick=${() => choose({ kind: 'event', key: event.number })}>
     <${SeverityMark} severity=${event.severity} quiet=${!open} />
     <span class="what">${event.number} ${capital(plain(event.kind))}<small>${event.severity}${event.room ? `, ${event.room}` : ''}</small></span>
-    <span class="state"><${StateMark} state=${event.state} />${event.state} <b>${age}</b>
+    <span class="state"><${StateMark} state=${event.state} />${event.state} <b>${open ? ageText(ageOf(event.since_ms)) : ''}</b>
       ${event.assigned.length > 0 && html`<small>${event.assigned.join(', ')}</small>`}</span>
   </button></li>`;
 }

@@ -2,7 +2,7 @@
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
 import { effect } from '../../vendor/preact.js';
 import { events, guard, hazards, rows, scene, selection, thingAt, tracks } from '../store.js';
-import { pageAge } from '../net/world_time.js';
+import { isStale, pageAge } from '../net/world_time.js';
 import { colours } from '../shell/theme.js';
 import { Icon } from '../ui/icon.js';
 import { useEvery } from '../ui/every.js';
@@ -12,7 +12,6 @@ import { Live } from './live.js';
 import { Plan } from './plan.js';
 import { MapView } from './view.js';
 
-const STALE_S = 2;
 const TAP_PX = 5;
 
 /**
@@ -154,10 +153,8 @@ function Buttons({ view, following, follow }) {
 
 /** Note over a map whose data is outdated. */
 function Stale() {
-  useEvery(500);
-  const age = pageAge();
-  if (age < STALE_S || !Number.isFinite(age)) return null;
-  return html`<div class="stale"><span>as of ${Math.round(age)} s ago</span></div>`;
+  if (!isStale.value) return null;
+  return html`<div class="stale"><span>as of ${Math.round(pageAge())} s ago</span></div>`;
 }
 
 const LENGTHS = [1, 2, 5, 10, 20, 50, 100, 200, 500];

@@ -54,7 +54,7 @@ export async function ask(what, more = {}, id = newId()) {
 }
 
 /** @param {import('../types.js').Answer} done */
-function showRefusal(done) {
+export function showRefusal(done) {
   notice.value = done.ok ? '' : done.text;
   return done;
 }

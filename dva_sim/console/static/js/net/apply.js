@@ -2,7 +2,7 @@
 import { batch } from '../../vendor/preact.js';
 import { hearLog } from '../logs/log_rows.js';
 import {
-  alarmList, audit, connection, control, devices, events, guard, hazards, pictures, rows, scene, seat, shelf, story,
+  alarmList, audit, connection, control, deviceList, events, guard, hazards, pictures, rows, scene, seat, shelf, story,
   tracks,
   windows, you,
 } from '../store.js';
@@ -46,7 +46,7 @@ const LINES = {
     rememberKey(line.key);
   },
   pictures: (line) => (pictures.value = line.ok ? '' : line.text),
-  devices: (line) => (devices.value = line.devices),
+  devices: (line) => (deviceList.value = line),
   log: hearLog,
   pong: heardPong,
   bye: (line) => (connection.value = line.why || 'the world has ended'),

@@ -1,15 +1,25 @@
-/** Emergency stop: sent on every available path, and repeated until it is confirmed. */
-import { signal } from '../../vendor/preact.js';
+/** Emergency stop: sent on every available path, and repeated until it is confirmed or refused. */
+import { effect, signal } from '../../vendor/preact.js';
 import { forget } from '../drive/hold.js';
-import { notice, robots, you } from '../store.js';
+import { notice, robots, rowOf, rows, you } from '../store.js';
 import { ask, newId } from './actions.js';
+import { worldNow } from './world_time.js';
 
 const AGAIN_MS = 1000; // from one attempt to the next
 const REQUEST_MS = 60000; // after which a request is given up, so that none piles up
 const KEPT = 'dva-sim-unconfirmed-stops';
+const REFUSED = 'refused'; // outcome of what asking again does not change
+const MOVING = ['Mission', 'Teleoperation'];
 
 /** Reason why a stop is not confirmed yet; empty if none is pending. */
 export const unconfirmed = signal('');
+/** Reason for which the newest stop was refused; empty if it was not. */
+export const refused = signal('');
+/**
+ * Robots that have confirmed a stop of this page, with the simulation time of the confirmation [ms].
+ * @type {import('../../vendor/preact.js').Signal<Map<number, number>>}
+ */
+export const stopped = signal(new Map());
 
 /** @typedef {'all' | number[]} Robots */
 
@@ -47,6 +57,7 @@ export async function stopRobots(which) {
   const stop = { again: () => {} };
   open.set(key, stop);
   remember();
+  refused.value = '';
   unconfirmed.value ||= 'Emergency stop not confirmed yet …';
   let id = newId();
   /** @type {Promise<Outcome>[]} */
@@ -57,17 +68,18 @@ export async function stopRobots(which) {
       window.setTimeout(go, AGAIN_MS);
     });
     asked.push(overSocket(id, which), overRequest(id, which));
-    const done = await Promise.race([decided(asked), pause.then(() => null)]);
+    const done = await firstAnswer(asked, pause);
     if (open.get(key) !== stop) return;
-    if (done?.ok) {
-      confirmed(key);
+    if (done?.ok || done?.isRefusal) {
+      close(key);
+      if (done.ok) confirm(which);
+      else refused.value = done.text;
       return;
     }
     if (done && singles(which).length > 1) {
       // Some robot has not confirmed: the others need not be stopped again and again for it.
       for (const one of singles(which)) stopRobots([one]);
-      open.delete(key);
-      remember();
+      close(key);
       return;
     }
     if (done) {
@@ -84,30 +96,56 @@ export async function stopRobots(which) {
 const singles = (which) => (which === 'all' ? robots.peek().map((robot) => robot.i) : which);
 
 /** @param {string} key */
-function confirmed(key) {
+function close(key) {
   open.delete(key);
   remember();
   if (open.size === 0) unconfirmed.value = '';
+}
+
+/** @param {Robots} which */
+function confirm(which) {
+  const at = worldNow();
+  stopped.value = new Map([...stopped.peek(), .../** @type {[number, number][]} */ (singles(which).map((i) => [i, at]))]);
   notice.value = '';
 }
 
+/** Forget confirmations of robots that have been ordered to move again since. */
+effect(() => {
+  const t = rows.value?.t ?? 0;
+  const isOver = (/** @type {[number, number]} */ [i, at]) => t > at && (rowOf(i)?.by_hand || MOVING.includes(rowOf(i)?.mode ?? ''));
+  const left = [...stopped.value].filter((entry) => !isOver(entry));
+  if (left.length < stopped.value.size) stopped.value = new Map(left);
+});
+
 /**
- * Resolve with the first reply from the simulation to requests with the same ID.
+ * Resolve with the first answer to requests with the same ID. A refusal counts if no path brings an
+ * answer before all have ended or the pause is over; null if there is none either.
  * @param {Promise<Outcome>[]} asked
- * @returns {Promise<Outcome>}
+ * @param {Promise<unknown>} pause
+ * @returns {Promise<Outcome | null>}
  */
-function decided(asked) {
-  return new Promise((settle) => {
-    for (const each of asked) each.then((done) => done.isAnswer && settle(done));
+function firstAnswer(asked, pause) {
+  /** @type {Outcome | null} */
+  let refusal = null;
+  const answers = asked.map(async (each) => {
+    const done = await each;
+    if (done.isAnswer) return done;
+    if (done.isRefusal) refusal = done;
+    throw new Error(done.text);
   });
+  return Promise.race([Promise.any(answers), pause.then(() => refusal)]).catch(() => refusal);
 }
 
-/** @typedef {{ok: boolean, text: string, isAnswer: boolean}} Outcome */
+/**
+ * Outcome of one path: an answer of the simulation, a refusal, or neither.
+ * @typedef {{ok: boolean, text: string, isAnswer: boolean, isRefusal: boolean}} Outcome
+ */
 
 /** @param {string} id @param {Robots} which @returns {Promise<Outcome>} */
 async function overSocket(id, which) {
   const done = await ask('emergency', { robots: which }, id);
-  return { ok: done.ok, text: done.text, isAnswer: Boolean(done.id) && !done.late };
+  const isRefusal = done.outcome === REFUSED;
+  return { ok: done.ok, text: done.text, isAnswer: Boolean(done.id) && !done.late && !isRefusal, isRefusal };
 }
 
 /** @param {string} id @param {Robots} which @returns {Promise<Outcome>} */
@@ -121,9 +159,10 @@ async function overRequest(id, which) {
     const answer = await fetch('/api/emergency', about);
     const done = await answer.json().catch(() => ({ ok: false, text: '' }));
     const text = done.text || `the server answered ${answer.status}`;
-    return { ok: Boolean(answer.ok && done.ok), text, isAnswer: answer.status === 200 };
+    const isRefusal = done.outcome === REFUSED || (answer.status >= 400 && answer.status < 500);
+    return { ok: Boolean(answer.ok && done.ok), text, isAnswer: answer.status === 200 && !isRefusal, isRefusal };
   } catch {
-    return { ok: false, text: 'the console cannot be reached', isAnswer: false };
+    return { ok: false, text: 'the console cannot be reached', isAnswer: false, isRefusal: false };
   }
 }
 

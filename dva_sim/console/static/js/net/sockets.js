@@ -1,6 +1,6 @@
 /** The two sockets: one receives the state, the other sends the person's input. */
 import { effect } from '../../vendor/preact.js';
-import { connection, mayDrive, reaches, you } from '../store.js';
+import { connection, notice, reaches, you } from '../store.js';
 import { settle, socketLost } from './actions.js';
 import { apply } from './apply.js';
 import { PAGE, rememberedKey } from './seat_key.js';
@@ -11,6 +11,7 @@ const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 4000;
 const RESYNC_EVERY_MS = 1000;
 const LEAVING = 1001; // the server ends
+const REFUSED = 1008; // what this page sends is refused
 const LOOK_MS = 1000; // from one look at a socket to the next; it is asked as often
 const ATTEMPTS = 3; // looks at which nothing was heard: the link is lost, though nobody said so
 const OPENS_WITHIN = 10; // looks
@@ -46,6 +47,7 @@ export function connect() {
     socket.close();
     if (why.code === LEAVING && isAlive()) connection.value = why.reason || 'it was ended';
     else if (isAlive()) connection.value = 'lost';
+    showWhy(why);
     window.setTimeout(connect, wait);
     wait = Math.min(LONGEST_WAIT_MS, 2 * wait);
   };
@@ -67,6 +69,11 @@ export function connect() {
     receive(JSON.parse(event.data));
   };
   socket.onclose = end;
+}
+
+/** Show why the server has closed a socket, if it has refused what it got. @param {{code?: number, reason?: string}} why */
+function showWhy({ code, reason }) {
+  if (code === REFUSED) notice.value = `The console closed a connection of this page: ${reason}`;
 }
 
 /** True unless the simulation is known to have ended. */
@@ -115,10 +122,10 @@ export function look(logs, tables) {
 
 const isLooking = () => looked.tables.length > 0 || Object.keys(looked.logs).length > 0;
 
-/** Open the socket for driving whenever this page may, with the key of its seat. */
+/** Keep the socket for actions open, with the key of the page's seat. */
 export function keepDriveSocket() {
   effect(() => {
-    const key = mayDrive.value ? you.value?.key : null;
+    const key = you.value?.key;
     reaches.value = false;
     replaceDriveSocket(key ? open(key) : null);
   });
@@ -135,7 +142,8 @@ function open(key) {
     if (line.k === 'done') settle(line.id ?? '', line);
     else apply(line);
   };
-  socket.onclose = () => {
+  socket.onclose = (event) => {
+    showWhy(event);
     const unexpected = isDriveSocket(socket);
     if (unexpected) reaches.value = false;
     socketLost(unexpected);

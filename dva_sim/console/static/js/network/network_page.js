@@ -42,7 +42,7 @@ function Figures() {
     <h2>Each robot <span class="count">${rows.value?.dropped ?? 0} messages to the pages given up</span></h2>
     <div class="scrolls" tabindex="0" role="group" aria-label="Table, scrolls sideways"><table><thead><tr>
       ${heads.map((head, n) => html`<th scope="col">${head}${units[n] && html`<small> ${units[n]}</small>`}</th>`)}
-    </tr></thead><tbody>
+    </tr></thead><tbody class="reported">
       ${list.slice(0, MOST_ROWS).map((robot) => html`<${Row} key=${robot.i} robot=${robot} />`)}
     </tbody></table></div>
     ${list.length > MOST_ROWS && html`<p class="soft">and ${list.length - MOST_ROWS} more robots</p>`}
@@ -74,7 +74,7 @@ function Charts() {
     colour: `pattern-${rowOf(robot.i)?.pattern}`,
     dash: DASHES[n],
   }));
-  return html`<section class="panel" aria-label="Charts">
+  return html`<section class="panel reported" aria-label="Charts">
     <h2>On one time axis <span class="count">the last ${SPAN_S} s of the world's time</span></h2>
     <p class="figures">${shown.map(
       (robot, n) => html`<span><i class=${`line line-${n} ${lines[n].colour}`}></i>${robot.label}</span>`,

@@ -1,6 +1,6 @@
 /** Figures on each robot's commands in the last minute, recorded whatever page is shown. */
 import { driveOf, robots, rowOf } from '../store.js';
-import { worldNow } from '../net/world_time.js';
+import { isStale, worldNow } from '../net/world_time.js';
 import { History } from '../charts/history.js';
 
 export const SPAN_S = 60;
@@ -29,7 +29,7 @@ export function keepSampling() {
 
 function sample() {
   const now = robots.peek().slice(0, MOST_ROBOTS).map((robot) => robot.i);
-  if (!now.length) return;
+  if (!now.length || isStale.peek()) return;
   if (now.join() !== known.join()) {
     known = now;
     histories = KINDS.map(() => new History(now.length, SPAN_S + 10));

@@ -1,14 +1,14 @@
 /** Frame of the five screens: heading, link status, alerts, emergency stop. */
 import { html, render, useEffect, useRef } from '../../vendor/preact.js';
-import { connection, notice, scene, seat } from '../store.js';
-import { resumeStops, stopRobots } from '../net/emergency.js';
+import { connection, scene, seat } from '../store.js';
+import { resumeStops } from '../net/emergency.js';
 import { interrupted } from '../drive/hold.js';
-import { Icon } from '../ui/icon.js';
-import { UnconfirmedStop } from '../ui/unconfirmed_stop.js';
+import { Notices } from '../ui/notices.js';
 import { AuthenticationScreen } from './authentication.js';
 import { CalibrationScreen } from './calibration.js';
 import { choices } from './choices.js';
-import { robot, whyNoEmergency } from './drive.js';
+import { robot } from './drive.js';
+import { EmergencyFooter } from './emergency_footer.js';
 import { InstructionsScreen } from './instructions.js';
 import { LinkStatus } from './link_status.js';
 import { MainScreen } from './main_screen.js';
@@ -44,7 +44,7 @@ function App() {
     </header>
     <${Alerts} />
     <main id="main">${scene.value ? html`<${Screen} key=${name} />` : html`<${Waiting} />`}</main>
-    <${Emergency} />
+    <${EmergencyFooter} robot=${robot.value} />
   </div>`;
 }
 
@@ -79,24 +79,7 @@ function Alerts() {
     interrupted.value && `${interrupted.value} The robot was stopped; start again when you are ready.`,
   ];
   return html`<div class="alerts" role="alert">
-    <${UnconfirmedStop} />
+    <${Notices} others=${texts} />
     ${texts.filter(Boolean).map((text) => html`<p class="warning" key=${text}>${text}</p>`)}
-    ${notice.value && !texts.includes(notice.value) &&
-    html`<p class="warning">${notice.value}
-      <button type="button" class="plain" aria-label="Dismiss" onClick=${() => (notice.value = '')}>
-        <${Icon} name="x" /></button></p>`}
   </div>`;
-}
-
-/** Emergency stop, on every screen and by its own request; shows the reason while it is unavailable. */
-function Emergency() {
-  const why = whyNoEmergency.value;
-  const one = robot.value;
-  return html`<footer class="bottom">
-    ${why && html`<p class="soft" id="why-no-emergency">${why}</p>`}
-    <button type="button" class="emergency" disabled=${Boolean(why)}
-      aria-describedby=${why ? 'why-no-emergency' : null}
-      onClick=${() => one && stopRobots([one.i])}>
-      <${Icon} name="octagon-x" />Emergency stop</button>
-  </footer>`;
 }

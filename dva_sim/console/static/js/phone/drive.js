@@ -46,13 +46,6 @@ export const robot = computed(() => {
 });
 /** Stand-in for a device of the DVA that is not a robot of this simulation: it has no camera picture. */
 const STRANGER = { i: -1, kind: 'robot', radius_m: 0, max_speed_mps: 0, max_turn_rate_radps: 0 };
-/** Reason why the emergency stop is unavailable; empty if it is available. */
-export const whyNoEmergency = computed(() => {
-  if (!isKnown.value) return 'No robot yet: register first.';
-  if (!robot.value) return 'No robot yet: choose one first.';
-  return robot.value.i < 0 ? 'This device is not a robot of this simulation, so nothing will move.' : '';
-});
-
 /** Start driving, if this page holds a robot. */
 export async function start() {
   if (!holds.value || isDriving.value || asking.peek()) return;

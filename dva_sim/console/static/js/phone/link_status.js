@@ -17,7 +17,7 @@ export function LinkStatus() {
     : connection.value !== 'open'
       ? [0, 'connecting']
       : [rank(known), msText(known)];
-  return html`<span class=${`link-status bars-${bars}`} role="status" aria-label="Link" aria-live="off"
+  return html`<span class=${`link-status reported bars-${bars}`} role="status" aria-label="Link" aria-live="off"
     title=${`There and back between this phone and the robot${trip === null ? ', as the link is modelled' : ''}`}>
     <span class="bars" aria-hidden="true"><i></i><i></i><i></i></span>${text}</span>`;
 }

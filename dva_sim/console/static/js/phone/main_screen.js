@@ -1,11 +1,10 @@
 /** Main screen: the menu, and the open events. */
 import { html } from '../../vendor/preact.js';
-import { worldNow } from '../net/world_time.js';
+import { ageOf } from '../net/world_time.js';
 import { hasPlayedGuards, NO_PLAYED_GUARD } from '../guard/played.js';
 import { eventsInOrder, isOpen, noEventText, placeOf } from '../map/shown.js';
 import { dark, switchTheme } from '../shell/theme.js';
 import { SeverityMark } from '../ui/icon.js';
-import { useEvery } from '../ui/every.js';
 import { ageText, capital, plain } from '../ui/words.js';
 import { holds, isKnown, phone } from './drive.js';
 import { SCREENS } from './screens.js';
@@ -30,15 +29,14 @@ export function MainScreen() {
 }
 
 function Events() {
-  useEvery(1000);
   const open = eventsInOrder().filter(isOpen);
   const next = holds.value ? 'teleoperation' : 'authentication';
   return html`<section aria-label="Events"><h2>Events <span class="count">${open.length} open</span></h2>
     ${open.length === 0 && html`<p class="soft">${noEventText()}</p>`}
-    <ul class="cards">${open.map(
+    <ul class="cards reported">${open.map(
       (event) => html`<li key=${event.number}><${SeverityMark} severity=${event.severity} />
         <span class="what"><b>${capital(plain(event.kind))}</b> ${placeOf(event)}
-          <small>${event.severity}, ${plain(event.state)} ${ageText(worldNow() - event.since_ms)}</small></span>
+          <small>${event.severity}, ${plain(event.state)} ${ageText(ageOf(event.since_ms))}</small></span>
         <a class="go" href=${`#/${next}`} aria-label=${`Drive there: event ${event.number}`}>Drive there</a></li>`,
     )}</ul></section>`;
 }

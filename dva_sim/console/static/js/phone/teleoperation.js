@@ -67,7 +67,7 @@ function Figures({ one }) {
   const [speed, turn] = drive?.command ?? [0, 0];
   const degrees = phone.value ? phone.value.radius_deg : Math.trunc((turn * 180) / Math.PI);
   const metres = phone.value ? phone.value.speed_mps : speed;
-  return html`<div class="figures-phone">
+  return html`<div class="figures-phone reported">
     <span role="status" aria-label="Radius" aria-live="off">Radius: ${degrees}°</span>
     <span role="status" aria-label="Speed" aria-live="off">Speed: ${metres.toFixed(2)}m/s</span>
     <small>command ${msText(drive?.command_age_ms ?? null)} old</small>

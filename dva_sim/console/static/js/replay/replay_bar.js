@@ -2,9 +2,8 @@
 import { html } from '../../vendor/preact.js';
 import { clock, replay } from '../store.js';
 import { act } from '../net/actions.js';
-import { worldNow } from '../net/world_time.js';
+import { shownTime } from '../net/world_time.js';
 import { Icon } from '../ui/icon.js';
-import { useEvery } from '../ui/every.js';
 import { Slider } from '../ui/slider.js';
 import { clockText } from '../ui/words.js';
 
@@ -13,10 +12,9 @@ const SLACK_MS = 700; // so soon after a mark the one before it is meant
 
 /** The bar, while a recording is shown. */
 export function ReplayBar() {
-  useEvery(200);
   const about = replay.value;
   if (!about) return null;
-  const now = Math.min(worldNow(), about.duration_ms);
+  const now = Math.min(shownTime(), about.duration_ms);
   return html`<section class="replay-bar" aria-label="Replay">
     <${Buttons} now=${now} marks=${about.marks} />
     <${Scrubber} about=${about} now=${now} />

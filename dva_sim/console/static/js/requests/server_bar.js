@@ -16,7 +16,7 @@ export function ServerBar() {
   const wrong = listens || server.port === null ? '' : wrongNumber(shown, 1, MOST_PORT, '');
   const start = () => act('server_start', { port: Number(shown) });
   return html`<section class="panel server" aria-label="Server">
-    <p role="status" aria-label="Server state" class=${listens ? 'state' : 'state stopped'}>
+    <p role="status" aria-label="Server state" class=${listens ? 'state reported' : 'state stopped reported'}>
       <i class=${listens ? 'lamp on' : 'lamp'} aria-hidden="true"></i>${stateText(server)}</p>
     ${server.own !== false &&
     html`<div class="server-controls">

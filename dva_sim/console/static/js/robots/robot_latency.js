@@ -1,7 +1,7 @@
 /** Latency of the messages between a robot and its driver. */
 import { html, useEffect, useMemo, useRef } from '../../vendor/preact.js';
 import { rowOf } from '../store.js';
-import { worldNow } from '../net/world_time.js';
+import { isStale, worldNow } from '../net/world_time.js';
 import { Chart } from '../charts/chart.js';
 import { History } from '../charts/history.js';
 import { msText } from '../ui/words.js';
@@ -43,7 +43,7 @@ export function RobotLatency({ robot }) {
   }, [history]);
   const colour = `pattern-${rowOf(robot.i)?.pattern ?? 'req-rep'}`;
   const lines = KINDS.map(([, label], n) => ({ label, colour, dash: [undefined, [6, 3], [2, 3]][n] }));
-  return html`<section class="panel latency-panel" aria-label="Latency"><h2>Latency <span class="count">of the newest 1,000 messages</span></h2>
+  return html`<section class="panel latency-panel reported" aria-label="Latency"><h2>Latency <span class="count">of the newest 1,000 messages</span></h2>
     <div class="scrolls" tabindex="0" role="group" aria-label="Figures, scroll sideways"><table aria-label="Latency"><thead><tr><th scope="col">ms</th>${FIGURES.map(([, name]) => html`<th scope="col">${name}</th>`)}</tr></thead>
       <tbody>${KINDS.map(([key, name, hint], n) => html`<tr title=${hint}><th scope="row"><i class=${`line line-${n} ${colour}`}></i>${name}</th>
         ${FIGURES.map(([figure]) => html`<td class="n">${figureText(shown, key, figure)}</td>`)}</tr>`)}</tbody></table></div>
@@ -62,7 +62,7 @@ function figureText(shown, key, figure) {
  * @param {History} history @param {number[]} counts @param {RobotWindow | undefined} shown
  */
 function sample(history, counts, shown) {
-  if (document.hidden) return;
+  if (document.hidden || isStale.peek()) return;
   const values = KINDS.map(([key], n) => {
     const figures = /** @type {any} */ (shown?.[key]);
     const isNew = figures && figures.count !== counts[n];

@@ -26,7 +26,7 @@ export function RobotLog({ robot }) {
     atEnd.current = scrollHeight - scrollTop - clientHeight < NEAR_PX;
   };
   return html`<section class="panel robot-log" aria-label="Log">
-    <h2>Log <span class="count">${latencyText(windowOf(robot.i))}</span></h2>
+    <h2>Log <span class="count reported">${latencyText(windowOf(robot.i))}</span></h2>
     <div class="scrolls log" ref=${box} onScroll=${onScroll} tabindex="0" role="group" aria-label="Messages, scrolls">
       <table aria-label="Messages"><thead><tr>${['Time', 'Message', 'From', 'Reply'].map((head) => html`<th scope="col">${head}</th>`)}</tr></thead>
       <tbody>${shown.map((row) => (row.gap ? gap(row) : html`<${Row} key=${row.n} row=${row} />`))}</tbody></table>

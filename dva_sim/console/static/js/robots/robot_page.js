@@ -1,8 +1,9 @@
 /** Page of one robot: its messages, its wheels, and manual control. */
 import { html, useEffect } from '../../vendor/preact.js';
-import { isPast, mayDrive, modeOf } from '../store.js';
+import { isPast, modeOf } from '../store.js';
 import { stopRobots } from '../net/emergency.js';
 import { watch } from '../net/sockets.js';
+import { sinceSent } from '../net/world_time.js';
 import { CameraPicture } from '../drive/camera.js';
 import { Icon, ModeMark } from '../ui/icon.js';
 import { clockText } from '../ui/words.js';
@@ -39,15 +40,16 @@ export function RobotPage({ robot }) {
 function Head({ robot }) {
   const shown = windowOf(robot.i);
   const mode = shown ? shownMode(robot.i) : modeOf(robot.i);
-  const left = shown?.watchdog_left_s ?? null;
+  const reported = shown?.watchdog_left_s ?? null;
+  const left = shown && reported !== null ? Math.max(0, reported - sinceSent(shown)) : null;
   return html`<header class="robot-bar">
     <h1>${robot.label}</h1>
-    <span role="status" aria-label="Mode" class="mode-status"><${ModeMark} mode=${mode} /> ${mode}</span>
-    ${shown?.holder && html`<span>held by ${shown.holder}</span>`}
-    ${!isPast.value && html`<span class="soft">${left === null ? 'watchdog off' : `watchdog ${left.toFixed(1)} s`}</span>`}
+    <span role="status" aria-label="Mode" class="mode-status reported"><${ModeMark} mode=${mode} /> ${mode}</span>
+    ${shown?.holder && html`<span class="reported">held by ${shown.holder}</span>`}
+    ${!isPast.value && html`<span class="soft reported">${left === null ? 'watchdog off' : `watchdog ${left.toFixed(1)} s`}</span>`}
     <span class="gap"></span>
     <a href="#/robots">All robots</a>
-    ${!isPast.value && html`<button type="button" class="stop-one" disabled=${!mayDrive.value}
+    ${!isPast.value && html`<button type="button" class="stop-one"
       onClick=${() => stopRobots([robot.i])}><${Icon} name="octagon-x" />Stop ${robot.label}</button>
     <${Reasons} robot=${robot} />`}
   </header>`;
@@ -67,6 +69,6 @@ function Reasons({ robot }) {
     : lost
       ? `Link lost: ${stopReason}`
       : stopReason && `Stopped: ${stopReason}`;
-  return html`<p class=${stop || lost ? 'reason warning' : 'reason'} role="status" aria-label="Reason">
+  return html`<p class=${stop || lost ? 'reason reported warning' : 'reason reported'} role="status" aria-label="Reason">
     <span>${text || 'It moves.'}${notice && ` ${notice}.`}</span></p>`;
 }

@@ -32,7 +32,7 @@ function List() {
   return html`<main class="page robots-page" id="main" tabindex="-1"><h1>Robots</h1>
     <div class="scrolls panel" tabindex="0" role="group" aria-label="Table, scrolls sideways">
       <table aria-label="Robots"><thead><tr>${HEADS.map((head) => html`<th scope="col">${head}</th>`)}</tr></thead>
-      <tbody>${robots.value.map((robot) => html`<${Row} key=${robot.i} robot=${robot} />`)}</tbody></table>
+      <tbody class="reported">${robots.value.map((robot) => html`<${Row} key=${robot.i} robot=${robot} />`)}</tbody></table>
     </div></main>`;
 }
 

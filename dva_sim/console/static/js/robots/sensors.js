@@ -9,7 +9,7 @@ const UNITS = /** @type {Record<string, string>} */ ({ degC: '°C', 1: '', 'kW/m
 export function Sensors({ robot }) {
   const sensors = windowOf(robot.i)?.sensors ?? [];
   return html`<section class="panel" aria-label="Sensors"><h2>Sensors</h2>
-    <dl class="sensors">${sensors.map((sensor) => html`<div key=${sensor.name}><dt>${plain(sensor.name)}</dt>
+    <dl class="sensors reported">${sensors.map((sensor) => html`<div key=${sensor.name}><dt>${plain(sensor.name)}</dt>
       <dd>${valueText(sensor)}${sensor.stuck && html` <span class="stuck">stuck</span>`}</dd></div>`)}</dl>
     ${!sensors.length && html`<p class="soft">It has none.</p>`}
   </section>`;

@@ -13,7 +13,7 @@ export function SideView({ robot }) {
   const spin = speed / radius;
   const text = `${fixed(speed, 2)} m/s, wheels ${fixed(spin, 2)} rad/s`;
   const model = isModelCar(robot);
-  return html`<section class="panel view-panel" aria-label="Side view"><h2>Side view</h2>
+  return html`<section class="panel view-panel reported" aria-label="Side view"><h2>Side view</h2>
     <svg class="robot-view" viewBox="0 0 200 100" role="img" aria-label=${`${robot.label} from the side, driving to the right: ${text}`}>
       <line class="ground" x1="4" y1="90" x2="196" y2="90" />
       <path class="hull" d=${model ? CAR : SERVICE} />

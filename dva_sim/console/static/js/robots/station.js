@@ -14,7 +14,7 @@ export function Station({ robot }) {
   const at = STEPS.indexOf(station.state);
   const last = station.state === 'listening' ? shownMode(robot.i) : 'Idle, Mission or Teleoperation';
   const now = station.state === 'listening' ? STEPS.length : at;
-  return html`<ol class="steps" aria-label="State">${[...STEPS, last].map(
+  return html`<ol class="steps reported" aria-label="State">${[...STEPS, last].map(
     (step, n) => html`<li class=${n <= Math.max(at, now) ? 'past' : ''} aria-current=${n === now ? 'step' : null}>${step}</li>`,
   )}</ol>
     ${station.by_hand ? html`<${Steps} robot=${robot} station=${station} />` : html`<p class="soft">It registers by itself and listens on ${station.address}.</p>`}`;

@@ -16,7 +16,7 @@ export function TopView({ robot }) {
   const asked = Math.max(-MOST_DEG, Math.min(MOST_DEG, degrees(rate)));
   const angle = car ? CAR_DEG * Math.sign(Number(rate.toFixed(3))) : asked;
   const text = car ? `steering ${way}` : `turn rate ${fixed(degrees(rate), 0)} °/s, ${way}`;
-  return html`<section class="panel view-panel" aria-label="Top view"><h2>Top view</h2>
+  return html`<section class="panel view-panel reported" aria-label="Top view"><h2>Top view</h2>
     <svg class="robot-view" viewBox="0 0 200 100" role="img"
       aria-label=${`${robot.label} from above, ahead to the right: ${text}; wheels at ${fixed(angle, 0)} degrees`}>
       <line class="ahead" x1="100" y1="50" x2="194" y2="50" />

@@ -1,7 +1,7 @@
 /** The shell: bar, rail, warnings, and the page named in the address. */
 import { html, render } from '../../vendor/preact.js';
 import {
-  clock, connection, isAttached, isPast, notice, replay, rows, scene, shelf,
+  clock, connection, isAttached, isPast, replay, rows, scene, shelf,
 } from '../store.js';
 import { AuditPage } from '../audit/audit_page.js';
 import { DevicesPage } from '../devices/devices_page.js';
@@ -17,7 +17,7 @@ import { RequestsPage } from '../requests/requests_page.js';
 import { RobotsPage } from '../robots/robots_page.js';
 import { Tour, TourButton } from '../tour/tour.js';
 import { Icon } from '../ui/icon.js';
-import { UnconfirmedStop } from '../ui/unconfirmed_stop.js';
+import { Notices } from '../ui/notices.js';
 import { resumeStops } from '../net/emergency.js';
 import { Bar } from './bar.js';
 import { PhoneButton, PhoneCode } from './phones.js';
@@ -119,7 +119,7 @@ function Warnings() {
   const limit = Math.round(1000 * (scene.value?.lag_limit_s ?? 0.25));
   const ended = !['open', 'connecting', 'lost'].includes(connection.value);
   return html`<div class="warnings" role="alert">
-    <${UnconfirmedStop} />
+    <${Notices} />
     ${held &&
     html`<p class="warning">Robots were stopped: the simulation fell more than ${limit} ms behind real time, so you no
       longer saw what you were steering. ${lag > limit / 1000
@@ -131,8 +131,5 @@ function Warnings() {
     ${rows.value?.server?.own === false && !rows.value.server.listens &&
     html`<p class="warning">The DVA at ${rows.value.server.address} does not answer. What you see is out of date. Retrying …</p>`}
     ${ended && html`<p class="warning">The simulation has ended: ${connection.value}</p>`}
-    ${notice.value &&
-    html`<p class="warning">${notice.value} <button type="button" class="plain"
-      aria-label="Dismiss" onClick=${() => (notice.value = '')}><${Icon} name="x" /></button></p>`}
   </div>`;
 }

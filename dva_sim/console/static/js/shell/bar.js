@@ -1,20 +1,17 @@
 /** Top bar: time, link, age of the data, alarms, the person's role, emergency stop. */
 import { html } from '../../vendor/preact.js';
 import {
-  clock, connection, isAttached, isModelled, isPast, link, maySteer, replay, scene, you,
+  clock, isAttached, isModelled, isPast, link, maySteer, replay, scene, you,
 } from '../store.js';
 import { act } from '../net/actions.js';
 import { emergencyStop } from '../net/emergency.js';
 import { roundTrip } from '../net/round_trip.js';
-import { pageAge, worldNow } from '../net/world_time.js';
+import { isStale, pageAge, shownTime } from '../net/world_time.js';
 import { alarms } from '../map/shown.js';
 import { Icon, SeverityMark } from '../ui/icon.js';
-import { useEvery } from '../ui/every.js';
 import { clockText, secondsText } from '../ui/words.js';
 import { dark, switchTheme } from './theme.js';
 import { openHelp } from '../help/help.js';
-
-const OLD_S = 1;
 
 /** The bar. */
 export function Bar() {
@@ -32,11 +29,10 @@ export function Bar() {
 }
 
 function Time() {
-  useEvery(200);
   const { factor, paused } = clock.value;
   const name = paused ? 'Resume' : 'Pause';
   return html`<span class="item time" title="Simulation time and speed">
-    <span class="figure">${clockText(worldNow())}</span>
+    <span class="figure reported">${clockText(shownTime())}</span>
     <span class="soft">${paused ? 'paused' : `×${Number(factor.toFixed(1))}`}</span>
     ${!isPast.value && html`<button type="button" class="plain" disabled=${!maySteer.value || !isModelled.value}
       aria-label=${name} title=${isModelled.value ? name : 'With real sockets the simulation runs in real time'}
@@ -71,19 +67,17 @@ function Link() {
 }
 
 function Age() {
-  useEvery(250);
   const age = pageAge();
-  const old = age > OLD_S || connection.value !== 'open';
   const known = Number.isFinite(age);
   const error = roundTrip.value.error;
   const more = Number.isNaN(error) ? '' : `; to the server and back ${roundTrip.value.ms.toFixed(1)} ms, clocks ±${error.toFixed(1)} ms`;
-  return html`<span class=${old ? 'item age old' : 'item age'} title=${`Age of the latest update from the simulation${more}`}>
+  return html`<span class=${isStale.value ? 'item age old' : 'item age'} title=${`Age of the latest update from the simulation${more}`}>
     <span class="word">data </span>${known ? secondsText(age) : '–'}<span class="word">${known ? ' old' : ''}</span></span>`;
 }
 
 function Alarms() {
   const counts = alarms();
-  return html`<a class="item alarms" href="#/events" title="Open events, by severity"><span class="word soft">alarms</span>
+  return html`<a class="item alarms reported" href="#/events" title="Open events, by severity"><span class="word soft">alarms</span>
     ${Object.entries(counts).map(
       ([rank, count]) => html`<span class=${count ? 'some' : 'nothing'} title=${`${count} open events of severity ${rank}`}>
         <${SeverityMark} severity=${rank} quiet=${!count} />${count}<span class="hidden">${rank}</span></span>`,

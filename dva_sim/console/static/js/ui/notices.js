@@ -1,0 +1,45 @@
+/** What a person has to be told on every page: emergency stops, refusals, and data that is out of date. */
+import { html } from '../../vendor/preact.js';
+import { thingAt, notice } from '../store.js';
+import { giveUp, refused, stopped, unconfirmed } from '../net/emergency.js';
+import { isStale, newestTime } from '../net/world_time.js';
+import { Icon } from './icon.js';
+import { clockText } from './words.js';
+
+/** @param {{others?: any[]}} props `others` are texts that the page shows itself */
+export function Notices({ others = [] }) {
+  return html`<${EmergencyReport} /><${Silence} />
+    ${notice.value && !others.includes(notice.value) && html`<${Note} text=${notice.value} onDismiss=${() => (notice.value = '')} />`}`;
+}
+
+/** What became of this page's emergency stops. */
+function EmergencyReport() {
+  return html`${unconfirmed.value &&
+    html`<p class="warning unconfirmed-stop">${unconfirmed.value} A driven robot stops by its watchdog; a robot
+        on a mission may go on. <button type="button" class="plain" onClick=${giveUp}>Stop asking</button></p>`}
+    ${refused.value &&
+    html`<${Note} look="unconfirmed-stop" text=${`Emergency stop refused: ${refused.value}`}
+      onDismiss=${() => (refused.value = '')} />`}
+    ${stopped.value.size > 0 &&
+    html`<${Note} look="stopped" text=${stoppedText()} onDismiss=${() => (stopped.value = new Map())} />`}`;
+}
+
+/** Robots that have confirmed that they stand, by the time of their confirmation. */
+function stoppedText() {
+  const byTime = /** @type {Record<string, string[]>} */ ({});
+  for (const [i, at] of stopped.value) (byTime[clockText(at)] ??= []).push(thingAt(i)?.label ?? String(i));
+  const parts = Object.entries(byTime).map(([time, labels]) => `${labels.join(', ')} at ${time}`);
+  return `Your emergency stop is confirmed: ${parts.join('; ')}.`;
+}
+
+/** Since when nothing has been heard; what is greyed is as old as that. */
+function Silence() {
+  if (!isStale.value) return null;
+  return html`<p class="warning silence">No data since ${clockText(newestTime())}. What is greyed is as old as that.</p>`;
+}
+
+/** @param {{text: string, onDismiss: () => void, look?: string}} props */
+function Note({ text, onDismiss, look = '' }) {
+  return html`<p class=${`warning ${look}`}><span>${text}</span>
+    <button type="button" class="plain" aria-label="Dismiss" onClick=${onDismiss}><${Icon} name="x" /></button></p>`;
+}

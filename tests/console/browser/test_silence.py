@@ -1,0 +1,180 @@
+"""Pages that hear nothing more: each age counts on, and all else that was reported is greyed."""
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from helpers.console.console_program import started
+from helpers.console.stopped_network import StoppableNetwork, network_to
+from helpers.processes.programs import all_gone_after
+from playwright.sync_api import Page, expect
+
+WORLD = ("--phones", "--robots", "3", "--people", "5", "--site", "office-block")
+ALONE = ("--set", "guard.count=0", "--set", "bystander.count=0", "--set", "operator.count=1")
+SILENCE_MS = 9000
+SOMETHING = re.compile(r"\S")
+HAND = {"width": 360, "height": 740, "has_touch": True, "is_mobile": True}
+
+# For each page: values that it has to show, and what brings them there.
+PAGES: dict[str, tuple[str, ...]] = {
+    "drive": (".watchdog", ".stop-reason", ".picture-age", ".mode-status", ".latency .figures b"),
+    "map": (".lists .state", ".card dd", ".bar .time .figure", ".bar .age"),
+    "events": (".alarm > b", ".events-table td.aside", ".facts dd"),
+    "robots": (".robots-page td.n",),
+    "robots/robot-1": (".robot-bar .mode-status", ".sensors dd", ".view-panel b", ".picture-age"),
+    "devices": (".devices-page td.n",),
+    "network": (".figures-panel td.n",),
+    "main": (".server .state",),
+    "phone#/main": (".cards small", ".link-status"),
+    "guard": (".order-card h2", ".order-card p"),
+}
+
+# Leaves of a page that show a number with a unit, an age or one of the listed values.
+TEXTS = """listed => {
+  const AGE = /\\d ?(s|ms|m\\/s|rad\\/s|%|°|°C)( |$)|\\d:\\d\\d/;
+  const SET = '.slider, .presets, .scale-bar, .legend, .warnings, .alerts, .log, .requests, h3, dt, '
+    + '.chart, #whom-it-stops, .raise, .link, .events-head, .robot-view, .tour, option, .station, .faults, button';
+  const found = new Set(document.querySelectorAll(listed.join()));
+  for (const one of document.querySelectorAll('#app *')) {
+    const own = [...one.childNodes].filter(n => n.nodeType === 3).map(n => n.data).join('');
+    if (AGE.test(own) && !one.closest(SET) && one.checkVisibility()) found.add(one);
+  }
+  window.watched = [...found].map(one => [one, one.textContent]);
+  return [...found].map(one => one.textContent);
+}"""
+# Those of them that stand as if nothing had happened, and whether each page says since when.
+FROZEN = """() => window.watched.filter(([one, before]) => {
+  const greyed = one.closest('.reported');
+  const isGreyed = greyed && getComputedStyle(greyed).filter === 'grayscale(1)'
+    && getComputedStyle(greyed).backgroundImage.includes('gradient');
+  return one.isConnected && one.textContent === before && !isGreyed;
+}).map(([one, before]) => `${one.className}: ${before}`)"""
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Address of a console whose robots have windows."""
+    for programs in all_gone_after(tmp_path_factory.mktemp("consoles")):
+        yield started(programs, *ALONE)[1]
+
+
+class Cut:
+    """Opens pages over a network that can be cut."""
+
+    def __init__(self, ends: ExitStack) -> None:
+        self._ends = ends
+        self.network: StoppableNetwork | None = None
+
+    def open(self, page: Page, address: str) -> None:
+        self.network = self._ends.enter_context(network_to(urlsplit(address).port or 0))
+        page.goto(urlsplit(address)._replace(netloc=f"127.0.0.1:{self.network.port}").geturl())
+
+    def now(self) -> None:
+        assert self.network is not None
+        self.network.cut()
+
+
+@pytest.fixture
+def cut() -> Iterator[Cut]:
+    with ExitStack() as ends:
+        yield Cut(ends)
+
+
+@pytest.fixture
+def address_of(fake: Callable[..., Any], request: pytest.FixtureRequest) -> Callable[[str], str]:
+    """Address of each page, in a world that has something in all its places."""
+
+    def address(name: str) -> str:
+        document, _, screen = name.partition("#")
+        if name.startswith(("phone", "guard")):
+            return f"{fake(*WORLD).phone.replace('/phone?', f'/{document}?')}#{screen}"
+        of_robot = name.startswith("robots/")
+        return f"{request.getfixturevalue('real') if of_robot else fake(*WORLD).drive}#/{name}"
+
+    return address
+
+
+def opened(page: Page, cut: Cut, address: str, name: str) -> None:
+    """Show a page of the world, with a value in each of its places."""
+    page.clock.install()
+    cut.open(page, address)
+    if name == "guard":
+        page.get_by_role("button", name="guard-1").click()
+    if name == "drive":
+        page.get_by_role("button", name="Take control").click()
+        page.get_by_role("button", name="Start", exact=True).click()
+        expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+    if name == "map":
+        page.get_by_role("region", name="Robots").get_by_role("button", name="robot-1").click()
+    for selector in PAGES[name]:
+        expect(page.locator(selector).first).to_have_text(SOMETHING)
+    if page.locator(".picture-age").count():
+        expect(page.locator(".picture-age").first).to_contain_text("s old")
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_on_a_network_that_falls_silent_nothing_stands_as_if_it_were_live(
+    address_of: Callable[[str], str], cut: Cut, visits: Callable[..., Any], name: str
+) -> None:
+    is_small = name.startswith(("phone", "guard"))
+    page = visits(**HAND if is_small else {"width": 1440, "height": 900}).tab()
+    opened(page, cut, address_of(name), name)
+    assert page.locator("[data-stale]").count() == 0
+    cut.now()
+    texts = page.evaluate(TEXTS, list(PAGES[name]))
+    print(name, texts)
+    page.clock.run_for(SILENCE_MS)
+
+    assert page.evaluate(FROZEN) == []
+    expect(page.locator(".silence")).to_contain_text("No data since 0:")
+    for picture in page.locator(".camera").all():
+        expect(picture.locator(".veil")).to_have_class("veil hatched")
+        expect(picture.locator(".picture-age")).to_contain_text("no data for 9")
+    for overlay in page.locator(".map-box").all():
+        expect(overlay.locator(".stale")).to_contain_text("as of 9 s ago")
+
+
+PACES = [({"paused": False, "factor": 1}, 9), ({"paused": False, "factor": 4}, 36)]
+PACES += [({"paused": True}, 0)]
+AGES = """() => [...document.querySelectorAll('.alarm > b, .events-table tr:not(.over) td:nth-child(5)')]
+  .map(one => one.textContent.split(':').reduce((sum, part) => 60 * sum + Number(part), 0))"""
+
+
+@pytest.mark.parametrize(("pace", "later"), PACES)
+def test_ages_of_alarms_and_events_follow_the_time_of_the_world(
+    address_of: Callable[[str], str],
+    cut: Cut,
+    visit: Any,
+    pace: dict[str, Any],
+    later: int,
+) -> None:
+    page = visit.tab()
+    opened(page, cut, address_of("events"), "events")
+    changed = "async pace => (await import('/static/js/net/actions.js')).act('pace', pace)"
+    assert page.evaluate(changed, pace)["ok"]
+    expect(page.locator(".bar .time .soft")).to_have_text(
+        "paused" if pace["paused"] else f"×{pace['factor']}"
+    )
+    page.wait_for_timeout(300)  # lines of the new pace
+    cut.now()
+    before = page.evaluate(AGES)
+    page.clock.run_for(SILENCE_MS)
+    after = page.evaluate(AGES)
+    print(before, after)
+    assert len(before) > 1
+    assert [b - a for a, b in zip(before, after, strict=True)] == pytest.approx(
+        [later] * len(before), abs=1 + later / 10
+    )
+
+
+@pytest.fixture(autouse=True)
+def _usual_pace(fake: Callable[..., Any], browser: Any) -> Iterator[None]:
+    yield
+    context = browser.new_context()
+    body = {"id": "usual", "action": "pace", "arguments": {"paused": False, "factor": 1}}
+    context.request.get(fake(*WORLD).drive)
+    context.request.post(f"{fake(*WORLD).base}api/actions", data=body)
+    context.close()
