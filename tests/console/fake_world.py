@@ -283,6 +283,10 @@ class FakeWorld(FakePhones, FakeControlRoom):
                 seat.alert = "emergency stop"
                 self.halt(seat, "held" if seat.robots else "free")
                 self.tell(seat)
+        for robot in self.scene.robots:
+            if asked["robots"] == "all" or robot.index in asked["robots"]:
+                robot.mode, robot.wanted = "Idle", (0.0, 0.0)
+        self.say(self.rows())
         self.say({"k": "story", "who": "console", "what": "emergency stop", "kind": "emergency"})
         return "robots stop"
 

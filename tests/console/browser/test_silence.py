@@ -35,8 +35,8 @@ PAGES: dict[str, tuple[str, ...]] = {
 # Leaves of a page that show a number with a unit, an age or one of the listed values.
 TEXTS = """listed => {
   const AGE = /\\d ?(s|ms|m\\/s|rad\\/s|%|°|°C)( |$)|\\d:\\d\\d/;
-  const SET = '.slider, .presets, .scale-bar, .legend, .warnings, .alerts, .log, .requests, h3, dt, '
-    + '.chart, #whom-it-stops, .raise, .link, .events-head, .robot-view, .tour, option, .station, .faults, button';
+  const SET = '.slider, .presets, .scale-bar, .legend, .warnings, .alerts, .log, .requests, h3, '
+    + 'dt, .chart, .raise, .link, .events-head, .robot-view, option, .station, .faults, button';
   const found = new Set(document.querySelectorAll(listed.join()));
   for (const one of document.querySelectorAll('#app *')) {
     const own = [...one.childNodes].filter(n => n.nodeType === 3).map(n => n.data).join('');
@@ -139,8 +139,9 @@ def test_on_a_network_that_falls_silent_nothing_stands_as_if_it_were_live(
 
 PACES = [({"paused": False, "factor": 1}, 9), ({"paused": False, "factor": 4}, 36)]
 PACES += [({"paused": True}, 0)]
-AGES = """() => [...document.querySelectorAll('.alarm > b, .events-table tr:not(.over) td:nth-child(5)')]
-  .map(one => one.textContent.split(':').reduce((sum, part) => 60 * sum + Number(part), 0))"""
+AGES = """() => [...document.querySelectorAll(
+  '.alarm > b, .events-table tr:not(.over) td:nth-child(5)')].map(one =>
+    one.textContent.split(':').reduce((sum, part) => 60 * sum + Number(part), 0))"""
 
 
 @pytest.mark.parametrize(("pace", "later"), PACES)

@@ -69,10 +69,10 @@ export function settle(id, done) {
   waiting.delete(id);
 }
 
-/** @param {boolean} unexpected */
-export function socketLost(unexpected) {
+/** @param {boolean} unexpected @param {string} text for pending requests */
+export function socketLost(unexpected, text) {
   for (const id of [...waiting.keys()]) {
-    settle(id, { ok: false, text: 'The connection was lost before the reply arrived.' });
+    settle(id, { ok: false, text });
   }
   if (unexpected) driveLost.value += 1;
 }

@@ -47,7 +47,7 @@ export function connect() {
     socket.close();
     if (why.code === LEAVING && isAlive()) connection.value = why.reason || 'it was ended';
     else if (isAlive()) connection.value = 'lost';
-    showWhy(why);
+    notice.value = refusalOf(why) || notice.value;
     window.setTimeout(connect, wait);
     wait = Math.min(LONGEST_WAIT_MS, 2 * wait);
   };
@@ -71,10 +71,8 @@ export function connect() {
   socket.onclose = end;
 }
 
-/** Show why the server has closed a socket, if it has refused what it got. @param {{code?: number, reason?: string}} why */
-function showWhy({ code, reason }) {
-  if (code === REFUSED) notice.value = `The console closed a connection of this page: ${reason}`;
-}
+/** Reason why the server has refused what a socket sent; empty if it has not. @param {{code?: number, reason?: string}} why */
+const refusalOf = ({ code, reason }) => (code === REFUSED ? `The console closed a connection of this page: ${reason}` : '');
 
 /** True unless the simulation is known to have ended. */
 const isAlive = () => ['open', 'connecting', 'lost'].includes(connection.value);
@@ -143,10 +141,11 @@ function open(key) {
     else apply(line);
   };
   socket.onclose = (event) => {
-    showWhy(event);
+    const refusal = refusalOf(event);
+    notice.value = refusal || notice.value;
     const unexpected = isDriveSocket(socket);
     if (unexpected) reaches.value = false;
-    socketLost(unexpected);
+    socketLost(unexpected, refusal || 'The connection was lost before the reply arrived.');
     if (unexpected) window.setTimeout(() => reopen(socket, key), LONGEST_WAIT_MS / 4);
   };
   return socket;

@@ -1,4 +1,4 @@
-/** What a person has to be told on every page: emergency stops, refusals, and data that is out of date. */
+/** Notices of every page: emergency stops, refusals, and data that is out of date. */
 import { html } from '../../vendor/preact.js';
 import { thingAt, notice } from '../store.js';
 import { giveUp, refused, stopped, unconfirmed } from '../net/emergency.js';
@@ -12,7 +12,7 @@ export function Notices({ others = [] }) {
     ${notice.value && !others.includes(notice.value) && html`<${Note} text=${notice.value} onDismiss=${() => (notice.value = '')} />`}`;
 }
 
-/** What became of this page's emergency stops. */
+/** Emergency stops of this page: pending, refused, confirmed. */
 function EmergencyReport() {
   return html`${unconfirmed.value &&
     html`<p class="warning unconfirmed-stop">${unconfirmed.value} A driven robot stops by its watchdog; a robot
@@ -32,10 +32,10 @@ function stoppedText() {
   return `Your emergency stop is confirmed: ${parts.join('; ')}.`;
 }
 
-/** Since when nothing has been heard; what is greyed is as old as that. */
+/** Note that nothing has arrived for some time, and since when. */
 function Silence() {
   if (!isStale.value) return null;
-  return html`<p class="warning silence">No data since ${clockText(newestTime())}. What is greyed is as old as that.</p>`;
+  return html`<p class="warning silence">No data since ${clockText(newestTime())}. Greyed values are from then.</p>`;
 }
 
 /** @param {{text: string, onDismiss: () => void, look?: string}} props */
