@@ -59,6 +59,7 @@ class ConsoleSupervisor:
             ConfigError: the scenario cannot be run, or not recorded as wanted.
             ChildFailed: the web process could not begin, or has ended by itself.
             DvaSimError: what was to be recorded is not, or not all of it.
+            RunsFailed: some tables of the results could not be made.
             RulesBroken: a safety rule was broken.
         """
         options, scenario = self._options, self._options.read()
@@ -84,11 +85,13 @@ class ConsoleSupervisor:
             with self._recorded(world):
                 self._run(world)
         finally:
-            if results is not None:
-                self._write(results)
-            found = verdicts(world.recorder)
-            for verdict in found:
-                self._say(str(verdict))
+            try:
+                if results is not None:
+                    self._write(results)
+            finally:
+                found = verdicts(world.recorder)
+                for verdict in found:
+                    self._say(str(verdict))
         if self._processes.failed:
             raise ChildFailed(self._processes.failed)
         if options.record is not None:

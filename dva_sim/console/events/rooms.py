@@ -183,8 +183,7 @@ class ConsoleRooms:
     def _forget(self, room: ConsoleRoom) -> None:
         for peer in (room.device.dva, *self._run.field.robots):
             room.device.forget(peer)
-        self._run.stage.devices.remove(room.device)
-        room.device.labels.pop(room.device.id_tag, None)
+        self._run.stage.dismiss(room.device)
         self._roles.dismiss(room.device.id_tag)
         self._used.discard(room.number)
 

@@ -146,6 +146,5 @@ class Phones:
     def _forget(self, number: int, device: AgentDevice) -> None:
         for peer in (DVA, NOBODY, *self._run.field.robots):
             device.forget(peer)
-        self._run.stage.devices.remove(device)
-        device.labels.pop(device.id_tag, None)
+        self._run.stage.dismiss(device)
         self._used.discard(number)

@@ -152,16 +152,18 @@ class KeptResults:
         """Write all; nothing where nothing was followed.
 
         Raises:
-            DvaSimError: the disk is full or refuses to be written.
+            DvaSimError: the disk is full or refuses to be written, or some tables cannot be made.
         """
         if self._world is None or self._kept is None:
             return
-        self._world.run.recording()  # the last look at rules and places
-        self._keep()
-        self._kept.close()
+        try:
+            self._world.run.recording()  # the last look at rules and places
+            self._keep()
+        finally:
+            self._kept.close()
 
 
-PEOPLES = ("console", "phone")  # kinds of devices that people name
+PEOPLES = ("console", "control-room", "phone")  # kinds of devices that people name
 
 
 def name_of(id_tag: str) -> str:

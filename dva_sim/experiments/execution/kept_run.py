@@ -3,7 +3,8 @@
 While the run goes on its lines go into a journal (SQLite in WAL mode) by a thread of its own, so
 that the run waits for no disk. At its end the tables are made of the journal, which is removed.
 Of a run that was killed the journal is left; `complete` makes its tables as if the run had ended
-with the last line.
+with the last line. The journal stays, too, while any table cannot be made, so that a later version
+of the program can make it.
 """
 
 from __future__ import annotations
@@ -21,20 +22,30 @@ from typing import Any, Final
 
 from dva_sim.experiments.results.folder_lock import FolderLock
 from dva_sim.experiments.results.manifest import machine, write_json
-from dva_sim.experiments.results.results import JOURNAL, MACHINE, MANIFEST, TABLES, digests
+from dva_sim.experiments.results.results import (
+    JOURNAL,
+    MACHINE,
+    MANIFEST,
+    TABLES,
+    digests,
+    missing_tables,
+)
 from dva_sim.experiments.results.tables import write_tables
 from dva_sim.experiments.study.cell_grid import runs_in
-from dva_sim.kernel.errors import ConfigError, DvaSimError
-from dva_sim.simulation.full.drive_tables import drive_tables
+from dva_sim.kernel.errors import ConfigError, DvaSimError, RunsFailed
+from dva_sim.simulation.full import episode_measures
+from dva_sim.simulation.full.drive_tables import command_rows, drive_rows
 from dva_sim.simulation.full.dva_trace import OWN_CODE
-from dva_sim.simulation.full.episode_measures import tables_of
 from dva_sim.simulation.full.run_journal import JournalLine, recording_of
 from dva_sim.simulation.models import Tables
 from dva_sim.simulation.scenario import Scenario
 
+Missing = dict[str, str]  # reasons, by table
+
 KEPT_RUN: Final = "console.sqlite"  # the journal
 AGAIN: Final = 1.0  # after so long a full disk is tried again [s]
 _FORMAT: Final = 1
+_TABLES: Final = episode_measures.TABLES | {"drives": drive_rows, "commands": command_rows}
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS run (id INTEGER PRIMARY KEY CHECK (id = 1), format INTEGER NOT NULL,
   manifest TEXT NOT NULL, scenario TEXT NOT NULL, seed INTEGER NOT NULL);
@@ -89,6 +100,7 @@ class KeptRun:
 
         Raises:
             DvaSimError: the disk is full or cannot be written; what is in the journal is kept.
+            RunsFailed: some tables could not be made; the others are there.
         """
         self._waiting.put(None)
         self._thread.join()
@@ -97,7 +109,12 @@ class KeptRun:
                 f"{self._folder}: what happened last could not be written: {self.problem}; "
                 f"mend that, then `dva-sim show {self._folder}` makes the tables of the rest"
             )
-        _finish(self._folder, own_code=True)
+        missing = _finish(self._folder, own_code=True)
+        if missing:
+            raise RunsFailed(
+                f"{self._folder}: {missing_tables(missing)}; the others are written, and "
+                f"`dva-sim show {self._folder}` tries again"
+            )
 
     # --- in its own thread -------------------------------------------------------------------
 
@@ -166,7 +183,9 @@ def is_left(folder: Path) -> bool:
 
 
 def complete(folder: Path) -> None:
-    """Make the tables of a run that was killed, if there is one.
+    """Make the tables that are missing of a run that was killed, if there is one.
+
+    The manifest's `partial` names the tables that cannot be made.
 
     Raises:
         FolderInUse: the run still goes on.
@@ -186,21 +205,25 @@ def tables_so_far(folder: Path) -> tuple[dict[str, Any], Tables]:
         ConfigError: the journal is damaged, or made by a later version.
     """
     manifest, scenario, seed, lines = _read(folder)
-    tables, lasted = _tables(folder, scenario, seed, lines)
-    return manifest | {"partial": {"until_s": lasted}}, tables
+    tables, missing, lasted = _tables(folder, scenario, seed, lines)
+    return manifest | {"partial": {"until_s": lasted, "missing": missing}}, tables
 
 
-def _finish(folder: Path, own_code: bool = False) -> None:
-    """Make tables of the journal, which is removed last."""
+def _finish(folder: Path, own_code: bool = False) -> Missing:
+    """Make tables of the journal, which is removed last; return the tables that cannot be made."""
     manifest, scenario, seed, lines = _read(folder, own_code)
-    tables, lasted = _tables(folder, scenario, seed, lines)
+    tables, missing, lasted = _tables(folder, scenario, seed, lines)
+    if missing:
+        manifest |= {"partial": {"missing": missing}, "runs": int("runs" in tables)}
     jobs = runs_in(manifest)
     write_tables(folder, jobs, lambda _: tables)
     write_json(folder / MANIFEST, manifest | {"tables": digests(folder / TABLES)})
     facts = {"wall_s": lasted, "platform": platform.platform()}
     write_json(folder / MACHINE, machine(jobs, {}) | facts)
     _remove(folder, JOURNAL)  # of a study that was replaced
-    _remove(folder, KEPT_RUN)
+    if not missing:
+        _remove(folder, KEPT_RUN)
+    return missing
 
 
 def _read(
@@ -239,15 +262,25 @@ def _read(
 
 def _tables(
     folder: Path, scenario: Scenario, seed: int, lines: Sequence[JournalLine]
-) -> tuple[Tables, float]:
-    """Return the tables and duration [s] of a run; no rows of one that never began."""
+) -> tuple[Tables, Missing, float]:
+    """Return the tables, the missing ones, and the duration [s] of a run.
+
+    A run that never began has no rows.
+    """
     if not lines:
-        return {}, 0.0
+        return {}, {}, 0.0
     try:
         recording = recording_of(scenario, seed, lines)
     except ValueError as error:
         raise ConfigError(f"contains no lines of a run: {error}", folder / KEPT_RUN) from None
-    return tables_of(recording) | drive_tables(recording), recording.duration
+    tables: Tables = {}
+    missing: Missing = {}
+    for name, make in _TABLES.items():
+        try:
+            tables[name] = make(recording)
+        except Exception as error:  # a bug in one table must not cost the others
+            missing[name] = f"{type(error).__name__}: {error}"
+    return tables, missing, recording.duration
 
 
 def _remove(folder: Path, name: str) -> None:

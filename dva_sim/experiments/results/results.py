@@ -215,6 +215,11 @@ def digest_of(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+def missing_tables(reasons: Mapping[str, str]) -> str:
+    """Return which tables cannot be made, each with its reason."""
+    return "; ".join(f"table {name!r} cannot be made: {why}" for name, why in reasons.items())
+
+
 @dataclass(frozen=True)
 class Results:
     """Results of a study.
@@ -274,10 +279,14 @@ class Results:
         found = self.manifest.get("partial")
         if found is None:
             return ""
+        missing = f"{text}. " if (text := missing_tables(found.get("missing", {}))) else ""
         if "until_s" in found:
             return (
-                f"Partial: the run goes on; what follows is of its first {found['until_s']:.0f} s."
+                f"Partial: {missing}The run goes on; what follows is of its first "
+                f"{found['until_s']:.0f} s."
             )
+        if missing:
+            return f"Partial: {missing.strip()}"
         persons = self.study["persons"]
         return (
             f"Partial: {found['done']} of {found['of']} runs are done. What follows rests on the "

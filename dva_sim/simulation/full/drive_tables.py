@@ -52,13 +52,15 @@ COMMAND_COLUMNS = (
 )
 
 
-def drive_tables(recording: Recording) -> dict[str, list[Row]]:
-    """A row for each drive, and for each command that took effect."""
-    logs = list(enumerate(recording.recorder.drives, 1))
-    return {
-        "drives": [_drive(recording, number, log) for number, log in logs],
-        "commands": [row for number, log in logs for row in _commands(number, log)],
-    }
+def drive_rows(recording: Recording) -> list[Row]:
+    """Return a row for each drive."""
+    return [_drive(recording, *numbered) for numbered in enumerate(recording.recorder.drives, 1)]
+
+
+def command_rows(recording: Recording) -> list[Row]:
+    """Return a row for each command that took effect."""
+    logs = enumerate(recording.recorder.drives, 1)
+    return [row for number, log in logs for row in _commands(number, log)]
 
 
 def _drive(recording: Recording, number: int, log: DriveLog) -> Row:
@@ -66,12 +68,12 @@ def _drive(recording: Recording, number: int, log: DriveLog) -> Row:
     lasted = 0.0 if log.started is None else end - log.started
     done = driven(log, end)
     ages = [a.time - a.issued for a in done.applied]
-    by, names = log.by, recording.labels
+    by = log.by
     return {
         "drive": number,
-        "operator_name": names.get(log.operator, log.operator),
+        "operator_name": recording.label_of(log.operator),
         "person_label": by.person,
-        "robot_name": names.get(log.robot, log.robot),
+        "robot_name": recording.label_of(log.robot),
         "event_id": log.event,
         "pattern": by.pattern or recording.scenario.pattern,
         "link_delay_s": by.link_delay_s,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Final
 
 import numpy as np
 
@@ -12,10 +14,22 @@ from dva_sim.kernel.measure import Measure, names_of, text
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.simulation.full import Recording, dispatch_measures, loop_delay, workload
 from dva_sim.simulation.full.loop_delay import NAN, Row, command_ages, delay_budget, driven
+from dva_sim.simulation.full.recording import RobotLog
 from dva_sim.simulation.scenario import Scenario
 
 SETTLED = "confirmed", "contained", "refuted"  # outcomes of events that somebody has looked at
 
+_BODY = (
+    Measure("path_m", "way of the robots that were driven", title="path length"),
+    Measure(
+        "contacts",
+        "contacts of these robots with walls and others",
+        title="contacts with walls and others",
+    ),
+    Measure("contact_impulse_n_s", "impulse of all contacts", title="impulse of all contacts"),
+    Measure("person_contacts", "contacts with people", title="contacts with people"),
+    Measure("jams", "times that a robot was jammed"),
+)
 _OF_DRIVES = (
     Measure(
         "confirmed", "whether the first driven event was confirmed", better="large", low=0, high=1
@@ -28,15 +42,7 @@ _OF_DRIVES = (
         awaits="confirmation",
     ),
     Measure("attempts", "drives to the event"),
-    Measure("path_m", "way of the robots that were driven", title="path length"),
-    Measure(
-        "contacts",
-        "contacts of these robots with walls and others",
-        title="contacts with walls and others",
-    ),
-    Measure("contact_impulse_n_s", "impulse of all contacts", title="impulse of all contacts"),
-    Measure("person_contacts", "contacts with people", title="contacts with people"),
-    Measure("jams", "times that a robot was jammed"),
+    *_BODY,
     text("cause", "why it was not confirmed; empty if it was"),
     *loop_delay.COLUMNS,
     Measure(
@@ -319,14 +325,22 @@ def drive_measures(recording: Recording) -> Row:
 
 def _cause(row: Row, attempts: list[DriveLog], recording: Recording) -> str:
     """Return why an event was not confirmed: a robot without power or jammed, else how it ended."""
-    if not all(recording.robots[drive.robot].powered for drive in attempts):
+    if not all(robot.powered for robot in _robots_of(attempts, recording)):
         return "battery"
-    return "jammed" if row["jams"] else str(row["outcome"])
+    return "jammed" if row["jams"] > 0 else str(row["outcome"])
+
+
+def _robots_of(attempts: list[DriveLog], recording: Recording) -> list[RobotLog]:
+    """Return the measures of the robots driven; of robots of other makes there are none."""
+    driven_robots = sorted({drive.robot for drive in attempts})
+    return [recording.robots[robot] for robot in driven_robots if robot in recording.robots]
 
 
 def _body_measures(attempts: list[DriveLog], recording: Recording) -> Row:
     """Return the measures of the robots' bodies."""
-    robots = [recording.robots[robot] for robot in sorted({d.robot for d in attempts})]
+    robots = _robots_of(attempts, recording)
+    if not robots:
+        return dict.fromkeys(names_of(_BODY), NAN)
     return {
         "path_m": sum(robot.distance for robot in robots),
         "contacts": sum(robot.contacts for robot in robots),
@@ -343,10 +357,11 @@ def _command_measures(attempts: list[DriveLog], recording: Recording) -> Row:
     drives = [driven(d, end) for d, (_, end) in zip(attempts, spans, strict=True)]
     applied, in_force = sum(len(d.applied) for d in drives), sum(d.hold.sum() for d in drives)
     trips = [t for d in attempts for t in d.round_trips]
-    robots = [recording.robots[robot] for robot in sorted({d.robot for d in attempts})]
+    robots = _robots_of(attempts, recording)
     if not any(d.sent for d in attempts):
         driving = 0.0  # nobody drove: the robot was on a mission
-    motor = recording.robots[attempts[0].robot].motor
+    first = recording.robots.get(attempts[0].robot)
+    motor = NAN if first is None else first.motor
     return (
         command_ages(drives)
         | delay_budget(drives, motor)
@@ -361,7 +376,7 @@ def _command_measures(attempts: list[DriveLog], recording: Recording) -> Row:
             "samples_per_value": _ratio(
                 sum(d.samples for d in attempts), sum(d.values for d in attempts)
             ),
-            "queue_max": max(robot.longest_queue for robot in robots),
+            "queue_max": max((robot.longest_queue for robot in robots), default=NAN),
             "timeouts": sum(d.timeouts for d in attempts),
             "alerts": sum(d.alerts for d in attempts),
             "stop_share": 1.0 - float(in_force) / driving if driving else NAN,
@@ -417,7 +432,7 @@ def _event_row(recording: Recording, number: int) -> Row:
         row["outcome"] = outcome_of(event)
         if event.responder is not None:
             row["responder_kind"] = "robot" if event.operator else "guard"
-            row["responder"] = recording.labels[event.responder]
+            row["responder"] = recording.label_of(event.responder)
     row["response_s"] = row["t_arrived_s"] - row["t_detected_s"]
     row["confirmation_s"] = row["t_confirmed_s"] - row["t_detected_s"]
     row["containment_s"] = row["t_contained_s"] - row["t_detected_s"]
@@ -450,11 +465,15 @@ def track_rows(recording: Recording) -> list[Row]:
     ]
 
 
+TABLES: Final[dict[str, Callable[[Recording], list[Row]]]] = {
+    "runs": lambda recording: [run_row(recording)],
+    "events": event_rows,
+    "people": people_rows,
+    "operators": workload.operator_rows,
+}
+"""Functions that make the tables of a run of the full model, except its tracks."""
+
+
 def tables_of(recording: Recording) -> dict[str, list[Row]]:
     """Return the tables of a run of the full model, except its tracks."""
-    return {
-        "runs": [run_row(recording)],
-        "events": event_rows(recording),
-        "people": people_rows(recording),
-        "operators": workload.operator_rows(recording),
-    }
+    return {name: make(recording) for name, make in TABLES.items()}

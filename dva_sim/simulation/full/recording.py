@@ -144,7 +144,11 @@ class Playback:
 
     def robot_named(self, label: str) -> str | None:
         """The id of a robot, if there is one of that name."""
-        return next((robot for robot in self.radii if self.labels[robot] == label), None)
+        return next((robot for robot in self.radii if self.label_of(robot) == label), None)
+
+    def label_of(self, device: str) -> str:
+        """Return the name of a device by its id: the id itself for devices of other makes."""
+        return self.labels.get(device, device)
 
 
 @dataclass(kw_only=True)

@@ -19,6 +19,7 @@ from dva_sim.agents.robot.emergency_latch import DRIVE, ReleasedBy
 from dva_sim.core.registry import CONTROL_ROOM, DETECTOR, GUARD, OPERATOR, REMOTE, ROBOT
 from dva_sim.core.roles import ControlRoomRole
 from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.labels import with_id
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.messaging import Transport
@@ -130,8 +131,9 @@ class Stage:
         recorder: Recorder of the run.
         address: Function that returns the address of a new device, by kind and number.
         time_of_day: See `AgentDevice`.
+        labels: Names of all devices that have ever taken part, by id.
         cameras: Addresses of the robots' pictures.
-        devices: All that were made.
+        devices: Devices that take part.
         pattern_names: Pattern of the commands for a robot, by its id, where it was changed.
         attended: True if people may join, who could release a robot after an emergency.
 
@@ -211,6 +213,12 @@ class Stage:
         )
         self.devices.append(device)
         return device
+
+    def dismiss(self, device: AgentDevice) -> None:
+        """Remove a device that has left. What it did stays under its label, with its id beside."""
+        self.devices.remove(device)
+        id_tag, label = device.id_tag, device.label
+        self.labels[id_tag] = label if id_tag in label else with_id(label, id_tag)
 
 
 @lru_cache(maxsize=4)

@@ -246,12 +246,12 @@ def _is_sample(point: TrackPoint) -> bool:
 
 def path_error(recording: Recording) -> Row:
     """Root mean square and greatest distance from the ways planned, over all drives [m]."""
-    tracks, labels = recording.recorder.tracks, recording.labels
+    tracks = recording.recorder.tracks
     gaps = np.concatenate(
         [
             np.empty(0),
             *(
-                off_the_way(log, tracks[labels[log.robot]], recording.duration)
+                off_the_way(log, tracks[recording.label_of(log.robot)], recording.duration)
                 for log in recording.recorder.drives
             ),
         ]
@@ -307,7 +307,7 @@ def operator_row(recording: Recording, operator: str) -> Row:
     busy, turned = covered(hands), sum(log.turned_to for log in logs)
     judged = [judgement(recording, log) for log in logs]
     return {
-        "operator_name": recording.labels[operator],
+        "operator_name": recording.label_of(operator),
         "orders": len(logs),
         "utilisation": busy / end,
         "attending_share": covered(span for log in logs for span in attended(log, end)) / end,

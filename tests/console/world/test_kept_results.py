@@ -11,6 +11,7 @@ from helpers.processes.programs import wait_until
 from helpers.wording import unnamed
 
 import dva_sim
+from dva_sim.cli.program import call
 from dva_sim.console.run.recorder import KEPT
 from dva_sim.console.world.kept_results import KeptResults, name_of
 from dva_sim.experiments.execution import kept_run
@@ -22,7 +23,7 @@ from dva_sim.experiments.report.study_size import size_of
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.folder_lock import FolderInUse
 from dva_sim.experiments.results.results import Results
-from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.errors import ConfigError, DvaSimError, ExitCode, RunsFailed
 from dva_sim.simulation.full.stage import DVA, id_of, kind_of
 
 pytestmark = pytest.mark.system
@@ -291,6 +292,36 @@ def test_a_disk_that_stays_full_is_told_and_what_it_took_is_kept(monkeypatch, tm
 
     driven(monkeypatch, tmp_path / "out", end=end)
     assert load_so_far(tmp_path / "out").table("drives").rows == 4
+
+
+@pytest.mark.parametrize("name", kept_run._TABLES)
+def test_a_table_that_cannot_be_made_costs_no_other_and_is_made_later(
+    monkeypatch, cut_off, capsys, name
+):
+    def broken(_):
+        raise KeyError("who")
+
+    reason = f"table '{name}' cannot be made: KeyError: 'who'"
+    with monkeypatch.context() as during:
+        during.setitem(kept_run._TABLES, name, broken)
+        assert reason in load_so_far(cut_off).partial
+        for command in ("show", "report"):
+            assert call([command, str(cut_off)]) == ExitCode.OK
+        assert reason in " ".join(capsys.readouterr().out.split())
+        found = Results.load(cut_off)
+        assert set(found.tables) == set(kept_run._TABLES) - {name}
+    found = load_so_far(cut_off)
+    assert (found.partial, found.has("runs"), (cut_off / KEPT_RUN).exists()) == ("", True, False)
+
+
+def test_a_console_that_ends_without_a_table_names_it_and_fails(monkeypatch, tmp_path):
+    monkeypatch.setitem(kept_run._TABLES, "operators", lambda _: {}["who"])
+    out = tmp_path / "out"
+    with pytest.raises(RunsFailed) as failure:
+        driven(monkeypatch, out)
+    assert unnamed(str(failure.value), out, "'operators'", "KeyError", "dva-sim show") == []
+    assert failure.value.exit_code == ExitCode.RUNS_FAILED == 3
+    assert Results.load(out).table("drives").rows == 4
 
 
 def test_memory_does_not_grow_with_what_was_kept(monkeypatch, tmp_path):
