@@ -33,7 +33,7 @@ _MEANINGS: Final = {
     ExitCode.OK: "done",
     ExitCode.DOES_NOT_HOLD: "a check failed, or a live run broke a safety rule",
     ExitCode.MISTAKE: "usage error, invalid file, or a file that cannot be read or written",
-    ExitCode.RUNS_FAILED: "some runs or tables failed (run again to retry), or a plug-in raised an error",
+    ExitCode.RUNS_FAILED: "runs or tables failed (run again to retry), or a plug-in failed",
     ExitCode.GATE_FAILED: "a gate failed: `compare --fail-if` holds, or `validate` misses",
     ExitCode.INTERRUPTED: "stopped by Ctrl-C; what is finished is kept (`live`, `console`: 0)",
     ExitCode.READER_GONE: "the reader of the output has ended, as in `| head`",
