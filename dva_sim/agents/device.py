@@ -144,6 +144,12 @@ class AgentDevice:
 
         self.ask(self.dva, self._registration, answered, on_failure)
 
+    def resume(self) -> None:
+        """Register at once, and publish again, after it was withdrawn."""
+        self._life += 1
+        self.withdrawn = False
+        self.register()
+
     def leave(self) -> None:
         """Send nothing more: the DVA finds out as of any device that falls silent."""
         self.silent = True

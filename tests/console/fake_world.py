@@ -214,6 +214,9 @@ class FakeWorld(FakePhones, FakeControlRoom):
     def do_tour_time(self, asked: dict[str, Any]) -> None:
         print(f"Tour: robot {asked['robot']} took {asked['took_s']:.1f} s", flush=True)
 
+    def do_here(self, asked: dict[str, Any]) -> None:
+        """Pages of the fake world may come and go."""
+
     def do_watch(self, asked: dict[str, Any]) -> None:
         self.watched = set(asked["robots"])
 

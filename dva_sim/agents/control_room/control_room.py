@@ -59,7 +59,9 @@ class ControlRoomAgent:
         device.clock.every(REFRESH, self.refresh, start=device.clock.now + REFRESH)
 
     def refresh(self) -> None:
-        """Ask for the whole list, who is there, and how orders are given."""
+        """Ask for the whole list, who is there, and how orders are given, if it takes part."""
+        if self.device.withdrawn:
+            return
         self.ask(m.GetDispatch())
         self.ask(m.GetDeviceList())
         self._ask_above(None)

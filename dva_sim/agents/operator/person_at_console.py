@@ -19,7 +19,7 @@ from dva_sim.agents.tilt import GivenTilt, TiltSources
 from dva_sim.protocol import messages as m
 
 MOST_ROBOTS = 2  # design: that one person drives by the same input
-DECLINED_AFTER = 30.0  # design: an order to a seat in which nobody sits [s]
+DECLINED_AFTER = 30.0  # design: an order that none of the people at open pages takes [s]
 THERE = 3.0  # design: so near the place of an event a robot has arrived [m]
 
 
@@ -70,6 +70,15 @@ class PersonAgent:
     def steer_by(self, tilt: Callable[[], GivenTilt | TiltSources] | None) -> None:
         """Set what makes the commands of the next drives; None: input is entered as tilt."""
         self._tilt = tilt or (lambda: GivenTilt(self.console.phone))
+
+    def man(self, is_manned: bool) -> None:
+        """Take part while somebody is there; otherwise the DVA counts the seat as silent."""
+        if is_manned and self.device.withdrawn:
+            self.device.resume()
+        elif not is_manned and not self.device.withdrawn:
+            self.device.withdrawn = True
+            if self.order is not None:
+                self._put_down("failed" if self._arrived else "declined")
 
     # --- what the person does ------------------------------------------------------------
 
@@ -205,6 +214,8 @@ class PersonAgent:
             case m.PermissionRevocation(device=robot, session=session):
                 if robot in self.robots:
                     self.robots[robot].revoked(session)
+            case m.Order() if self.device.withdrawn:
+                return m.Reply(message.message_id, m.BUSY, "nobody is at this seat")
             case m.Order(device=str(), task="confirm") as order:
                 self._on_order(order)
             case m.OrderProgress(event_id=event, state="done"):

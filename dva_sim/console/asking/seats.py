@@ -1,16 +1,20 @@
 """Seats and their clients: pure, without a clock and without sockets.
 
 A client that takes control gets a seat, and keeps it until it gives it up or is gone. What it
-wants must come again and again while it holds on: who falls silent is stopped.
+wants must come again and again while it holds on: who falls silent is stopped. A seat is manned
+while its client is there; free seats are manned by open pages that have none.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from dva_sim.console.wire.limits import SILENT_AFTER
 
 MOST_SEATS = 16
+RELOADED = 3.0  # design: a page that is loaded again is open again by then, real time [s]
 
 
 @dataclass
@@ -37,6 +41,25 @@ class Seats:
 
     def __init__(self) -> None:
         self.taken: dict[str, TakenSeat] = {}
+        self._there: dict[str, float] = {}  # until when, real time [s]
+        self._may_drive: frozenset[str] = frozenset()
+
+    def note_open(self, pages: Mapping[str, bool], now: float) -> None:
+        """Note which clients are there at a time [s], each with whether it may take a free seat."""
+        left = self._there.keys() - pages.keys()
+        self._there |= {client: min(self._there[client], now + RELOADED) for client in left}
+        self._there |= dict.fromkeys(pages, math.inf)
+        self._may_drive |= {client for client, drives in pages.items() if drives}
+
+    def manned(self, seats: Iterable[int], now: float) -> set[int]:
+        """Return which of some seats are manned at a time [s]."""
+        self._there = {client: until for client, until in self._there.items() if until > now}
+        self._may_drive &= self._there.keys()
+        used = {seat.number for seat in self.taken.values()}
+        waiting = len(self._may_drive - self.taken.keys())
+        free = sorted(set(seats) - used)[:waiting]
+        here = {seat.number for client, seat in self.taken.items() if client in self._there}
+        return here.union(free)
 
     def sit(self, client: str, rather: int | None = None) -> int | None:
         """The number of the seat of a client: its own, `rather`, or the lowest that is free.
@@ -50,12 +73,13 @@ class Seats:
             (n for n in (rather, *range(MOST_SEATS)) if n is not None and n not in used), None
         )
         if free is not None:
-            self.taken[client] = TakenSeat(free)
+            self.sit_at(client, free)
         return free
 
     def sit_at(self, client: str, number: int) -> None:
         """A client takes a seat that is its own."""
         self.taken[client] = TakenSeat(number)
+        self._there.setdefault(client, math.inf)
 
     def stand_up(self, client: str) -> int | None:
         """A client leaves: the seat it had."""

@@ -6,7 +6,7 @@ DVA's own: another make of control room, or of DVA, can take either place.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Final, Unpack
@@ -164,6 +164,14 @@ class ConsoleRooms:
         agent = self._agent(LISTENER + number, name or f"{role}-{number}")
         self._roles.appoint(agent.device.id_tag, role)
         return ConsoleRoom(number, agent, role)
+
+    def attend(self, clients: Container[str]) -> None:
+        """Let the DVA count the rooms as silent whose pages are not open, until they are again."""
+        for client, room in self.by_client.items():
+            if client not in clients:
+                room.device.withdrawn = True
+            elif room.device.withdrawn:
+                room.device.resume()
 
     def leave(self, client: str) -> None:
         """A page is gone for good, or has another name; what it asked for is answered yet."""

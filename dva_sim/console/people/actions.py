@@ -32,6 +32,7 @@ from dva_sim.console.wire.arguments import (
     OfRobots,
     OfSome,
     PaceChange,
+    PagesHere,
     PatternChoice,
     RobotsWatched,
     SampleBatch,
@@ -97,6 +98,7 @@ class Actions:
         person = self._world.person(number)
         self._world.client_of[number] = client
         person.sit_down()
+        self._man()
 
         holders = self._holders(robots, person)
 
@@ -151,6 +153,19 @@ class Actions:
             self._world.client_of.pop(number, None)
             self._world.free_seat(client)
         self._hold()
+
+    @does("here")
+    def _here(self, _: str, line: PagesHere) -> None:
+        self._seats.note_open(line["pages"], time.monotonic())
+        self._rooms.attend(line["pages"].keys())
+        self._man()
+
+    def _man(self) -> None:
+        """Let exactly the seats take part at which somebody is."""
+        persons = dict(self._world.numbered_persons())
+        manned = self._seats.manned(persons, time.monotonic())
+        for number, person in persons.items():
+            person.man(number in manned)
 
     def _hold(self) -> None:
         held = {robot for person in self._world.persons for robot in person.robots}
@@ -268,6 +283,7 @@ class Actions:
         why = f"stopped: the page was silent for {SILENT_AFTER:g} s while it held on"
         for client in self._seats.silent(time.monotonic()):
             self._stop_one(client, why)
+        self._man()
         self._look_for_old_pictures()
 
     def _look_for_old_pictures(self) -> None:

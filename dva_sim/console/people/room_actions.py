@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from functools import partial
 from typing import Any, Unpack
 
@@ -44,6 +44,10 @@ class RoomActions:
     ) -> None:
         self._world, self._rooms, self._seats = world, world.rooms, seats
         self._robot, self._take = robot, take
+
+    def attend(self, clients: Container[str]) -> None:
+        """Let rooms take part only while their pages are open."""
+        self._rooms.attend(clients)
 
     def forget(self, client: str) -> None:
         """A page is gone for good."""

@@ -105,6 +105,17 @@ class Clients:
         """Pages whose state socket is open."""
         return [client for client in self._all.values() if client.is_here]
 
+    def acting(self) -> dict[str, bool]:
+        """Return who is there and may act, pages and programs, each with whether it is a driver's.
+
+        A phone drives from its own seat, and a program from the one that it asks for.
+        """
+        return {
+            client.name: client.is_here and client.role >= Role.DRIVE
+            for client in self._all.values()
+            if client.role.acts and (client.is_here or client.asked)
+        }
+
     def yielding(self, role: Role) -> Client | None:
         """Return the page that makes room for one of a role: of a lower role, idle ones first."""
         lesser = [client for client in self.here() if client.role < role]

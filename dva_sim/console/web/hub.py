@@ -72,6 +72,7 @@ class Hub:
         if client.ws is not None:  # the page has lost that one, and we did not know
             wire_of(client.ws.scope).drop(STUCK, "this page was opened again")
         client.ws = ws
+        self._tell_here()
         you = {"k": "you", "client": client.name, "key": client.key, "role": role.name.lower()}
         client.feed.put(you)
 
@@ -124,9 +125,14 @@ class Hub:
         logs, tables = self.clients.looked()
         self.simulation.send({"do": "look", "logs": logs, "tables": tables})
 
+    def _tell_here(self) -> None:
+        """Tell the simulation who is there, so that the DVA orders nobody who is not."""
+        self.simulation.send({"do": "here", "pages": self.clients.acting()})
+
     def _leave(self, client: Client) -> None:
         """A page is gone: its robots stop, and after a while others may have them."""
         self.clients.leave(client)
+        self._tell_here()
         self._tell_looks()
         self.watching()
         self._stop_drive(client)
@@ -161,6 +167,7 @@ class Hub:
         program, least = self.clients.add_program(role, time.monotonic())
         if least is not None:
             self._give_back(least)
+        self._tell_here()
         return program
 
     def dismiss(self, program: Client) -> None:

@@ -36,6 +36,7 @@ from dva_sim.console.wire.arguments import (
     OfRobots,
     OfSome,
     PaceChange,
+    PagesHere,
     PatternChoice,
     PhoneIdentity,
     PhoneWish,
@@ -354,6 +355,7 @@ OF_THE_WEB: Final[Mapping[str, Action]] = {
     for action in (
         Action("watch", "says whose pictures are looked at", RobotsWatched, at=_ALL, **_LOOKED),
         Action("look", "says which logs and tables are looked at", LogsLooked, at=_ALL, **_LOOKED),
+        Action("here", "says which clients are there", PagesHere, **_LOOKED),
     )
 }
 

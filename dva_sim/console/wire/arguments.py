@@ -323,6 +323,12 @@ class LogsLooked(TypedDict):
     tables: list[str]
 
 
+class PagesHere(TypedDict):
+    """Clients that are there and may act, each with whether it may take a free seat."""
+
+    pages: dict[str, bool]
+
+
 class SampleBatch(TypedDict):
     """Samples of a phone's sensor."""
 

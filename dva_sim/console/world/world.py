@@ -229,13 +229,16 @@ class ConsoleWorld(PublishingWorld):
         return list(self._persons.items())
 
     def person(self, number: int) -> PersonAgent:
-        """The person of a seat, by its number; new ones of the console, from 0, register first."""
+        """Return the person of a seat, by its number; seats of the console are made from 0 on.
+
+        A new seat is unmanned.
+        """
         while number < FIRST_SEAT and number not in self._persons:
             place = sum(1 for known in self._persons if known < FIRST_SEAT)
             device = self.run.stage.device("console", place + 1)
             person = PersonAgent(device, self._console)
             person.on_robot = self._watch_robot
-            device.register()
+            device.withdrawn = True
             for robot in self.run.field.robots:
                 device.connect(robot)  # an emergency does not wait for a connection
             self.feed.things.add(device.id_tag, device.label, "operator")

@@ -1,5 +1,9 @@
-from dva_sim.console.asking.seats import MOST_SEATS, Seats
+import pytest
+
+from dva_sim.console.asking.seats import MOST_SEATS, RELOADED, Seats
 from dva_sim.console.wire.limits import SILENT_AFTER
+
+LATER = RELOADED + 0.1  # [s]
 
 
 def test_a_client_keeps_its_seat_and_the_lowest_free_one_is_given():
@@ -11,6 +15,28 @@ def test_a_client_keeps_its_seat_and_the_lowest_free_one_is_given():
     for number in range(MOST_SEATS):
         seats.sit(f"more {number}")
     assert seats.sit("one too many") is None
+
+
+@pytest.mark.parametrize(
+    ("pages", "later", "manned"),
+    [
+        ({"a": True}, LATER, {0}),
+        ({"phone": False}, LATER, set()),
+        ({"a": True, "b": True}, LATER, {0, 2}),
+        ({"seated": True}, LATER, {1}),
+        ({"seated": True, "a": True}, LATER, {0, 1}),
+        ({}, RELOADED - 0.1, {0, 1}),
+        ({}, LATER, set()),
+    ],
+)
+def test_a_seat_is_manned_while_somebody_is_there(pages, later, manned):
+    seats = Seats()
+    seats.sit("a")
+    seats.sit("seated")
+    seats.stand_up("a")
+    seats.note_open({"a": True, "seated": True}, 0.0)
+    seats.note_open(pages, 10.0)
+    assert seats.manned([0, 1, 2], 10.0 + later) == manned
 
 
 def test_who_holds_on_and_says_nothing_is_told_of_once():

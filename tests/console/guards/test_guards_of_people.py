@@ -225,6 +225,7 @@ def test_without_an_order_there_is_nothing_to_say(page):
 
 def test_operators_are_people_by_number(monkeypatch):
     page = PhonePage(monkeypatch, operator__count=3, operator__kind={1: "person", 3: "person"})
+    page.are_open("p1", "p2")
     page.let(1.0)
     labels = {e.device.label for e in page.world.run.dva.core.registry.entries.values()}
     assert {"console-1", "console-2", "operator-2"} <= labels

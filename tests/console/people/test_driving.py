@@ -224,6 +224,7 @@ def test_an_order_of_the_dva_is_shown_driven_to_and_confirmed(page):
 
 def test_whoever_takes_the_robot_of_an_order_that_waits_sits_where_it_waits(page):
     """The DVA has given the order to the second seat, in which nobody sits any more."""
+    page.are_open("c1", "c2", "c3")
     assert page.do("take", robots=[0])[0]
     assert not page.do("take", robots=[0], client="c2")[0]
     page.let(20.0)

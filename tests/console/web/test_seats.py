@@ -35,6 +35,26 @@ def act(console, token, action, ok=True, **about):
     return answer.json, asked
 
 
+@pytest.mark.parametrize(("role", "shown"), [("supervise", True), ("drive", True), ("look", None)])
+def test_the_simulation_hears_which_pages_are_open_that_may_drive(console, role, shown):
+    console.asked_so_far()
+    page = console.page(getattr(console, role))
+    if shown:
+        assert console.next_asked("here")["pages"][page.client] is shown
+    page.close()
+    assert page.client not in console.next_asked("here")["pages"]
+
+
+def test_a_program_is_there_but_takes_no_free_seat(console):
+    answer, _ = act(console, console.drive, "take", arguments={"robots": [0]})
+    assert console.ask("/api/state", token=console.drive).status == 200
+    console.page(console.drive).close()
+    (program,) = [
+        drives for name, drives in console.next_asked("here")["pages"].items() if name[0] == "p"
+    ]
+    assert (answer["ok"], program) == (True, False)
+
+
 def test_a_name_is_public_and_a_key_is_nowhere_but_with_its_owner(console, page):
     looker = console.page(console.look)
     seen = [looker.next("snap"), console.ask("/api/state", token=console.look).json]

@@ -132,8 +132,8 @@ class Served:
         return found
 
     def acted(self) -> list[Line]:
-        """Lines so far, except those that select views."""
-        return [line for line in self.asked_so_far() if line["do"] != "watch"]
+        """Lines so far, except those that select views or say who is there."""
+        return [line for line in self.asked_so_far() if line["do"] not in ("watch", "here")]
 
     def answering(self, kind: str, ask: Callable[..., Answer], *words: Any, **done: Any) -> Any:
         """Let somebody ask, and do it in the simulation: the answer, and what was asked there."""

@@ -64,8 +64,13 @@ class Page:
         self.world.show = lambda line, key="": self.frames.append(checked(line, PaintersLine))
         self.actions = Actions(self.world)
         self.world.begin()
+        self.are_open(client)
         self.wanted, self._count = None, 0
         self.world.clock.every(0.03, self._want)
+
+    def are_open(self, *clients):
+        """Say which pages of drivers are open."""
+        self.actions.take({"do": "here", "pages": dict.fromkeys(clients, True)})
 
     def do(self, what, /, within=30.0, client=None, **about):
         """An action, and its answer once it comes."""
