@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import heapq
 import json
+import math
 import threading
 from collections.abc import Iterable
 from typing import Any, Final
@@ -45,7 +46,7 @@ class Facts:
         """Remember the devices of this run and the messages they have sent, in any order."""
         if line[0] == HERE:
             self._here.update(line[2])
-        elif line[0] == SENT_LINE:
+        elif line[0] == SENT_LINE and line[2] in self._here:
             self._senders.note(line[2], line[4].encode())
 
     def fact(self, line: Line) -> Any:
@@ -136,5 +137,5 @@ class LiveJudge:
             if not self._is_judging:
                 self._judge_up_to(self._latest)
             if self._is_judging:
-                self._judge.take(FactGap(self._up_to, len(self._waiting) + 1))
+                self._judge.take(FactGap(math.inf, len(self._waiting) + 1, self._up_to))
             return self._judge.verdicts()

@@ -154,6 +154,7 @@ def _run_part(
         network = carrier.open(clock, ring, tell, scenario.zeromq, broker, tells_loss)
         at_end.callback(network.close)
         team = frozenset(team_of(scenario))
+        recorder.team = team
         recorder.is_own = team.__contains__ if supervised else network.is_here
         network.watcher = recorder.message
         joining = _joining(network, options, name)

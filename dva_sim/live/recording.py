@@ -14,7 +14,8 @@ import json
 import re
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections import OrderedDict
+from collections.abc import Callable, Container, Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Any
@@ -40,15 +41,22 @@ from dva_sim.recordings.writing import (
 from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation.full.observation_json import as_plain
 from dva_sim.simulation.full.observations import FactGap, FactLog, terms_of
-from dva_sim.simulation.full.verdicts import Verdict
+from dva_sim.simulation.full.verdicts import Verdict, rules_on
 from dva_sim.simulation.scenario import Scenario
 
 BYTES_PER_SECOND = 1024 * 1024  # of a part; a drive takes a twentieth
+SPARE = 0.5  # share of them for what strangers cause, and for what no rule is judged by
+MOST_ASKED = 5000  # requests of strangers whose answers no rule is judged by
 MOST_FACTS = 20_000  # of which one knows that they were said
 MOST_FOREIGN = 200  # devices of another make whose messages are kept
 _ENDS = re.compile(
     rb"<DestinationID>([0-9A-F:]{17})</DestinationID>.{0,200}?<SourceID>([0-9A-F:]{17})<", re.DOTALL
 )
+_NUMBER = re.compile(rb"<MessageID>\s*(\d{1,20})")
+_ANSWERS = re.compile(rb"<Answers>\s*(\d{1,20})")
+_ORDERED = b"<Order>", b"<TaskAward>"
+_ASKED = b"<RegMsg>", b"<GetDeviceList", b"<GetSensorInfo", b"<GetEventList", b"<GetDispatch"
+"""Starts of requests that no rule is judged by, unless they come from somebody with an order."""
 _NOT_KEPT = "not recorded"
 
 Line = list[Any]
@@ -66,14 +74,20 @@ class LiveRecorder(Recorder):
         log: Callback for the facts that this part sees; None: it sees neither robots nor the DVA.
         is_own: Predicate for device ids of this run: their messages are kept where they are sent,
             those of others where they arrive.
+        team: Ids of all devices of the run, wherever they are; all others are strangers.
     """
 
     def __init__(self, clock: Clock, outlet: PipeEnd, keeps: bool = True) -> None:
         super().__init__()
         self._clock, self._outlet, self.keeps = clock, outlet, keeps
         self.log: FactLog | None = None
-        self._filmed, self._missing = set[str](), 0
+        self._filmed = set[str]()
+        self._gaps: dict[bool, FactGap] = {}  # not written yet, by whether they are strangers'
         self.is_own: Callable[[str], bool] = lambda _: False
+        self.team: Container[str] = ()
+        self._ordered: set[str] = set()
+        self._of_strangers = False  # the fact that is observed now
+        self._asked: OrderedDict[tuple[str, bytes], None] = OrderedDict()
         self._foreign: set[str] = set()
         self._second, self._room = 0, BYTES_PER_SECOND
         self._drawn: dict[int, tuple[int, int]] = {}
@@ -81,22 +95,46 @@ class LiveRecorder(Recorder):
 
     def put(self, *line: Any) -> bool:
         """Keep a line, and return whether that was possible; a gap in the facts is noted later."""
+        is_fact = line[0] in JUDGED
+        return self._put_as(line, is_fact=is_fact, of_strangers=False)
+
+    def _put_as(self, line: Sequence[Any], is_fact: bool, of_strangers: bool) -> bool:
+        """Keep a line, of strangers or of no fact only while enough room is left for our facts."""
         if not self.keeps and line[0] not in JUDGED:
             return True
-        if self._missing:
-            gap = as_plain(FactGap(self._clock.now, self._missing))
-            if not self._put([SEEN, gap[1], gap[0], gap[2]]):
-                self._missing += line[0] in JUDGED
-                return False
-            self._missing = 0
-        kept = self._put(line)
-        self._missing += line[0] in JUDGED and not kept
+        kept = self._notes_gaps() and self._put(line, spare=of_strangers or not is_fact)
+        if is_fact and not kept:
+            self._lose(of_strangers)
         return kept
 
-    def _put(self, line: Sequence[Any]) -> bool:
+    def _lose(self, of_strangers: bool) -> None:
+        """Note that a fact could not be kept."""
+        now, log = self._clock.now, self.log
+        sees_dva = log is not None and log.sees_dva
+        rules = rules_on(log is not None and log.sees_robots, sees_dva, of_strangers)
+        before = self._gaps.get(of_strangers, FactGap(now, 0, now, rules))
+        self._gaps[of_strangers] = before._replace(missing=before.missing + 1)
+
+    def _notes_gaps(self) -> bool:
+        """Write where facts are missing, if there are such places; False: there is no room yet."""
+        for of_strangers, gap in list(self._gaps.items()):
+            if of_strangers and self._left() <= SPARE * BYTES_PER_SECOND:
+                continue
+            word, time, values = as_plain(gap._replace(time=self._clock.now))
+            if not self._put([SEEN, time, word, values]):
+                return False
+            del self._gaps[of_strangers]
+        return True
+
+    def _left(self) -> int:
+        """Return the room that is left in this second [B]."""
         if (second := int(time.monotonic())) != self._second:
             self._second, self._room = second, BYTES_PER_SECOND
-        data = json.dumps(line).encode() if self._room > 0 else b""
+        return self._room
+
+    def _put(self, line: Sequence[Any], spare: bool = False) -> bool:
+        has_room = self._left() > (SPARE * BYTES_PER_SECOND if spare else 0)
+        data = json.dumps(line).encode() if has_room else b""
         self._room -= len(data)
         kept = bool(data) and self._outlet.offer(data + b"\n")
         self.counters[_NOT_KEPT] += not kept
@@ -112,7 +150,7 @@ class LiveRecorder(Recorder):
     def observe(self, fact: Any) -> None:
         """Keep a fact that the rules are judged by."""
         word, time, values = as_plain(fact)
-        self.put(SEEN, time, word, values)
+        self._put_as([SEEN, time, word, values], True, self._of_strangers)
 
     def is_alive(self) -> None:
         """Note that all facts of this part up to now are written."""
@@ -147,18 +185,53 @@ class LiveRecorder(Recorder):
         if ends is None:
             return
         destination, source = ends[1].decode(), ends[2].decode()
-        if sent or (self.keeps and self._is_news(source, payload)):
-            self.put(SENT_LINE, now, node if sent else source, destination, payload.decode())
-        if sent or self.log is None:
+        if sent:
+            self._note_sent(node, destination, payload)
+        else:
+            self._note_arrival(node, source, destination, payload)
+
+    def _is_stranger(self, device: str) -> bool:
+        return not (self.is_own(device) or device in self.team)
+
+    def _note_sent(self, node: str, destination: str, payload: bytes) -> None:
+        """Keep a message of a device of ours; an answer that no rule looks at is no fact."""
+        to_stranger = self._is_stranger(destination)
+        if to_stranger and any(word in payload for word in _ORDERED):
+            self._ordered.add(destination)
+        answers = _ANSWERS.search(payload) if to_stranger and self._asked else None
+        is_fact = answers is None or (destination, answers[1]) not in self._asked
+        line = SENT_LINE, self._clock.now, node, destination, payload.decode()
+        self._put_as(line, is_fact, to_stranger)
+
+    def _note_arrival(self, node: str, source: str, destination: str, payload: bytes) -> None:
+        now, is_stranger = self._clock.now, self._is_stranger(source)
+        if self.keeps and self._is_news(source, payload):
+            line = SENT_LINE, now, source, destination, payload.decode()
+            self._put_as(line, is_fact=False, of_strangers=True)
+        if self.log is None:
             return
-        if self._room <= 0:
-            self._missing += 1
+        if is_stranger and self.log.sees_dva and self._only_asks(source, payload):
+            self.log.heard(source)
+        elif self._left() <= (SPARE * BYTES_PER_SECOND if is_stranger else 0):
+            self._lose(is_stranger)
         elif self._is_message(payload):
+            self._of_strangers = is_stranger
             self.log.delivered(now, source, node, payload)
+            self._of_strangers = False
+
+    def _only_asks(self, source: str, payload: bytes) -> bool:
+        """Return True for a request that no rule is judged by."""
+        if source in self._ordered or not any(word in payload for word in _ASKED):
+            return False
+        if (number := _NUMBER.search(payload)) is not None:
+            self._asked[source, number[1]] = None
+            if len(self._asked) > MOST_ASKED:
+                self._asked.popitem(last=False)
+        return True
 
     def _is_news(self, source: str, data: bytes) -> bool:
         """Return True for a message from somebody who keeps no record for us."""
-        if self.is_own(source) or self._room <= 0:
+        if self.is_own(source) or self._left() <= SPARE * BYTES_PER_SECOND:
             return False
         if source not in self._foreign and len(self._foreign) >= MOST_FOREIGN:
             self.counters[_NOT_KEPT] += 1
@@ -169,11 +242,12 @@ class LiveRecorder(Recorder):
         return True
 
     def _is_message(self, data: bytes) -> bool:
-        """Return True for a valid message; an invalid one uses up room as if it were kept."""
+        """Return True for a valid message; an invalid one uses up spare room as if it were kept."""
         try:
             decode(data)
         except ProtocolError:
-            self._room -= len(data)
+            reserved = int(SPARE * BYTES_PER_SECOND)
+            self._room = min(self._room, max(self._room - len(data), reserved))
             return False
         return True
 

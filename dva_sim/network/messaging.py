@@ -30,12 +30,14 @@ class Request(NamedTuple):
         answer: Callback for the bytes of the reply; once, now or later.
         sender: Id of the device whose key opened the connection; None without keys.
         peer: Local identity of the connection that it came by; meaningless elsewhere.
+        origin: Network address and key that it came from; None where no sockets carry it.
     """
 
     data: bytes
     answer: Answer
     sender: str | None = None
     peer: Hashable = None
+    origin: str | None = None
 
 
 make_request = maker(Request)

@@ -238,7 +238,7 @@ class MqttNetwork(RealNetwork):
 
         # Refused below if it is too long, and answered: an empty text is no message.
         read = data if len(data) <= LARGEST else b""
-        self._serve_request(node, read, send, sender=sender, peer=sender)
+        self._serve_request(node, read, send, sender=sender, peer=sender, origin=sender)
 
     # --- publications ------------------------------------------------------------------
 

@@ -118,7 +118,13 @@ class RealNetwork(ABC):
             self.watcher(node, payload, sent)
 
     def _serve_request(
-        self, node: str, data: bytes, send: Answer, sender: str | None, peer: Hashable
+        self,
+        node: str,
+        data: bytes,
+        send: Answer,
+        sender: str | None,
+        peer: Hashable,
+        origin: str,
     ) -> None:
         """Hand a request to the service of a node; `send` takes the bytes of the reply."""
         self.note(node, data, sent=False)
@@ -127,7 +133,7 @@ class RealNetwork(ABC):
             self.note(node, reply)
             send(reply)
 
-        request = make_request(data, answer, sender, peer)
+        request = make_request(data, answer, sender, peer, origin)
         service, tap = self._services[node], self.taps.get(node)
         if tap is None:
             service(request)

@@ -392,7 +392,8 @@ class SocketNetwork(RealNetwork):
                 return  # others have their turn before its many other parts
             sender = None if self._ring is None else self._security.sender(last)
             if sender is not None or self._ring is None:
-                self._request(node, router, peer, parts, sender)
+                origin = f"{last.get('Peer-Address')} {sender or ''}"
+                self._request(node, router, peer, parts, sender, origin)
             else:
                 self.counters["refused: of a key that is no longer known"] += 1
             if not self.clock.has_more(router):
@@ -406,7 +407,13 @@ class SocketNetwork(RealNetwork):
         return self.clock.has_more(router)
 
     def _request(
-        self, node: str, router: Socket, peer: bytes, parts: list[bytes], sender: str | None
+        self,
+        node: str,
+        router: Socket,
+        peer: bytes,
+        parts: list[bytes],
+        sender: str | None,
+        origin: str,
     ) -> None:
         """One request: its route back, an empty frame, and one frame with the message."""
         if node not in self._services or b"" not in parts:
@@ -421,6 +428,7 @@ class SocketNetwork(RealNetwork):
             *(node, data, lambda reply: self.send(router, [*route, reply])),
             sender=sender,
             peer=peer,
+            origin=origin,
         )
 
     def send(self, socket: Socket, frames: list[bytes], look: bool = True) -> None:

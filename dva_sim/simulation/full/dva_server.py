@@ -19,10 +19,11 @@ from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.core.audit import MOST_KEPT, Fact
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import Event, State
+from dva_sim.core.registration_limit import BURST, RATE, RegistrationLimit
 from dva_sim.core.registry import CONTROL_ROOM, DETECTOR, GUARD, ROBOT
 from dva_sim.core.sessions import Send
 from dva_sim.core.store import Store
-from dva_sim.network.messaging import Subscription
+from dva_sim.network.messaging import Request, Subscription
 from dva_sim.protocol import messages as m
 
 MOST_REPORTED = 20_000  # events whose last word is remembered, so that none is said twice
@@ -70,7 +71,8 @@ class DvaAgent:
         self.beats: Counter[str] = Counter()
         self._heard: dict[str, tuple[str, list[Subscription]]] = {}  # address, at which heard
         self._attended = 0
-        device.serve(self._on_request)
+        self._registrations = RegistrationLimit()
+        device.network.serve(device.id_tag, self._on_arrival)
 
     def start(self) -> None:
         """Begin to look at deadlines; a memory tells what was going on before."""
@@ -129,6 +131,19 @@ class DvaAgent:
             granted = sessions.grant(entries[robot].device, entries[takes].device, wish)
             sends += granted[1] if granted is not None else []
         self._carry_out(sends)
+
+    def _on_arrival(self, request: Request) -> None:
+        """Take a request, unless its peer registers too many devices at once."""
+        registers = request.origin is not None and b"<RegMsg>" in request.data
+        now = self.device.clock.now
+        if registers and not self._registrations.takes(request.origin or "", now):
+            message = self.device.admit(request)
+            if message is not None:
+                text = f"too many registrations: at most {BURST} at once and {RATE:g} a second"
+                reply = m.Reply(message.message_id, m.BUSY, text)
+                self.device.turn_away(request, message, reply)
+        else:
+            self.device.take(request, self._on_request)
 
     def _on_request(self, message: m.Message) -> m.Reply:
         reply, sends = self.core.handle(message, self.device.clock.now)

@@ -128,6 +128,12 @@ def _read_events(time: float, content: Mapping[str, Any]) -> o.BookNews:
 
 _EVENTS: Final = _as_named(o.BookNews)
 
+def _read_gap(time: float, content: Mapping[str, Any]) -> o.FactGap:
+    """Read a gap; earlier versions noted neither its start nor the rules that depend on it."""
+    since = float(content.get("since_s", time))
+    return o.FactGap(time, content["missing"], since, tuple(content.get("rules", ())))
+
+
 FORMS: Final[dict[str, _Form]] = {
     "arrived": _Form(o.Arrived, _write_arrived, _read_arrived),
     "heard": _as_named(o.Heard),
@@ -138,7 +144,7 @@ FORMS: Final[dict[str, _Form]] = {
     "book": _Form(o.BookNews, _write_events, _read_events),
     "deafened": _as_named(o.Deafened),
     "slowed": _as_named(o.Slowed, processing="processing_s"),
-    "gap": _as_named(o.FactGap),
+    "gap": _Form(o.FactGap, _as_named(o.FactGap, since="since_s").write, _read_gap),
 }
 """Forms by the word that stands for each kind of fact."""
 _WORDS: Final = {form.kind: word for word, form in FORMS.items()}

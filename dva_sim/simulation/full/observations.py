@@ -317,10 +317,19 @@ class Slowed(NamedTuple):
 
 
 class FactGap(NamedTuple):
-    """Number of facts that could not be kept, here or shortly before."""
+    """Facts that could not be kept.
+
+    Attributes:
+        time: From when on facts are kept again [s]; infinite: no more come.
+        missing: Number of facts.
+        since: Time of the first of them [s].
+        rules: Rules that depend on them; empty: all.
+    """
 
     time: float
     missing: int
+    since: float
+    rules: tuple[str, ...] = ()
 
 
 Fact = Sent | Arrived | Heard | Accepted | ByHand | MotionNews | PlaceNews | BookNews
@@ -358,6 +367,20 @@ class FactLog:
         self._heard: dict[str, None] = {}
         self._events = _EventTableDiff()
 
+    @property
+    def sees_dva(self) -> bool:
+        """True if the DVA's book is seen here."""
+        return self._page is not None
+
+    @property
+    def sees_robots(self) -> bool:
+        """True if the motion of any robot has been seen here."""
+        return bool(self._motions)
+
+    def heard(self, source: str) -> None:
+        """Note that the DVA has heard a device, whatever it said."""
+        self._heard[source] = None
+
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:
         """Note a message: an answer with the robot's motion, an order with the book."""
         if isinstance(payload, bytes):
@@ -375,7 +398,7 @@ class FactLog:
         if not any(quiet in payload for quiet in _QUIET):
             self._put(Arrived(now, source, to, payload))
         elif to == self._dva:
-            self._heard[source] = None
+            self.heard(source)
 
     def accepted(self, command: Accepted) -> None:
         """Implement `Observer`."""

@@ -6,7 +6,8 @@ rules. It runs nothing of the program that was recorded.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -14,7 +15,7 @@ from dva_sim.kernel.errors import DvaSimError, ExitCode
 from dva_sim.kernel.recorder import Accepted, Breach, ByHand, Recorder, Sent
 from dva_sim.protocol.messages import Position
 from dva_sim.simulation.full import observations as o
-from dva_sim.simulation.full.safety_checks import SafetyAudit
+from dva_sim.simulation.full.safety_checks import OBEYS_WITHIN, SafetyAudit
 
 RULES: Final = {
     "S1": "a robot moves only by a valid command in time, or a mission that holds",
@@ -27,7 +28,11 @@ RULES: Final = {
 }
 OF_ROBOTS: Final = ("S1", "S2", "S3", "S4", "S5")
 OF_THE_DVA: Final = ("S6", "S7")
+_AT_ROBOTS: Final = ("S1", "S2", "S3", "S5")  # rules on messages that reach robots
+_AT_THE_DVA: Final = ("S2", "S6")  # rules on messages that reach the DVA
+SETTLES: Final = OBEYS_WITHIN  # for which the facts of a gap may still have effects [s]
 EVENTS_UNKNOWN = "what the DVA's book showed is not known here"
+MOST_SPANS: Final = 3  # gaps that a verdict names
 HELD, BROKEN, NOT_JUDGED = "held", "broken", "not judged"
 
 
@@ -52,6 +57,24 @@ class Verdict:
 
     def __str__(self) -> str:
         return f"{self.rule} {self.state}: {self.text}"
+
+
+def rules_on(sees_robots: bool, sees_dva: bool, of_strangers: bool) -> tuple[str, ...]:
+    """Return the rules that depend on facts of a part of a run.
+
+    Args:
+        sees_robots: The part sees how robots move.
+        sees_dva: It sees the DVA's book.
+        of_strangers: The facts are messages of devices from outside the run, or to them.
+    """
+    rules: set[str] = set()
+    if sees_robots:
+        rules |= {*(_AT_ROBOTS if of_strangers else OF_ROBOTS)}
+    elif not sees_dva:  # an operator, whose messages reach robots
+        rules |= {*_AT_ROBOTS}
+    if sees_dva:
+        rules |= {*_AT_THE_DVA, *(() if of_strangers else ("S5", *OF_THE_DVA))}
+    return tuple(sorted(rules))
 
 
 def broken_lines(broken: Iterable[Breach]) -> dict[str, list[str]]:
@@ -122,8 +145,7 @@ class Judge:
         self._places: dict[str, Position] = {}
         self._audit = SafetyAudit(self.recorder, terms, self._motion_of, self._places.get)
         self._sees_robots = self._sees_dva = False
-        self._gap: o.FactGap | None = None
-        self._missing = 0
+        self._gaps: list[o.FactGap] = []
 
     def _motion_of(self, robot: str) -> o.RobotMotion:
         return self._motions.get(robot, o.STATIONARY)
@@ -159,19 +181,22 @@ class Judge:
             case o.Slowed():
                 audit.slowed(now, fact.processing)
             case o.FactGap():
-                self._gap = self._gap or fact
-                self._missing += fact.missing
+                self._gaps.append(fact)
+        self._forget_doubtful()
+
+    def _forget_doubtful(self) -> None:
+        """Forget breaches that facts which were lost might explain."""
+        broken = self.recorder.broken
+        for gap in self._gaps if broken else ():
+            for key in [key for key, breach in broken.items() if _is_doubtful(breach, gap)]:
+                del broken[key]
 
     def verdicts(self, until: str = "") -> list[Verdict]:
         """Return the verdicts so far; see the function `verdicts`."""
         return verdicts(self.recorder, self._not_judged(), until)
 
     def _not_judged(self) -> dict[str, str]:
-        gap = self._gap
-        if gap is not None:
-            why = f"from {gap.time:.1f} s on {self._missing} facts could not be kept"
-            return dict.fromkeys(RULES, why)
-        why_not: dict[str, str] = {}
+        why_not = {rule: _lost(gaps) for rule in RULES if (gaps := self._gaps_of(rule))}
         if not self._terms.motors:
             why_not |= dict.fromkeys(OF_ROBOTS, "no robot of the scenario takes part")
         elif not self._sees_robots:
@@ -179,6 +204,27 @@ class Judge:
         if not self._sees_dva:
             why_not |= dict.fromkeys(OF_THE_DVA, EVENTS_UNKNOWN)
         return why_not
+
+    def _gaps_of(self, rule: str) -> list[o.FactGap]:
+        return [gap for gap in self._gaps if not gap.rules or rule in gap.rules]
+
+
+def _is_doubtful(breach: Breach, gap: o.FactGap) -> bool:
+    is_of_rule = not gap.rules or breach.rule in gap.rules
+    return is_of_rule and gap.since <= breach.time <= gap.time + SETTLES
+
+
+def _lost(gaps: Sequence[o.FactGap]) -> str:
+    """Return when which facts were lost, in words."""
+    spans = ", ".join(
+        f"from {gap.since:.1f} s on"
+        if math.isinf(gap.time)
+        else f"from {gap.since:.1f} s to {gap.time:.1f} s"
+        for gap in gaps[:MOST_SPANS]
+    )
+    more = f" and {len(gaps) - MOST_SPANS} more times" if len(gaps) > MOST_SPANS else ""
+    missing = sum(gap.missing for gap in gaps)
+    return f"{spans}{more} {missing} facts could not be kept; held otherwise"
 
 
 def judged(
