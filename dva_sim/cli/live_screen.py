@@ -24,7 +24,7 @@ from dva_sim.live.options import PARTS, LiveOptions
 from dva_sim.live.process import Report, run_part
 from dva_sim.live.supervisor import Summary, Supervisor
 from dva_sim.network.sockets import DEFAULT_PORT
-from dva_sim.ros.options import OpenPort, open_port
+from dva_sim.serving.open_port import OpenPort, open_port
 from dva_sim.simulation.full.verdicts import Verdict, refuse_broken
 from dva_sim.simulation.scenario import contradictions
 

@@ -24,8 +24,8 @@ from dva_sim.live.recording import Keeper, LiveRecorder
 from dva_sim.network.emulator.process import LinkEnded
 from dva_sim.network.emulator.report import LinkReport
 from dva_sim.ros.gateway import RosGateway
-from dva_sim.ros.options import open_port
 from dva_sim.ros.server import RosbridgeServer
+from dva_sim.serving.open_port import open_port
 from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation.full.verdicts import refuse_broken, verdicts
 from dva_sim.simulation.scenario import Scenario
@@ -189,9 +189,7 @@ class ConsoleSupervisor:
         gateway.camera_base = str(self._processes.serving["base"])
         gateway.camera_token = self._look_token
         self._say(f"rosbridge: {port.url}")
-        return RosbridgeServer(
-            *(world.clock, port.listener, gateway, stage.site), port.token, world.note
-        )
+        return RosbridgeServer(world.clock, port, gateway, stage.site, world.note)
 
     @property
     def _look_token(self) -> str:

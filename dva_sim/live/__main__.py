@@ -9,7 +9,7 @@ from pathlib import Path
 from dva_sim.kernel.errors import DvaSimError, error_line
 from dva_sim.live.options import PATHS, LiveOptions
 from dva_sim.live.process import run_part
-from dva_sim.ros.options import OpenPort
+from dva_sim.serving.open_port import OpenPort
 from dva_sim.serving.pipes import PipeEnd
 
 

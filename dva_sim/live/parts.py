@@ -32,8 +32,8 @@ from dva_sim.network.messaging import Transport
 from dva_sim.network.realtime import LiveClock
 from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.ros.gateway import RosGateway
-from dva_sim.ros.options import OpenPort
 from dva_sim.ros.server import RosbridgeServer
+from dva_sim.serving.open_port import OpenPort
 from dva_sim.simulation.full.control_room import add_dispatcher, add_dva, add_operator
 from dva_sim.simulation.full.dva_trace import traced
 from dva_sim.simulation.full.observations import STATIONARY, FactLog, motion_of, page_of
@@ -335,8 +335,7 @@ class RosbridgePart:
         self._gateway = RosGateway(stage)
         recorder = stage.recorder
         self._server = RosbridgeServer(
-            *(clock, door.listener, self._gateway, stage.site),
-            token=door.token,
+            *(clock, door, self._gateway, stage.site),
             tell=lambda what: recorder.tell(clock.now, ROSBRIDGE, what, "link"),
         )
 

@@ -26,7 +26,7 @@ from dva_sim.network.mqtt import open_broker
 from dva_sim.network.real_network import RealNetwork
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import split_address
-from dva_sim.ros.options import OpenPort
+from dva_sim.serving.open_port import OpenPort
 from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation.full.stage import DVA, Stage, id_of, team_of
 from dva_sim.simulation.full.verdicts import Verdict

@@ -23,7 +23,7 @@ from dva_sim.network.carriers import DEFAULT_PORT, free_port
 from dva_sim.network.emulator.forwarder import FAR, NEAR
 from dva_sim.network.emulator.process import ADDRESSES, LinkEnded, LinkProcess
 from dva_sim.network.emulator.report import LinkReport
-from dva_sim.ros.options import OpenPort
+from dva_sim.serving.open_port import OpenPort
 from dva_sim.simulation.full.verdicts import Verdict, broken_rules
 from dva_sim.simulation.scenario import Scenario
 

@@ -30,6 +30,7 @@ from dva_sim.simulation.full.stage import Stage
 LOOK_AROUND: Final = 2.0  # design: between two looks at who is there [s]
 MOST_ROBOTS: Final = 64
 MOST_DRIVERS: Final = 8  # clients that may be in control at a time
+SILENT: Final = 0.5  # design: without a command a robot is told to stand [s]; 25 of a joystick
 TAKE_TRIES: Final = 3  # design: a long link takes a permission's time to be connected over
 SCAN_HZ: Final = 5.0
 RENEW: Final = 30.0  # design: of a subscription to a sensor [s]
@@ -122,6 +123,7 @@ class RosDriver:
         self._person = PersonAgent(device, console(), lambda: GivenVelocity(phone))
         self._console, self._number = console, 0
         self._wanted: set[str] = set()
+        self._newest: dict[str, int] = {}
         device.register()
 
     @property
@@ -193,7 +195,16 @@ class RosDriver:
         reach = self._person.console.reach(robot)
         self._number += 1
         held.want(self._number, max(0.0, speed) / reach.speed, turn_rate / reach.turn_rate)
+        self._newest[robot] = self._number
+        self.device.clock.call_after(SILENT, self._fell_silent, robot, self._number)
         return ""
+
+    def _fell_silent(self, robot: str, number: int) -> None:
+        """Let a robot stand if no command came after one."""
+        held = self._person.robots.get(robot)
+        if self._newest.get(robot) == number and held is not None and held.is_driven:
+            self._number += 1
+            held.want(self._number, 0.0, 0.0)
 
 
 class RosGateway:

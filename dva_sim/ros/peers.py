@@ -72,12 +72,14 @@ class RosPeer:
     Attributes:
         wants: Subscriptions of the client.
         driver: Its device, from when it first takes control.
+        only_stops: True if the client may stop robots, and nothing else.
     """
 
     def __init__(self, name: str, connection: WebSocketConnection, host: PeerHost) -> None:
         self.name, self._connection, self._host = name, connection, host
         self.wants: dict[str, PeerTopic] = {}
         self.driver: RosDriver | None = None
+        self.only_stops = False
         self._room, self._filled_at, self._dropped = BURST, host.now(), 0
         self._reported_at: dict[str, float] = {}
 
@@ -110,6 +112,8 @@ class RosPeer:
             self._connection.close(TOO_SLOW, "a flood of messages")
 
     def _do(self, operation: Json) -> None:
+        if self.only_stops and operation["op"] != "call_service":
+            raise BadOperation("too many clients are connected: only emergency_stop is served")
         match operation["op"]:
             case "subscribe":
                 self._subscribe(operation)

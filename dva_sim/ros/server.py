@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import hmac
-import socket
 from collections.abc import Callable
 from contextlib import suppress
 from http import HTTPStatus
 from typing import Any, Final
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import urlsplit
 
 from dva_sim.agents.observation import CameraFrame
 from dva_sim.network.realtime import LiveClock
@@ -16,14 +14,22 @@ from dva_sim.ros import published
 from dva_sim.ros.gateway import KnownRobot, RosGateway
 from dva_sim.ros.peers import RosPeer
 from dva_sim.ros.rosbridge import encode
-from dva_sim.ros.websocket import SHAKES_WITHIN, WebSocketConnection
+from dva_sim.ros.websocket import WebSocketConnection
+from dva_sim.serving.admission import RequestFacts
+from dva_sim.serving.open_port import OpenPort
+from dva_sim.serving.port_connections import PortConnection, PortConnections
 from dva_sim.worlds.site import Site
 
 Json = dict[str, Any]
 Answer = Callable[[bool, Json], object]
 
-LOCAL: Final = "localhost", "127.0.0.1", "::1"
-MOST_PEERS: Final = 16
+MOST_PEERS: Final = 16  # clients that may do everything; any other may only stop robots
+MOST_SERVED: Final = 32  # design: of both together
+MOST_CONNECTIONS: Final = 64  # design: the others have not shown a token yet
+STOPS, DOES_ALL = 1, 2  # ranks of clients
+PING: Final = 2.0  # design: between two pings [s]
+SILENT: Final = 5.0  # design: a client from which nothing comes, not even a pong, is cut [s]
+SWEEP: Final = 1.0  # design: between two looks at silent connections [s]
 LARGEST: Final = 100_000  # design: of a message of a client; a Twist has 200 [B]
 CLOCK_PERIOD: Final = 0.1  # [s]
 TYPES: Final = {
@@ -56,30 +62,31 @@ class RosbridgeServer:
 
     Args:
         clock: Polls the sockets.
-        listener: Listening socket.
+        port: Port to serve.
         gateway: The robots.
         site: For the map.
-        token: Token that clients have to show to drive; empty: none is needed.
         tell: Adds a line to the story.
     """
 
     def __init__(
         self,
         clock: LiveClock,
-        listener: socket.socket,
+        port: OpenPort,
         gateway: RosGateway,
         site: Site,
-        token: str,
         tell: Callable[[str], object],
     ) -> None:
-        self._clock, self._listener, self._gateway, self._site = clock, listener, gateway, site
-        self._token, self._tell = token, tell
+        self._clock, self._listener, self._gateway, self._site = clock, port.listener, gateway, site
+        self._admission, self._tell = port.admission(), tell
+        self._places = PortConnections(MOST_CONNECTIONS, MOST_SERVED)
         self._peers: dict[WebSocketConnection, RosPeer | None] = {}
         self._count, self._map = 0, b""
         gateway.on_frame, gateway.on_scan = self._on_frame, self._on_scan
         gateway.on_picture = self._on_picture
-        clock.watch(listener.fileno(), self._accept)
+        clock.watch(port.listener.fileno(), self._accept)
         clock.every(CLOCK_PERIOD, self._tick)
+        clock.every(PING, self._ping)
+        clock.every(SWEEP, lambda: self._places.sweep(clock.now))
 
     @property
     def port(self) -> int:
@@ -101,26 +108,30 @@ class RosbridgeServer:
 
         with suppress(OSError):
             sock, _ = self._listener.accept()
-            if len(self._peers) >= MOST_PEERS:
-                sock.close()
-                return
+            place = self._places.enter(self._clock.now)
             protocol = ServerProtocol(max_size=LARGEST)
             connection = WebSocketConnection(
                 self._clock,
                 sock,
                 protocol,
                 lambda data: self._take(connection, data),
-                lambda why: self._ended(connection, why),
+                lambda why: self._ended(connection, place, why),
             )
-            connection.on_event = lambda event: self._greet(connection, protocol, event)
+            place.drop = lambda: connection.end("its place was needed, or it showed no token")
+            connection.on_event = lambda event: self._greet(connection, place, protocol, event)
             self._peers[connection] = None
-            self._clock.call_after(SHAKES_WITHIN, self._give_up, connection)
 
-    def _give_up(self, connection: WebSocketConnection) -> None:
-        if self._peers.get(connection, self) is None:
-            connection.end("does not speak WebSocket")
+    def _ping(self) -> None:
+        """Ask every client for a sign of life; cut those that gave none for too long."""
+        for connection, peer in list(self._peers.items()):
+            if peer is not None and self._clock.now - connection.heard_at > SILENT:
+                connection.end(f"silent for {SILENT:g} s")
+            elif peer is not None:
+                connection.ping()
 
-    def _greet(self, connection: WebSocketConnection, protocol: Any, request: Any) -> None:
+    def _greet(
+        self, connection: WebSocketConnection, place: PortConnection, protocol: Any, request: Any
+    ) -> None:
         """Answer the opening handshake."""
         if protocol.handshake_exc is not None:
             return
@@ -134,33 +145,35 @@ class RosbridgeServer:
         if protocol.handshake_exc is None:
             self._count += 1
             name = f"ROS client {self._count}"
-            self._peers[connection] = RosPeer(name, connection, self)
-            self.tell(f"{name} has come")
+            self._peers[connection] = peer = RosPeer(name, connection, self)
+            self._admit(peer, place)
+
+    def _admit(self, peer: RosPeer, place: PortConnection) -> None:
+        """Give a client with a token its rank; those beyond the limit may still stop robots."""
+        others = [each for each in self._peers.values() if each is not None and each is not peer]
+        peer.only_stops = sum(not each.only_stops for each in others) >= MOST_PEERS
+        rank = STOPS if peer.only_stops else DOES_ALL
+        place.begin(rank, self._clock.now, is_limited=not peer.only_stops)
+        self.tell(f"{peer.name} has come{', and may only stop robots' if peer.only_stops else ''}")
 
     def _refusal(self, request: Any) -> tuple[HTTPStatus, str] | None:
-        """Return why a client is not let in: no address, a page of another site, or no token."""
-        # A browser names the page that asks; a name of another site may lead here (DNS rebinding).
+        """Return why a client is not let in: a foreign name or page, or no token."""
+        headers = request.headers
         try:
-            origin = urlsplit(request.headers.get("Origin", "")).hostname
-            asked = parse_qs(urlsplit(request.path).query)
+            facts = RequestFacts(headers.get("Host", ""), headers.get("Origin"), changes=True)
+            query, bearer = urlsplit(request.path).query, headers.get("Authorization", "")
         except (ValueError, LookupError):  # LookupError: a header that is there twice
-            return HTTPStatus.BAD_REQUEST, "the address or the origin makes no sense\n"
-        own = (*LOCAL, str(self._listener.getsockname()[0]))
-        if "Origin" in request.headers and origin not in own:
-            return HTTPStatus.FORBIDDEN, "a page of another site may not ask here\n"
-        shown = asked.get("token", [""])[0]
-        bearer = request.headers.get("Authorization", "")
-        shown = shown or bearer.removeprefix("Bearer ")
-        if not hmac.compare_digest(shown.encode("utf-8", "replace"), self._token.encode()):
-            return HTTPStatus.UNAUTHORIZED, "the token is missing or wrong: ws://...?token=...\n"
-        return None
+            return HTTPStatus.BAD_REQUEST, "the address or the headers make no sense\n"
+        refusal = self._admission.refusal(facts, query, bearer)
+        return None if refusal is None else (HTTPStatus(refusal[0]), f"{refusal[1]}\n")
 
     def _take(self, connection: WebSocketConnection, data: bytes) -> None:
         peer = self._peers.get(connection)
         if peer is not None:
             peer.take(data)
 
-    def _ended(self, connection: WebSocketConnection, why: str) -> None:
+    def _ended(self, connection: WebSocketConnection, place: PortConnection, why: str) -> None:
+        place.leave()
         peer = self._peers.pop(connection, None)
         if peer is None:
             return
@@ -278,6 +291,8 @@ class RosbridgeServer:
 
         if word == "emergency_stop":
             self._gateway.emergency(name, on_result)
+        elif peer.only_stops:
+            on_result(False, "too many clients are connected: only emergency_stop is served")
         elif word == "take_control":
             self._let_take(peer, robot, on_result)
         elif peer.driver is None:

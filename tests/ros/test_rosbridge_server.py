@@ -8,6 +8,7 @@ import socket
 import threading
 
 import pytest
+from helpers.network.port_visitors import DeafClient, is_closed
 from helpers.ros.served_world import ScriptedRosClient, ServedWorld
 from helpers.wording import unnamed
 from websockets.exceptions import ConnectionClosed
@@ -31,7 +32,10 @@ def address_of(world):
 
 
 def driver(world, name="robot_1"):
-    client = world.client()
+    return driver_of(world, world.client(), name)
+
+
+def driver_of(world, client, name="robot_1"):
     taken = client.call(world, f"/{name}/take_control")
     assert (taken["result"], taken["success"]) == (True, True)
     return client
@@ -119,11 +123,32 @@ def test_nobody_drives_without_control_and_two_cannot_have_it(world):
     world.until(lambda: second.call(world, "/robot_1/take_control")["success"])
 
 
-def test_a_client_that_falls_silent_is_stopped_by_the_robots_watchdog(world):
-    robot = drive(world, driver(world))
+def test_a_client_that_falls_silent_stops_its_robot_in_half_a_second_and_keeps_it(world):
+    client = driver(world)
+    robot = drive(world, client)
     world.until(lambda: robot.is_moving)
+    client.twist(CMD, 0.3)
+    silent_since = world.clock.now
+    world.until(lambda: robot.set_point[:2] == (0.0, 0.0))
+    assert 0.4 < world.clock.now - silent_since < 1.0  # the robot's own watchdog takes 3 s
     world.until(lambda: not robot.is_moving)
     assert robot.controller.mode == "Teleoperation"
+    drive(world, client, 0.2)
+
+
+def test_a_client_that_is_stopped_loses_its_robot_after_5_seconds(world):
+    frozen, other = DeafClient(world.url), world.client()
+    world.until(lambda: frozen.is_answered)
+    frozen.say({"op": "call_service", "service": "/robot_1/take_control"})
+    robot = world.robot("robot-1")
+    world.until(lambda: robot.controller.mode == "Teleoperation")
+    silent_since = world.clock.now  # it answers no ping from now on
+    world.until(lambda: robot.controller.grant is None)
+    assert 3.0 < world.clock.now - silent_since < 9.0
+    assert other.call(world, "/robot_1/take_control")["success"]
+    world.pause(6.0)
+    assert other.is_open  # it answers pings
+    frozen.sock.close()
 
 
 def test_a_client_that_leaves_in_mid_drive_stops_its_robot_and_frees_it(world):
@@ -188,7 +213,11 @@ def test_without_its_token_or_from_a_page_of_another_site_nobody_is_let_in(world
     assert world.client(bare).refused == 401
     wrong = ("y" if token[0] == "x" else "x") + token[1:]
     assert world.client(f"{bare}?token={wrong}").refused == 401
-    port = bare.rpartition(":")[2]
+    port = address_of(world)[1]
+    named = DeafClient(world.url, Host=f"evil.example:{port}")
+    world.until(lambda: named.is_answered)
+    assert named.sock.recv(12) == b"HTTP/1.1 421"
+    named.sock.close()
     for page in ({"Origin": "http://evil.example"}, {"Origin": "null"}):
         strange = ScriptedRosClient(world.url, **page)
         world.until(lambda asked=strange: asked.refused)
@@ -269,29 +298,50 @@ def test_a_client_that_reads_nothing_is_served_no_more_and_disturbs_nobody(world
     assert all(connection.waiting <= 10_000_000 for connection in connections)
 
 
-def test_more_clients_than_there_is_room_for_are_turned_away(world):
+def test_clients_beyond_the_limit_may_only_stop_robots(world):
     clients = [world.client() for _ in range(16)]
     assert all(client.is_open for client in clients)
-    assert world.client().refused == -1
-    clients[0].leave()
-    world.until(lambda: world.client().is_open)
+    robot = drive(world, driver_of(world, clients[0]))
+    late = world.client()
+    assert not late.call(world, "/robot_2/take_control")["success"]
+    late.subscribe("/map")
+    world.until(lambda: late.statuses)
+    assert late.call(world, "/robot_1/emergency_stop")["success"]
+    world.until(lambda: robot.controller.mode == "Idle")
+    clients[1].leave()
+    world.until(lambda: driver(world, "robot_2").is_open)
+    assert not late.closed
 
 
-def test_connections_that_say_nothing_make_room_for_those_that_do(world):
-    port = int(world.url.partition("?")[0].rstrip("/").rpartition(":")[2])
+def test_connections_without_a_token_keep_nobody_out_and_are_closed(world):
     with contextlib.ExitStack() as stack:
-        for _ in range(16):
-            stack.enter_context(socket.create_connection(("127.0.0.1", port)))
-        assert world.client().refused == -1
-        world.until(lambda: world.client().is_open)
+        silent = [
+            stack.enter_context(socket.create_connection(address_of(world))) for _ in range(200)
+        ]
+        client = driver(world)
+        assert client.call(world, "/robot_1/emergency_stop")["success"]
+        assert len(world.server._peers) <= 64
+        closed = []
+
+        def all_are_closed():
+            closed.extend(sock for sock in silent if sock not in closed and is_closed(sock))
+            return len(closed) == 200
+
+        world.until(all_are_closed)
+        assert client.is_open
 
 
 @pytest.mark.parametrize(
-    ("line", "origin"), [("GET //[?token= HTTP/1.1", ""), ("GET / HTTP/1.1", "Origin: http://[")]
+    ("line", "more", "status"),
+    [
+        ("GET //[?token= HTTP/1.1", "", b"400"),
+        ("GET / HTTP/1.1", f"Host: localhost{CRLF}", b"400"),
+        ("GET / HTTP/1.1", f"Origin: http://[{CRLF}", b"403"),
+    ],
 )
-def test_an_address_that_makes_no_sense_is_refused_and_the_drive_goes_on(world, line, origin):
+def test_a_request_that_makes_no_sense_is_refused_and_the_drive_goes_on(world, line, more, status):
     client = driver(world)
-    head = f"{line}\r\nHost: x\r\n{origin}{origin and CRLF}Upgrade: websocket\r\n"
+    head = f"{line}\r\nHost: localhost\r\n{more}Upgrade: websocket\r\n"
     head += "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
     head += "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
     with socket.create_connection(address_of(world)) as rude:
@@ -305,7 +355,7 @@ def test_an_address_that_makes_no_sense_is_refused_and_the_drive_goes_on(world, 
             return answer
 
         world.until(is_refused)
-    assert answer[0].startswith(b"HTTP/1.1 400")
+    assert answer[0].startswith(b"HTTP/1.1 " + status)
     drive(world, client, 0.2)
 
 

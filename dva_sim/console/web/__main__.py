@@ -130,7 +130,7 @@ def _after(task: asyncio.Task[None]) -> asyncio.Event:
 
 def serving(access: Entrance, host: str, port: int) -> dict[str, object]:
     """Return the first message to the simulation: the console's address and its secrets."""
-    base = address_of(own_address(host) if access.any_address else host.strip("[]"), port)
+    base = address_of(own_address(host) if access.own.any_address else host.strip("[]"), port)
     asked = access.tokens.are_asked
     addresses = {
         role.name.lower(): f"{base}?token={access.tokens.of(role)}" if asked else base

@@ -22,7 +22,7 @@ from starlette.websockets import WebSocket
 
 from dva_sim.cameras.streaming import PictureStream
 from dva_sim.cameras.streams import CameraStreams, headers_of
-from dva_sim.console.web.access import Asked, Entrance
+from dva_sim.console.web.access import Entrance
 from dva_sim.console.web.audit import AuditPages
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.log_requests import LogRequests
@@ -32,6 +32,7 @@ from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
 from dva_sim.console.web.static_files import StaticFiles
 from dva_sim.console.wire.roles import Role
 from dva_sim.serving.connection import place_of
+from dva_sim.serving.port_guard import facts_of
 
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
@@ -103,11 +104,11 @@ class Doorkeeper:
     def _refusal(self, scope: Scope) -> Response | None:
         """Response to a request without permission; else the role is noted in the scope."""
         asking = HTTPConnection(scope)
-        headers = asking.headers
-        refusal = self._access.refusal(_asked(scope, headers))
+        is_page = scope["path"] in PAGES or scope["path"] == "/trust"
+        refusal = self._access.own.refusal(facts_of(scope, is_page=is_page))
         if refusal is not None:
             return PlainTextResponse(refusal[1] + "\n", refusal[0], headers=NOT_KEPT)
-        scope[ROLE] = role = self._access.role(headers, asking.query_params)
+        scope[ROLE] = role = self._access.role(asking.headers, asking.query_params)
         if role is Role.NOBODY and scope["path"] not in (OPEN, *UNGUARDED):
             return _unknown(scope["path"])
         return None
@@ -120,20 +121,6 @@ def _with_headers(headers: Any) -> list[tuple[bytes, bytes]]:
     given = {name.lower() for name, _ in headers}
     more = [(k.lower().encode(), v.encode()) for k, v in HEADERS.items()]
     return [*headers, *(pair for pair in more if pair[0] not in given)]
-
-
-def _asked(scope: Scope, headers: Any) -> Asked:
-    hosts = headers.getlist("host")
-    is_http = scope["type"] == "http"
-    return Asked(
-        host=hosts[0] if len(hosts) == 1 else "",
-        origin=headers.get("origin"),
-        site=headers.get("sec-fetch-site", "").lower(),
-        mode=headers.get("sec-fetch-mode", "").lower(),
-        scheme="https" if scope.get("scheme") in ("https", "wss") else "http",
-        changes=not is_http or scope["method"] not in ("GET", "HEAD"),
-        is_page=scope["path"] in PAGES or scope["path"] == "/trust",
-    )
 
 
 def _unknown(path: str) -> Response:

@@ -17,7 +17,6 @@ from starlette.websockets import WebSocket
 from dva_sim.console.web.actions import Bucket, asked_of, check_role, id_of, read
 from dva_sim.console.web.clients import REMEMBERED, Client, Clients, Driver
 from dva_sim.console.web.simulation import Simulation
-from dva_sim.console.web.sockets import heard, say
 from dva_sim.console.web.state import body_of, encode
 from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.arguments import OfRobots
@@ -26,6 +25,7 @@ from dva_sim.console.wire.limits import DRIVES_BURST, DRIVES_RATE, LOOKS_BURST, 
 from dva_sim.console.wire.roles import Role
 from dva_sim.console.wire.seats import REFUSAL
 from dva_sim.serving.connection import wire_of
+from dva_sim.serving.web_sockets import heard, say
 
 TIDY = 10.0  # from one look at silent programs to the next [s]
 WITHOUT_PAGE = ("emergency", "stop", "gone")  # what is done though a page sees nothing

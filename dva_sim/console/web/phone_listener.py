@@ -53,7 +53,7 @@ def listen_for_phones(
     try:
         port = sock.getsockname()[1]
         access = rules(host, port, (*names, *own_hosts(())), tokens, secure=True)
-        shown = own_address(host) if access.any_address else host.strip("[]")
+        shown = own_address(host) if access.own.any_address else host.strip("[]")
         known = Hosts.of(own_hosts([*names, shown]))
         kept = certificates(folder or data_folder() / "phones", known)
     except BaseException:

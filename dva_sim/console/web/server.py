@@ -6,9 +6,9 @@ from pathlib import Path
 
 from starlette.types import ASGIApp
 
-from dva_sim.console.web.sockets import WireProtocol
 from dva_sim.console.wire.limits import MOST_BYTES
 from dva_sim.serving.server import Server
+from dva_sim.serving.web_sockets import WireProtocol
 
 PING = 10.0  # [s]
 

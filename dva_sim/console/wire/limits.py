@@ -26,5 +26,3 @@ LOG_BYTES: Final = 96_000  # of them, so that other lines do not wait for long
 LOG_PERIOD: Final = 0.2  # from one batch to the next, real time [s]
 OWN_KEPT: Final = 64  # lines for one page alone that may wait
 STORY_KEPT: Final = 1000  # lines of the story, for pages that come later
-STALLED: Final = 5.0  # without a byte taken, a page is dropped [s]
-FAREWELL: Final = 10.0  # for what is on its way to a page that was dropped [s]

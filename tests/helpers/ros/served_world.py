@@ -12,8 +12,8 @@ from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.network.realtime import PacedClock
 from dva_sim.ros.gateway import RosGateway
-from dva_sim.ros.options import open_port
 from dva_sim.ros.server import RosbridgeServer
+from dva_sim.serving.open_port import open_port
 from dva_sim.simulation.scenario import build
 
 SOURCE = {
@@ -42,9 +42,7 @@ class ServedWorld:
         self.url, self.lines = door.url, []
         stage = self.world.run.stage
         self.gateway = RosGateway(stage, lambda: self.world.console)
-        self.server = RosbridgeServer(
-            *(self.clock, door.listener, self.gateway, stage.site), door.token, self.lines.append
-        )
+        self.server = RosbridgeServer(self.clock, door, self.gateway, stage.site, self.lines.append)
         self.until(lambda: len(self.gateway.robots) == 2)
 
     def until(self, true) -> None:

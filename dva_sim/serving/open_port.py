@@ -1,12 +1,15 @@
-"""Options of a server for ROS clients, and the announcement of its address."""
+"""A port for programs of other makes, with its token and the announcement of its address."""
 
 from __future__ import annotations
 
+import json
 import os
 import secrets
 import socket
+from collections.abc import Collection
 from dataclasses import dataclass
 
+from dva_sim.serving.admission import Admission, own_names
 from dva_sim.serving.listening import listen
 
 
@@ -25,12 +28,12 @@ class OpenPort:
     host: str
 
     def passed(self) -> tuple[int, int]:
-        """Return open files for another process: the listener, and a pipe that holds the token.
+        """Return open files for another process: the listener, and a pipe with token and host.
 
         Words of a command would show the token to everybody on this machine.
         """
         reader, writer = os.pipe()
-        os.write(writer, self.token.encode())
+        os.write(writer, json.dumps([self.token, self.host]).encode())
         os.close(writer)
         return self.listener.fileno(), reader
 
@@ -38,7 +41,16 @@ class OpenPort:
     def received(cls, listener: int, token: int) -> OpenPort:
         """Return the port that another process has passed."""
         with os.fdopen(token, "rb") as pipe:
-            return cls(socket.socket(fileno=listener), pipe.read().decode(), "")
+            return cls(socket.socket(fileno=listener), *json.load(pipe))
+
+    def admission(self, programs: Collection[str] = ()) -> Admission:
+        """Return the rules of its clients.
+
+        Args:
+            programs: Origins of programs elsewhere that may ask, with the token.
+        """
+        names = own_names(self.host, any_port=True, programs=programs)
+        return Admission(names, self.token)
 
     @property
     def url(self) -> str:

@@ -1,18 +1,20 @@
-"""WebSockets to pages that may be slow, hostile or gone: one message in flight, and a deadline."""
+"""WebSockets to clients that may be slow, hostile or gone: one message in flight, a deadline."""
 
 from __future__ import annotations
 
 import asyncio
 from contextlib import suppress
-from typing import Any
+from typing import Any, Final
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.exceptions import InvalidState
 
-from dva_sim.console.wire.limits import FAREWELL, STALLED
 from dva_sim.serving.connection import PLACE, WIRE, extended, wire_of
 from dva_sim.serving.port_connections import PortConnection
+
+STALLED: Final = 5.0  # without a byte taken, a client is dropped [s]
+FAREWELL: Final = 10.0  # for what is on its way to a client that was dropped [s]
 
 
 class WireProtocol(WebSocketsSansIOProtocol):
@@ -35,14 +37,14 @@ class WireProtocol(WebSocketsSansIOProtocol):
 
     @property
     def waiting(self) -> int:
-        """Bytes that the page has not taken yet."""
+        """Bytes that the client has not taken yet."""
         return self.transport.get_write_buffer_size()
 
     def drop(self, code: int, reason: str) -> None:
         """Say why behind what is on its way, and wait no longer than a moment for all of it."""
         if self.disconnected or self.close_sent:
             return
-        with suppress(InvalidState):  # the page is closing it at this moment
+        with suppress(InvalidState):  # the client is closing it at this moment
             self.conn.send_close(code, reason)
         self.transport.write(b"".join(self.conn.data_to_send()))
         self.close_sent = True
@@ -50,14 +52,15 @@ class WireProtocol(WebSocketsSansIOProtocol):
         self.loop.call_later(FAREWELL, self.transport.abort)
 
 
-async def say(ws: WebSocket, text: str) -> bool:
-    """Send a message: False if the page has not taken a byte for too long."""
+async def say(ws: WebSocket, message: str | bytes) -> bool:
+    """Send a message: False if the client has not taken a byte for too long."""
     wire = wire_of(ws.scope)
     before = wire.waiting
+    leaving = ws.send_text(message) if isinstance(message, str) else ws.send_bytes(message)
     if not before:
-        await ws.send_text(text)
+        await leaving
         return True
-    sending = asyncio.ensure_future(ws.send_text(text))
+    sending = asyncio.ensure_future(leaving)
     try:
         while True:
             done, _ = await asyncio.wait({sending}, timeout=STALLED)
@@ -72,7 +75,7 @@ async def say(ws: WebSocket, text: str) -> bool:
 
 
 async def heard(ws: WebSocket) -> str | bytes | None:
-    """The next message of a page; None if it is gone."""
+    """Return the next message of a client; None if it is gone."""
     try:
         message = await ws.receive()
     except (WebSocketDisconnect, RuntimeError):
