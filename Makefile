@@ -118,7 +118,7 @@ $(DEV): pyproject.toml constraints.txt | $(VENV)
 
 $(EXTRAS): $(DEV)
 	@echo "Installing the extras: middleware for transports, Gymnasium ..."
-	@$(PIP) install -c constraints.txt -e '.[dev,mqtt,zenoh,webrtc,dds,rl,ros,foxglove]'
+	@$(PIP) install -c constraints.txt -e '.[dev,mqtt,zenoh,webrtc,dds,rl,ros]'
 	@touch $@ $(DEV) $(RUNTIME)
 
 $(BENCH): $(DEV)

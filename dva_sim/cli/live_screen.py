@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console, Group
@@ -19,14 +19,16 @@ from dva_sim.cli.verbosity import detail, is_verbose
 from dva_sim.core.registry import DETECTOR
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live import process
-from dva_sim.live.foxglove_server import FoxgloveServer
-from dva_sim.live.options import PARTS, LiveOptions
+from dva_sim.live.options import LOCALHOST, PARTS, LiveOptions
 from dva_sim.live.process import Report, run_part
 from dva_sim.live.supervisor import Summary, Supervisor
 from dva_sim.network.sockets import DEFAULT_PORT
 from dva_sim.serving.open_port import OpenPort, open_port
 from dva_sim.simulation.full.verdicts import Verdict, refuse_broken
 from dva_sim.simulation.scenario import contradictions
+
+if TYPE_CHECKING:
+    from dva_sim.live.foxglove_server import FoxgloveServer
 
 STORY_LINES = 12
 ALWAYS_SHOWN = "refused", "not sent", "form", "not recorded"  # in the names of counters
@@ -136,7 +138,10 @@ def run_all(options: LiveOptions) -> None:
     with ExitStack() as at_end:
         viewer = None
         if options.foxglove is not None:
-            viewer = FoxgloveServer(options.read(), options.seed, options.foxglove)
+            from dva_sim.live.foxglove_server import FoxgloveServer  # late: start-up
+
+            port = open_port(LOCALHOST, options.foxglove, "--foxglove", options.token)
+            viewer = FoxgloveServer(options.read(), options.seed, port)
             at_end.callback(viewer.close)
             _print(console, viewer.where)
         summary = _watched(console, board, partial(Supervisor, options), door, viewer)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
 from dva_sim.cameras.children import ChildFailed
@@ -17,7 +17,7 @@ from dva_sim.console.run.recorder import keep_run
 from dva_sim.console.world.kept_results import KeptResults
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.kernel.errors import DvaSimError
-from dva_sim.live.foxglove_server import FoxgloveServer
+from dva_sim.live.options import LOCALHOST
 from dva_sim.live.pipes import Inlets
 from dva_sim.live.process import ending_when_asked
 from dva_sim.live.recording import Keeper, LiveRecorder
@@ -29,6 +29,9 @@ from dva_sim.serving.open_port import open_port
 from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation.full.verdicts import refuse_broken, verdicts
 from dva_sim.simulation.scenario import Scenario
+
+if TYPE_CHECKING:
+    from dva_sim.live.foxglove_server import FoxgloveServer
 
 LAST_WORDS = 0.2  # of virtual time, for robots that are told to stop [s]
 
@@ -146,9 +149,13 @@ class ConsoleSupervisor:
 
     def _open_foxglove(self, world: ConsoleWorld) -> FoxgloveServer | None:
         """Serve the run to Foxglove, if that is wanted."""
-        if self._options.foxglove is None:
+        options = self._options
+        if options.foxglove is None:
             return None
-        viewer = FoxgloveServer(world.scenario, world.seed, self._options.foxglove)
+        from dva_sim.live.foxglove_server import FoxgloveServer  # late: start-up
+
+        port = open_port(LOCALHOST, options.foxglove, "--foxglove", options.token)
+        viewer = FoxgloveServer(world.scenario, world.seed, port)
         self._say(viewer.where)
         return viewer
 

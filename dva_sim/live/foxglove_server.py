@@ -1,13 +1,14 @@
 """A server for Foxglove: what a recording would hold, while the run goes on.
 
-The server is that of Foxglove's SDK, which sends from threads of its own and takes nothing from
-its clients. It knows no tokens, so it listens on this machine alone.
+It has a thread with an event loop of its own, and takes nothing from its viewers but their
+subscriptions. It listens on this machine alone.
 """
 
 from __future__ import annotations
 
+import asyncio
 import json
-import logging
+import secrets
 import threading
 import urllib.request
 from collections.abc import Iterable
@@ -15,132 +16,174 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
-from dva_sim.kernel.errors import ConfigError
+from starlette.applications import Starlette
+from starlette.responses import PlainTextResponse
+from starlette.routing import WebSocketRoute
+from starlette.websockets import WebSocket
+
+from dva_sim.live.foxglove_viewer import PROTOCOLS, FoxgloveViewer, ViewedChannel
 from dva_sim.live.running_channels import RunningChannels
 from dva_sim.recordings import channels
 from dva_sim.recordings.messages import XML, ChannelMessage, nanoseconds
-from dva_sim.recordings.writing import schema_of_channel
+from dva_sim.recordings.writing import packed
+from dva_sim.serving.open_port import OpenPort
+from dva_sim.serving.port_connections import PortConnections
+from dva_sim.serving.port_guard import PortGuard
+from dva_sim.serving.server import Server, serve
+from dva_sim.serving.web_sockets import WireProtocol, heard, say
 from dva_sim.simulation.scenario import Scenario
 
 LAYOUT: Final = Path(channels.__file__).with_name("foxglove_layout.json")  # panels of a run
-LOCALHOST: Final = "127.0.0.1"
-MISSING: Final = "--foxglove needs Foxglove's SDK: pip install 'dva-sim[foxglove]'"
-BACKLOG: Final = 4096  # messages that wait for a client; then its oldest ones are dropped
+PROGRAMS: Final = "https://app.foxglove.dev", "file://"  # Foxglove in a browser, and its program
+MOST_REQUEST: Final = 100_000  # design: of a viewer [B]
+MOST_CONNECTIONS, MOST_VIEWERS = 64, 16
+PING: Final = 2.0  # design: between two pings [s]
+PONG_WITHIN: Final = 3.0  # design: then a viewer is cut [s]
+ENDS_WITHIN: Final = 5.0  # design: [s]
 LOOK: Final = 0.5  # between two looks at which cameras are watched [s]
 STREAM_WITHIN: Final = 5.0  # for a picture to come [s]
 LARGEST: Final = 2_000_000  # of a picture [B]
+
+
+Shown = tuple[ViewedChannel, int, bytes]  # with its time [ns]
 
 
 class FoxgloveServer:
     """Serves one run.
 
     Args:
+        scenario: Scenario of the run.
         seed: Random seed.
-        port: To listen on; 0 for any that is free.
+        port: Port to serve.
 
     Attributes:
         camera_base: URL below which the robots' pictures are; empty: nowhere.
         camera_token: Shown there; empty: none.
         failures: Lines that could not be shown.
-
-    Raises:
-        ConfigError: the SDK is not installed, or the port is taken.
     """
 
-    def __init__(self, scenario: Scenario, seed: int, port: int) -> None:
-        try:
-            import foxglove  # late: start-up
-        except ImportError:
-            raise ConfigError(MISSING) from None
-        logging.getLogger("foxglove").setLevel(logging.ERROR)
-        self._sdk: Any = foxglove
-        self._running = RunningChannels(scenario, seed)
+    def __init__(self, scenario: Scenario, seed: int, port: OpenPort) -> None:
+        self._port, self._running = port, RunningChannels(scenario, seed)
         self._lock, self._is_over = threading.Lock(), threading.Event()
-        self._context = foxglove.Context()
-        self._channels: dict[str, Any] = {}
-        self._viewed: dict[str, threading.Thread] = {}
+        self._channels: dict[str, ViewedChannel] = {}
+        self._by_number: dict[int, ViewedChannel] = {}
+        self._viewers: set[FoxgloveViewer] = set()
+        self._session, self._announced = secrets.token_hex(8), 0
+        self._read_by: dict[str, threading.Thread] = {}
         self.camera_base, self.camera_token, self.failures = "", "", 0
-        try:
-            self._server = foxglove.start_server(
-                name="dva-sim",
-                host=LOCALHOST,
-                port=port,
-                capabilities=[foxglove.Capability.Time],
-                server_listener=self._listener(),
-                context=self._context,
-                message_backlog_size=BACKLOG,
-            )
-        except (OSError, RuntimeError, ValueError) as error:
-            text = f"cannot listen on {LOCALHOST} port {port}: {error}"
-            raise ConfigError(f"{text}; give another --foxglove, or --foxglove 0") from None
+        self._loop, self._ended = asyncio.new_event_loop(), asyncio.Event()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
         threading.Thread(target=self._look_at_cameras, daemon=True).start()
-
-    @property
-    def url(self) -> str:
-        """Return the address that Foxglove opens."""
-        return f"ws://{LOCALHOST}:{self._server.port}"
 
     @property
     def where(self) -> str:
         """Return a line that says where it is, and where a layout for it."""
-        return f"Foxglove: {self.url} (layout: {LAYOUT})"
+        return f"Foxglove: {self._port.url} (layout: {LAYOUT})"
 
-    def _listener(self) -> Any:
-        """Return a listener that tells late viewers of the scene what is there."""
-        server = self
+    # --- viewers, in the thread of the event loop --------------------------------------------
 
-        class Listener(self._sdk.ServerListener):  # type: ignore[misc,name-defined]
-            def on_subscribe(self, _: Any, channel: Any) -> None:
-                if channel.topic == channels.TOPIC:
-                    server.tell_scene()
+    def _serve(self) -> None:
+        app = Starlette(routes=[WebSocketRoute("/", self._view)])
+        server = Server.of(
+            PortGuard(app, self._port.admission(PROGRAMS)),
+            MOST_REQUEST,
+            ws=WireProtocol,
+            ws_max_size=MOST_REQUEST,
+            ws_ping_interval=PING,
+            ws_ping_timeout=PONG_WITHIN,
+            ws_per_message_deflate=False,
+        )
+        places = PortConnections(MOST_CONNECTIONS, MOST_VIEWERS)
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+            runner.run(serve(server, self._port.listener, places, self._ended))
 
-        return Listener()
+    async def _view(self, ws: WebSocket) -> None:
+        protocol = next((name for name in PROTOCOLS if name in ws.scope["subprotocols"]), None)
+        if protocol is None:
+            text = f"a viewer should offer the subprotocol {PROTOCOLS[0]}\n"
+            await ws.send_denial_response(PlainTextResponse(text, 400))
+            return
+        await ws.accept(protocol)
+        viewer = FoxgloveViewer(self._session)
+        viewer.advertise(self._by_number.values())
+        self._viewers.add(viewer)
+        tasks = {asyncio.ensure_future(work(ws, viewer)) for work in (self._send, self._hear)}
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._viewers.discard(viewer)
+            viewer.leave()
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
 
-    def tell_scene(self) -> None:
-        """Say again what stands on the site."""
+    @staticmethod
+    async def _send(ws: WebSocket, viewer: FoxgloveViewer) -> None:
+        while await say(ws, await viewer.next()):
+            pass
+
+    async def _hear(self, ws: WebSocket, viewer: FoxgloveViewer) -> None:
+        while (text := await heard(ws)) is not None:
+            if channels.TOPIC in viewer.take(text, self._by_number):
+                await asyncio.to_thread(self._tell_scene)
+
+    def _show(self, new: list[ViewedChannel], messages: list[Shown], time: int | None) -> None:
+        self._by_number |= {channel.number: channel for channel in new}
+        for viewer in self._viewers:
+            viewer.advertise(new)
+            for channel, at, content in messages:
+                viewer.show(channel, at, content)
+            if time is not None:
+                viewer.tell_time(time)
+
+    # --- the run, in any thread --------------------------------------------------------------
+
+    def _tell_scene(self) -> None:
+        """Say again what stands on the site, for a viewer that comes late."""
         with self._lock:
             self._log(self._running.standing())
 
     def keep(self, lines: bytes) -> None:
         """Take whole lines of the run's parts; any thread may."""
         with self._lock:
-            before = self._running.now
+            before, messages = self._running.now, []
             for line in lines.splitlines():
                 # These lines are judged by the safety rules as well, by the thread that calls.
                 try:
-                    self._take(json.loads(line))
+                    messages += self._take(json.loads(line))
                 except (ValueError, LookupError, TypeError):
                     self.failures += 1
-            if self._running.now != before and not self._is_over.is_set():
-                self._server.broadcast_time(nanoseconds(self._running.now))
+            now = self._running.now
+            self._log(messages, nanoseconds(now) if now != before else None)
 
-    def _take(self, line: list[Any]) -> None:
+    def _take(self, line: list[Any]) -> list[ChannelMessage]:
         if line[0] == "cameras":
             self.camera_base = line[1]
-        else:
-            self._log(self._running.take(line))
+            return []
+        return list(self._running.take(line))
 
-    def _log(self, messages: Iterable[ChannelMessage]) -> None:
+    def _log(self, messages: Iterable[ChannelMessage], time: int | None = None) -> None:
+        """Show new channels, messages to their subscribers, and the time [ns]."""
+        entries = []
         for message in messages:
-            if not self._is_over.is_set():
-                channel = self._channel(message.topic, message.schema)
-                if channel.has_sinks():
-                    channel.log(message.content, log_time=nanoseconds(message.time))
+            channel = self._channel(message.topic, message.schema)
+            if channel.viewers:
+                at, _, _, content = packed(message)
+                entries.append((channel, at, content))
+        new = list(self._channels.values())[self._announced :]
+        self._announced += len(new)
+        if not self._is_over.is_set():
+            self._loop.call_soon_threadsafe(self._show, new, entries, time)
 
-    def _channel(self, topic: str, schema: str) -> Any:
-        """A channel, which is advertised with its first message."""
-        known = self._channels.get(topic)
-        if known is None:
-            name, encoding, text = schema_of_channel(schema)
-            form = self._sdk.Schema(name=name, encoding=encoding, data=text)
-            known = self._sdk.Channel(
-                topic,
-                schema=form,
-                message_encoding=XML if schema == XML else "json",
-                context=self._context,
-            )
-            self._channels[topic] = known
-        return known
+    def _channel(self, topic: str, schema: str) -> ViewedChannel:
+        """Return a channel, which is advertised with its first message."""
+        channel = self._channels.get(topic)
+        if channel is None:
+            encoding = XML if schema == XML else "json"
+            channel = ViewedChannel(len(self._channels) + 1, topic, schema, encoding)
+            self._channels[topic] = channel
+        return channel
 
     # --- pictures ------------------------------------------------------------------------
 
@@ -149,15 +192,16 @@ class FoxgloveServer:
         while not self._is_over.wait(LOOK):
             with self._lock:
                 robots = self._running.robots if self.camera_base else []
-                found = [(name, self._image(name)) for name in robots]
-            for name, channel in found:
-                reader = self._viewed.get(name)
-                if channel.has_sinks() and (reader is None or not reader.is_alive()):
+                images = [(name, self._image(name)) for name in robots]
+                self._log([])  # viewers have to hear of them
+            for name, channel in images:
+                reader = self._read_by.get(name)
+                if channel.viewers and (reader is None or not reader.is_alive()):
                     reader = threading.Thread(target=self._read, args=(name,), daemon=True)
-                    self._viewed[name] = reader
+                    self._read_by[name] = reader
                     reader.start()
 
-    def _image(self, name: str) -> Any:
+    def _image(self, name: str) -> ViewedChannel:
         return self._channel(f"/{name}/{channels.IMAGE}", "foxglove.CompressedImage")
 
     def _read(self, name: str) -> None:
@@ -165,7 +209,7 @@ class FoxgloveServer:
         query = f"?token={self.camera_token}" if self.camera_token else ""
         url = f"{self.camera_base}camera/{name}.mjpg{query}"
         with suppress(OSError, ValueError), urllib.request.urlopen(url, timeout=STREAM_WITHIN) as s:
-            while not self._is_over.is_set() and self._image(name).has_sinks():
+            while not self._is_over.is_set() and self._image(name).viewers:
                 length, captured = _head(s)
                 picture = channels.picture(captured, name, s.read(length))
                 with self._lock:
@@ -175,7 +219,8 @@ class FoxgloveServer:
         """Serve no longer."""
         with self._lock:
             self._is_over.set()
-        self._server.stop()
+            self._loop.call_soon_threadsafe(self._ended.set)
+        self._thread.join(ENDS_WITHIN)
 
 
 def _head(stream: Any) -> tuple[int, float]:

@@ -12,10 +12,9 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from dva_sim.kernel.errors import ERROR, DvaSimError, ExitCode, RunsFailed
-from dva_sim.live.foxglove_server import FoxgloveServer
 from dva_sim.live.options import PATHS, ROSBRIDGE, LiveOptions
 from dva_sim.live.process import Report
 from dva_sim.live.recording import RunKeeping
@@ -26,6 +25,9 @@ from dva_sim.network.emulator.report import LinkReport
 from dva_sim.serving.open_port import OpenPort
 from dva_sim.simulation.full.verdicts import Verdict, broken_rules
 from dva_sim.simulation.scenario import Scenario
+
+if TYPE_CHECKING:
+    from dva_sim.live.foxglove_server import FoxgloveServer
 
 SPEAK_WITHIN = 60.0  # for a part to speak, from its start and after each time [s]
 END_WITHIN = 5.0  # for a part to end by itself once it is asked to [s]

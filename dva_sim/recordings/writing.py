@@ -287,11 +287,11 @@ def _add_messages(
         return int(writer.register_channel(topic, XML, number, ends))
 
     answer_text = chain(every_message(playback), decided)
-    every = [_packed(message) for message in answer_text]
+    every = [packed(message) for message in answer_text]
     plan = next((data for name, data in files.items() if name.endswith(".geojson")), None)
     if plan is not None:
         plan_message = ChannelMessage(0.0, "/plan", "foxglove.GeoJSON", {"geojson": plan.decode()})
-        every.insert(0, _packed(plan_message))
+        every.insert(0, packed(plan_message))
     for time, topic, schema, data in sorted(every, key=lambda entry: entry[0]):
         channel = channel_of(topic, schema)
         counts[topic] += 1
@@ -299,7 +299,8 @@ def _add_messages(
     writer.add_metadata(COUNTS, {topic: str(count) for topic, count in sorted(counts.items())})
 
 
-def _packed(message: ChannelMessage) -> tuple[int, str, str, bytes]:
+def packed(message: ChannelMessage) -> tuple[int, str, str, bytes]:
+    """Return a message's time [ns], topic, schema and content, as a file and a viewer get it."""
     content = message.content if message.schema == XML else _json(message.content)
     return messages.nanoseconds(message.time), message.topic, message.schema, content
 

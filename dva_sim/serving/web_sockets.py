@@ -35,6 +35,11 @@ class WireProtocol(WebSocketsSansIOProtocol):
         super().connection_lost(exc)
         self._place.leave()
 
+    def keepalive_timeout(self) -> None:
+        """Cut a client that answers no ping; it will not read what waits for it either."""
+        super().keepalive_timeout()
+        self.transport.abort()
+
     @property
     def waiting(self) -> int:
         """Bytes that the client has not taken yet."""

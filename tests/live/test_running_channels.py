@@ -1,25 +1,29 @@
 """A run that goes on, as Foxglove gets it: the messages of its recording, with their schemas."""
 
+import asyncio
 import json
+import time
 
 import jsonschema
 import pytest
 from helpers.foxglove.viewer import Viewer
+from helpers.network.port_visitors import DeafClient, is_closed
 from helpers.processes.patience import becomes
 from helpers.wording import unnamed
 
 from dva_sim.console.run.recorder import ConsoleRecorder, keep_run
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.live import foxglove_server
 from dva_sim.live.foxglove_server import LAYOUT, FoxgloveServer
+from dva_sim.live.foxglove_viewer import FoxgloveViewer, ViewedChannel
 from dva_sim.live.recorded_lines import lines_of_part
 from dva_sim.live.recording import Keeper, LiveRecorder
 from dva_sim.live.running_channels import RunningChannels
 from dva_sim.recordings import channels
 from dva_sim.recordings.messages import SCHEMAS, XML
-from dva_sim.recordings.writing import every_message
+from dva_sim.recordings.writing import every_message, schema_of_channel
 from dva_sim.serving.listening import listen
+from dva_sim.serving.open_port import open_port
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.run import Run, Watched
 
@@ -126,17 +130,20 @@ def test_every_topic_of_the_layout_is_one_that_is_served(running):
 # --- the server, by its own wire ---------------------------------------------------------
 
 
+def url_of(server):
+    return server.where.split()[1]
+
+
 @pytest.fixture
 def server(run):
-    pytest.importorskip("foxglove", reason="needs Foxglove's SDK: pip install 'dva-sim[foxglove]'")
-    server = FoxgloveServer(run[0], SEED, 0)
+    server = FoxgloveServer(run[0], SEED, open_port("127.0.0.1", 0, "--foxglove"))
     yield server
     server.close()
 
 
 @pytest.mark.system
 def test_a_viewer_gets_channels_schemas_and_messages_and_time(run, server):
-    viewer, lines = Viewer(server.url), run[1]
+    viewer, lines = Viewer(url_of(server)), run[1]
     assert becomes(lambda: viewer.info)
     assert viewer.info["name"] == "dva-sim"
     server.keep(b"".join(lines[:50]))
@@ -158,7 +165,7 @@ def test_a_viewer_gets_channels_schemas_and_messages_and_time(run, server):
 
 @pytest.mark.system
 def test_lines_that_make_no_sense_are_counted_and_the_next_ones_shown(run, server):
-    viewer = Viewer(server.url)
+    viewer = Viewer(url_of(server))
     assert becomes(lambda: viewer.info)
     bad = [b"no json", b"[]", b'["told", 1]', b'["at", "x", 7]', b'["frame", 1, 2, 3]', b"null"]
     server.keep(b"\n".join(bad) + b"\n" + b"".join(run[1][:50]))
@@ -168,14 +175,108 @@ def test_lines_that_make_no_sense_are_counted_and_the_next_ones_shown(run, serve
 
 
 @pytest.mark.system
-def test_a_port_that_is_taken_and_a_missing_sdk_are_told_in_one_line(run, monkeypatch):
-    pytest.importorskip("foxglove", reason="needs Foxglove's SDK: pip install 'dva-sim[foxglove]'")
+@pytest.mark.parametrize(
+    ("headers", "token", "status"),
+    [
+        ({}, True, 101),
+        ({"Origin": "https://app.foxglove.dev"}, True, 101),
+        ({"Origin": "file://"}, True, 101),
+        ({"Origin": "https://evil.example"}, True, 403),
+        ({"Origin": "null"}, True, 403),
+        ({"Host": "evil.example"}, True, 421),
+        ({"Origin": "http://evil.example", "Host": "evil.example"}, True, 421),
+        ({}, False, 401),
+        ({"Sec-WebSocket-Protocol": "chat"}, True, 400),
+    ],
+    ids=str,
+)
+def test_a_viewer_needs_the_token_a_name_of_this_machine_and_no_foreign_page(
+    server, headers, token, status
+):
+    url = url_of(server) if token else url_of(server).partition("?")[0]
+    more = {"Sec-WebSocket-Protocol": "foxglove.sdk.v1"} | headers
+    assert answered(DeafClient(url, **more)) == status
+
+
+@pytest.mark.system
+def test_the_wire_is_that_of_foxgloves_own_server(run, server):
+    import foxglove
+
+    name, encoding, text = schema_of_channel("foxglove.Log")
+    context = foxglove.Context()
+    theirs = foxglove.start_server(host="127.0.0.1", port=0, context=context)
+    schema = foxglove.Schema(name=name, encoding=encoding, data=text)
+    channel = foxglove.Channel("/story", schema=schema, message_encoding="json", context=context)
+    entries = []
+    for url, log in (
+        (f"ws://127.0.0.1:{theirs.port}", lambda: channel.log({"a": 1}, log_time=10)),
+        (url_of(server), lambda: server.keep(b'["told", 1.0, "dva", "begins", "event"]\n')),
+    ):
+        viewer = Viewer(url)
+        assert becomes(lambda viewer=viewer: viewer.info)
+        log()
+        assert becomes(lambda viewer=viewer: "/story" in viewer.channels)
+        assert becomes(lambda viewer=viewer, log=log: log() or viewer.came.get("/story"))
+        entries.append((viewer.channels["/story"] | {"id": 1}, viewer.info.keys() - {"metadata"}))
+        viewer.leave()
+    theirs.stop()
+    assert entries[0] == entries[1]
+
+
+@pytest.mark.system
+def test_a_viewer_that_is_stopped_loses_its_place_and_its_subscriptions(run, server):
+    server.keep(b"".join(run[1][:50]))
+    frozen = DeafClient(url_of(server), **{"Sec-WebSocket-Protocol": "foxglove.websocket.v1"})
+    assert becomes(lambda: frozen.is_answered)
+    frozen.say({"op": "subscribe", "subscriptions": [{"id": 9, "channelId": 1}]})
+    assert becomes(lambda: len(subscribed(server)) == 1)
+    silent_since = time.monotonic()
+    assert becomes(lambda: not subscribed(server))
+    assert time.monotonic() - silent_since < 15.0  # 20 s are TCP's own limit
+    assert is_closed(frozen.sock)
+    frozen.sock.close()
+
+
+def subscribed(server):
+    return [channel for channel in server._channels.values() if channel.viewers]
+
+
+def answered(client):
+    assert becomes(lambda: client.is_answered)
+    status = int(client.sock.recv(12).split()[1])
+    client.sock.close()
+    return status
+
+
+def test_what_a_viewer_does_not_read_is_dropped_oldest_first():
+    viewer = FoxgloveViewer("run")
+    channel = ViewedChannel(1, "/tf", "foxglove.FrameTransforms", "json")
+    wish = {"op": "subscribe", "subscriptions": [{"id": 7, "channelId": 1}]}
+    assert viewer.take(json.dumps(wish), {1: channel}) == {"/tf"}
+    for number in range(20):
+        viewer.show(channel, number, bytes(1_000_000))
+    asyncio.run(viewer.next())  # the server's info
+    times = [int.from_bytes(asyncio.run(viewer.next())[5:13], "little") for _ in range(7)]
+    assert times == list(range(13, 20))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "[]", "{}", "[" * 50_000, '{"op": "advertise"}', '{"op": "subscribe"}'),
+        '{"op": "subscribe", "subscriptions": [{"id": "x"}]}',
+        '{"op": "unsubscribe", "subscriptionIds": 1}',
+    ],
+    ids=lambda text: text[:40],
+)
+def test_a_request_that_makes_no_sense_is_left_out(text):
+    assert FoxgloveViewer("run").take(text, {}) == set()
+
+
+@pytest.mark.system
+def test_a_port_that_is_taken_is_told_in_one_line():
     with listen("127.0.0.1", 0) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(ConfigError) as refused:
-            FoxgloveServer(run[0], SEED, port)
+            open_port("127.0.0.1", port, "--foxglove")
     assert unnamed(refused.value, port, "--foxglove") == []
-    monkeypatch.setitem(__import__("sys").modules, "foxglove", None)
-    with pytest.raises(ConfigError) as refused:
-        FoxgloveServer(run[0], SEED, 0)
-    assert str(refused.value) == foxglove_server.MISSING

@@ -63,7 +63,6 @@ def test_a_robot_of_ros_without_a_dva_ends_in_one_line(programs):
 
 @pytest.mark.parametrize("command", ["live", "console"])
 def test_clients_of_ros_and_foxglove_see_what_runs(programs, command):
-    pytest.importorskip("foxglove", reason="needs Foxglove's SDK: pip install 'dva-sim[foxglove]'")
     more = ("--for", "300") if command == "live" else ("--no-open", "--port", "0")
     run = programs.start(*(command, "fire-drill", "--rosbridge", "0", "--foxglove", "0"), *more)
     client = ScriptedRosClient(address(run, "rosbridge"))

@@ -7,13 +7,11 @@ References:
 import contextlib
 import json
 import threading
-import time
 
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 MESSAGE_DATA, TIME = 1, 2
-MOST_TRIES = 20
 
 
 class Viewer:
@@ -27,7 +25,7 @@ class Viewer:
 
     def __init__(self, url: str, wants=lambda topic: True) -> None:
         self.channels, self.came, self.times, self.info = {}, {}, [], {}
-        self._wants, self._topics, self._tries = wants, {}, 0
+        self._wants, self._topics = wants, {}
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, args=(url,), daemon=True)
         self._thread.start()
@@ -53,13 +51,6 @@ class Viewer:
             self.channels[channel["topic"]] = channel
             if self._wants(channel["topic"]):
                 self._subscribe(channel)
-        if message["op"] == "status" and message.get("level", 0) > 0 and self._tries < MOST_TRIES:
-            # The server may advertise a channel a moment before it knows it itself.
-            self._tries += 1
-            time.sleep(0.05)
-            for topic in self.channels.keys() - self.came.keys():
-                if self._wants(topic):
-                    self._subscribe(self.channels[topic])
 
     def _subscribe(self, channel: dict) -> None:
         number = len(self._topics) + 1
