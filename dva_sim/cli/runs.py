@@ -158,7 +158,10 @@ def _show_replay(**asked: Any) -> None:
     transport=_TRANSPORT,
     rosbridge=_ROSBRIDGE,
     foxglove=_FOXGLOVE,
-    no_token=(flag("--no-token", "Let any client use --rosbridge and --foxglove without a token."), False),
+    no_token=(
+        flag("--no-token", "Let any client use --rosbridge and --foxglove without a token."),
+        False,
+    ),
     **RUN,
 )
 def live(

@@ -23,13 +23,19 @@ class Stop:
         stopped_by: Id of the device that sent it; None: the robot's own button.
         tick: The robot's own clock at the newest emergency [ms].
         heard: Time at which the robot last said so [s].
+        since: Time at which it was stopped [s].
         released: Person who has released it.
     """
 
     stopped_by: str | None
     tick: int
     heard: float
+    since: float
     released: Choice | None = None
+
+    def message(self, now: float) -> m.RobotEmergency:
+        """Return the emergency as the robot reports it."""
+        return m.RobotEmergency(self.stopped_by, max(0.0, now - self.since), self.tick)
 
 
 @dataclass
@@ -58,7 +64,7 @@ class Emergencies:
         if stop is not None and stop.tick == emergency.tick:
             stop = replace(stop, heard=now)
         else:
-            stop = Stop(emergency.stopped_by, emergency.tick, now)
+            stop = Stop(emergency.stopped_by, emergency.tick, now, now - emergency.stopped_for)
             self.changes += 1
         self._stops[robot] = stop
         return stop

@@ -294,7 +294,7 @@ class Store:
             dva.sessions.tell_robot(PermissionRevocation(*json.loads(data)))
         for robot, data in self._sessions["stops"].items():
             stopped_by, tick = json.loads(data)
-            dva.emergencies.restore(robot, Stop(stopped_by, tick, now))
+            dva.emergencies.restore(robot, Stop(stopped_by, tick, now, now))
         self._session_changes, self._held = _session_changes(dva), _held(dva)
         self._lasting = dva.with_something_open()
         permissions.count = max(permissions.count, self._about("sessions"))

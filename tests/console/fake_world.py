@@ -356,6 +356,7 @@ class FakeWorld(FakePhones, FakeControlRoom):
             "commands_hz": 10.0 if left is not None else 0.0,
             "refused": 0,
             "timeouts": 0,
+            "emergency": None,
         }
 
     # --- time ----------------------------------------------------------------------------

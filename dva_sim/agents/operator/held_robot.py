@@ -401,10 +401,10 @@ class HeldRobot:
         return goes_on
 
     def _lost(self, why: str) -> None:
-        """Nobody replies: stop the robot by every path that may still work."""
+        """End the drive, as nobody replies; the watchdog has stopped the robot by then, or will."""
         self.end("lost link")
         self._alert(f"{self.label}: link lost: {why}")
-        self.device.ask(self.robot, m.Emergency(), session=self.session)
+        self.device.ask(self.robot, m.StopTeleOp(), session=self.session)
 
     def _refused(self, why: str) -> None:
         self.end("refused")

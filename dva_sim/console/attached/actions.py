@@ -8,7 +8,9 @@ from typing import Final
 from dva_sim.console.asking.answers import BYE
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import OnResult, Refused, unanswered
+from dva_sim.console.asking.releases import release_robots
 from dva_sim.console.attached.decisions import AttachedDecisions
+from dva_sim.console.attached.lines import emergency_of
 from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.events.alarm_actions import AlarmActions
 from dva_sim.console.wire.actions import ActionPlace, Asked
@@ -87,6 +89,17 @@ class AttachedActions:
         for robot in robots:
             ok, failed = partial(ended, robot, True), partial(ended, robot, False)
             system.device.ask(robot, m.Emergency(), lambda _, ok=ok: ok(), failed)  # type: ignore[misc]
+
+    @does("release_emergency")
+    def _release_emergency(self, _: str, line: OfSome, on_result: OnResult) -> None:
+        """Release robots that an emergency holds; the DVA decides whether this console may."""
+        system, wanted = self._system, line.get("robots", "all")
+        now, devices = system.device.clock.now, system.state.devices
+        robots = [i for i in system.robots() if emergency_of(devices[i], now, {}) is not None]
+        if isinstance(wanted, list):
+            robots = [i for i in robots if system.numbers.get(i) in wanted]
+        labels = {robot: system.label_of(robot) for robot in robots}
+        release_robots(robots, labels, system.agent.ask, on_result)
 
     @does("revoke")
     def _revoke(self, _: str, line: OfDevice, on_result: OnResult) -> None:

@@ -8,13 +8,14 @@ from typing import Final
 
 from dva_sim.console.attached.system_state import DeviceState
 from dva_sim.console.dva.device_rows import link_of
+from dva_sim.console.robots.shown_mode import EMERGENCY, EMERGENCY_LAPSES, emergency_shown
 from dva_sim.console.run.lag import LIMIT
 from dva_sim.console.views.feed import SEVERITIES
 from dva_sim.console.views.foreign_devices import foreign_robot_row
 from dva_sim.console.views.scene import RULES, legend, site_of
 from dva_sim.console.views.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
 from dva_sim.console.wire.events import EventFacts
-from dva_sim.console.wire.rows import DeviceRow, RobotRow
+from dva_sim.console.wire.rows import DeviceRow, EmergencyShown, RobotRow
 from dva_sim.console.wire.scenes import LinkShown, SceneLine, SiteShown, ThingBody, ThingShown
 from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.protocol import messages as m
@@ -102,14 +103,31 @@ def positions(
     return rows
 
 
-def robot_row(device_state: DeviceState, number: int, now: float) -> RobotRow:
+def emergency_of(
+    device_state: DeviceState, now: float, labels: Mapping[str, str]
+) -> EmergencyShown | None:
+    """Describe the emergency that a robot reports; it does so each second while it is stopped."""
+    emergency, heard = device_state.emergency or (None, now)
+    is_silent = device_state.heard is None or now - device_state.heard > EMERGENCY_LAPSES
+    if emergency is None or (now - heard > EMERGENCY_LAPSES and not is_silent):
+        return None
+    return emergency_shown(emergency, heard, labels)
+
+
+def robot_row(
+    device_state: DeviceState, number: int, now: float, labels: Mapping[str, str]
+) -> RobotRow:
     """A robot, as it says itself."""
     status, holder = device_state.status, device_state.holder
     known = status if isinstance(status, m.RobotStatus) else None
     holding, since = holder if holder is not None else (None, now)
     held = holding is not None and holding.holder is not None
     return {
-        **foreign_robot_row(number, known.mode if known is not None else "unknown"),
+        **foreign_robot_row(
+            number,
+            known.mode if known is not None else "unknown",
+            emergency_of(device_state, now, labels),
+        ),
         "holder": holding.holder if holding is not None else None,
         "holder_label": holding.label if holding is not None else None,
         "session_age_s": round(holding.held_for + now - since, 1) if holding and held else None,
@@ -142,10 +160,12 @@ def _reading(sensor: m.Sensor, device_state: DeviceState, now: float) -> str:
 
 def device_row(device_state: DeviceState, now: float, is_fake: bool, may_revoke: bool) -> DeviceRow:
     """A device, as the DVA lists it and as it is heard here."""
+    is_stopped = emergency_of(device_state, now, {}) is not None
     device, status, holding = device_state.device, device_state.status, device_state.holder
     silent = now - device_state.listed > SILENT_AFTER
     heard = None if device_state.heard is None else now - device_state.heard
     doing = status.mode if isinstance(status, m.RobotStatus) else None
+    doing = EMERGENCY if is_stopped else doing
     holder = holding[0] if holding is not None else None
     return {
         "id": device.id_tag,

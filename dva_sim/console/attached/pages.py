@@ -133,8 +133,10 @@ class AttachedPages:
 
     def _robots(self) -> list[RobotRow]:
         now, numbers = self.clock.now, self.system.numbers
+        labels = {i: entry.device.label for i, entry in self.system.state.devices.items()}
+        labels[self.system.device.id_tag] = self.system.device.label
         return [
-            lines.robot_row(entry, numbers[id_tag], now)
+            lines.robot_row(entry, numbers[id_tag], now, labels)
             for id_tag, entry in self.system.state.devices.items()
             if entry.device.device_type == ROBOT and id_tag in numbers
         ]

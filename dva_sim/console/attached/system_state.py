@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from dva_sim.agents.device import HEARTBEAT, HOLDER, STATUS, AgentDevice
+from dva_sim.agents.device import EMERGENCY, HEARTBEAT, HOLDER, STATUS, AgentDevice
 from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.kernel.labels import distinct
 from dva_sim.live.parts import Rate
@@ -14,7 +14,7 @@ from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
 FORGET_AFTER: Final = 60.0  # without being on the list [s]
-TOPICS: Final = {ROBOT: (HEARTBEAT, STATUS, HOLDER), GUARD: (HEARTBEAT, STATUS)}
+TOPICS: Final = {ROBOT: (HEARTBEAT, STATUS, HOLDER, EMERGENCY), GUARD: (HEARTBEAT, STATUS)}
 
 
 @dataclass
@@ -27,6 +27,7 @@ class DeviceState:
         heard: Time of its latest publication; None: never [s].
         status: Latest status that it published.
         holder: Holder that it reported, and time of the report [s].
+        emergency: Emergency that it reported, and time of the report [s].
         beats: Heartbeats heard.
         camera: URL of its pictures.
         sensors: Sensors that it offers.
@@ -38,6 +39,7 @@ class DeviceState:
     heard: float | None = None
     status: m.RobotStatus | m.PersonStatus | None = None
     holder: tuple[m.RobotHolder, float] | None = None
+    emergency: tuple[m.RobotEmergency, float] | None = None
     beats: int = 0
     camera: str | None = None
     sensors: tuple[m.Sensor, ...] = ()
@@ -114,6 +116,8 @@ class SystemState:
                 device_state.status = body
             elif isinstance(body, m.RobotHolder):
                 device_state.holder = body, self._now
+            elif isinstance(body, m.RobotEmergency):
+                device_state.emergency = body, self._now
             elif isinstance(body, m.Heartbeat):
                 device_state.beats += 1
 

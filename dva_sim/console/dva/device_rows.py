@@ -10,6 +10,7 @@ from typing import Final
 
 from dva_sim.agents.device import HEARTBEAT_PERIOD
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.console.robots.shown_mode import EMERGENCY, shown_mode
 from dva_sim.console.wire.rows import DeviceRow
 from dva_sim.core.registry import DETECTOR, DeviceEntry
 from dva_sim.core.sessions import Grant
@@ -78,10 +79,12 @@ class DeviceRows:
     def _doing(self, id_tag: str, entry: DeviceEntry) -> str | None:
         field = self._run.field
         if id_tag in field.robots:
-            return field.robots[id_tag].controller.mode.value
+            return shown_mode(field.robots[id_tag].controller)
         guard = next((g for g in field.guards if g.device.id_tag == id_tag), None)
         if guard is not None:
             return guard.activity
+        if self._run.dva.core.emergencies.holds(id_tag):
+            return EMERGENCY
         return entry.mode if entry.position is not None and entry.kind == "Robot" else None
 
     def _rate_of(self, robot: RobotAgent | None, now: float) -> float | None:

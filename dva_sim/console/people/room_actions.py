@@ -8,6 +8,7 @@ from typing import Any, Unpack
 
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import OnResult, Refused
+from dva_sim.console.asking.releases import release_robots
 from dva_sim.console.asking.seats import Seats
 from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, place_of, report_of
 from dva_sim.console.events.missions import inspection_of, send_on_mission
@@ -17,6 +18,7 @@ from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import (
     MissionAsked,
     OfRobots,
+    OfSome,
     ReportAsked,
     RoomName,
     TakeoverAsked,
@@ -146,6 +148,23 @@ class RoomActions:
             send_on_mission(room.device, robot, label, body, on_result)
 
         self._room(client, line, on_result, send)
+
+    @does("release_emergency")
+    def _release(self, client: str, line: OfSome, on_result: OnResult) -> None:
+        """Release robots that an emergency holds; the DVA decides whether this person may."""
+        run = self._world.run
+        stopped = run.dva.core.emergencies.stopped()
+        latched = (i for i, robot in run.field.robots.items() if robot.controller.latch.holds)
+        robots = list(dict.fromkeys((*latched, *stopped)))
+        named = line.get("robots", "all")
+        if named != "all":
+            numbers = self._world.feed.numbers
+            robots = [robot for robot in robots if {robot, numbers.get(robot)} & set(named)]
+
+        def release(room: ConsoleRoom, answer: OnResult) -> None:
+            release_robots(robots, run.stage.labels, room.agent.ask, answer)
+
+        self._room(client, line, on_result, release)
 
     @does("take_over")
     def _take_over(self, client: str, line: TakeoverAsked, on_result: OnResult) -> None:

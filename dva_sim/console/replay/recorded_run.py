@@ -22,6 +22,7 @@ from dva_sim.console.replay.moments import (
     set_point,
 )
 from dva_sim.console.replay.robot_lines import RobotLines, about
+from dva_sim.console.robots.shown_mode import EMERGENCY
 from dva_sim.console.views.feed import event_facts, moment_shown
 from dva_sim.console.views.fields import HazardFeed
 from dva_sim.console.views.scene import scene_of
@@ -175,9 +176,11 @@ class RecordedRun:
         drive = self._drive_of(id_tag, now)
         speed, turn_rate = set_point(drive, now) if mode == Mode.TELEOPERATION else (0.0, 0.0)
         holder = None if drive is None else drive.operator
+        emergency = self._lines_of(id_tag).emergency(now)
         return {
             "i": self.numbers[id_tag],
-            "mode": mode or "Idle",
+            "mode": EMERGENCY if emergency is not None else mode or "Idle",
+            "emergency": emergency,
             "pattern": self.playback.scenario.pattern,
             "battery": None,
             "holder": holder,
@@ -196,12 +199,6 @@ class RecordedRun:
 
     def window(self, id_tag: str, now: float) -> RobotWindowLine:
         """Return the contents of a robot's windows."""
-        if id_tag not in self._windows:
-            playback = self.playback
-            self._windows[id_tag] = RobotLines(
-                *(self._drives.get(id_tag, []), playback.recorder.traffic or ()),
-                *(id_tag, playback.labels),
-            )
         label = self.playback.labels[id_tag]
         here = {name: (at, speed) for name, at, speed in self.tracks.places(now)}
         before = {name: at for name, at, _ in self.tracks.places(now - TURNING)}
@@ -210,7 +207,18 @@ class RecordedRun:
         if at is not None and label in before:
             turned = math.remainder(at.heading - before[label].heading, 2.0 * math.pi) / TURNING
         row = self._robot(id_tag, "" if at is None else at.mode, now)
-        return self._windows[id_tag].line(row, speed, turned, now)
+        return self._lines_of(id_tag).line(row, speed, turned, now)
+
+    def _lines_of(self, id_tag: str) -> RobotLines:
+        if id_tag not in self._windows:
+            playback = self.playback
+            self._windows[id_tag] = RobotLines(
+                self._drives.get(id_tag, []),
+                playback.recorder.traffic or (),
+                id_tag,
+                playback.labels,
+            )
+        return self._windows[id_tag]
 
     def _drive_of(self, robot: str, now: float) -> DriveLog | None:
         """The drive that goes on, if one does."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Iterable
 
 from dva_sim.console.robots.latencies import KEPT, Latencies
 from dva_sim.console.robots.robot_windows import WHEEL
+from dva_sim.console.robots.shown_mode import EMERGENCY_LAPSES, emergency_shown
 from dva_sim.console.wire.rows import (
     EmergencyShown,
     FaultsShown,
@@ -16,8 +18,10 @@ from dva_sim.console.wire.rows import (
 )
 from dva_sim.console.wire.scenes import ThingBody
 from dva_sim.kernel.recorder import Applied, DriveLog, Sent
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode
 
-_EMERGENCY = b"<EmergencyMsg>"
+_EMERGENCY = b"<RobotEmergency>"
 _NO_FAULTS: FaultsShown = {
     "processing_s": None,
     "replies": False,
@@ -56,12 +60,14 @@ class RobotLines:
     ) -> None:
         applied = [one for drive in drives for one in drive.applied]
         self._applied: list[Applied] = sorted(applied, key=lambda one: one.time)
+        self._labels = labels
         self._emergencies = [
-            (sent.time, labels.get(sent.source, sent.source))
+            (sent.time, body)
             for sent in traffic
-            if sent.destination == robot
+            if sent.source == robot
             and isinstance(sent.payload, bytes)
             and _EMERGENCY in sent.payload
+            and isinstance(body := decode(sent.payload).body, m.RobotEmergency)
         ]
 
     def line(self, row: RobotRow, speed: float, turn_rate: float, now: float) -> RobotWindowLine:
@@ -84,7 +90,7 @@ class RobotLines:
             "stop_reason": row["stop_reason"],
             "link_lost": False,
             "notice": "",
-            "emergency": self._emergency(now),
+            "emergency": row["emergency"],
             "speed_mps": row["set_speed_mps"],
             "turn_rate_radps": row["set_turn_rate_radps"],
             "now_mps": round(speed, 2),
@@ -97,9 +103,13 @@ class RobotLines:
             "sensors": [],
         }
 
-    def _emergency(self, now: float) -> EmergencyShown | None:
-        past = [entry for entry in self._emergencies if entry[0] <= now]
-        return {"at_ms": round(1000 * past[-1][0]), "by": past[-1][1]} if past else None
+    def emergency(self, now: float) -> EmergencyShown | None:
+        """Return the emergency that held the robot then, as it reported each second."""
+        end = bisect_right(self._emergencies, now, key=lambda entry: entry[0])
+        reported, emergency = self._emergencies[end - 1] if end else (-math.inf, None)
+        if emergency is None or now - reported > EMERGENCY_LAPSES:
+            return None
+        return emergency_shown(emergency, reported, self._labels)
 
     def _one_way(self, now: float) -> LatencyFigures | None:
         """Return the one-way delays of the newest commands that had taken effect by then."""

@@ -152,10 +152,12 @@ class RobotActions:
 
     def press_emergency(self, robot: str) -> None:
         """The button at the robot itself."""
-        window = self._windows.by_id[robot]
-        now = window.robot.device.clock.now
-        window.emergency = {"at_ms": round(1000 * now), "by": "its own button"}
-        window.hand.press_emergency()
+        self._windows.by_id[robot].hand.press_emergency()
+
+    def release_emergency(self, robot: str, who: str) -> m.Reply:
+        """Release a robot at the robot itself."""
+        decision = self._windows.by_id[robot].hand.release(who)
+        return m.Reply(0, decision.code, decision.text)
 
     # --- faults ------------------------------------------------------------------------
 

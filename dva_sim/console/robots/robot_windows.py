@@ -17,7 +17,8 @@ from dva_sim.agents.robot.faults import RobotFaults
 from dva_sim.agents.robot.manual_control import ManualControl
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.robots.latencies import Latencies
-from dva_sim.console.wire.rows import EmergencyShown, RobotWindowLine, SensorShown, StationShown
+from dva_sim.console.robots.shown_mode import latch_shown, shown_mode
+from dva_sim.console.wire.rows import RobotWindowLine, SensorShown, StationShown
 from dva_sim.console.wire.scenes import ThingBody
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.tap import Exchange
@@ -60,7 +61,6 @@ class RobotWindow:
         faults: Injected faults.
         hand: Manual control at the robot.
         number: Number of the page in manual control; None: nobody.
-        emergency: The newest emergency that it has heard: when [ms] and of whom.
         notice: Reason why manual control last ended.
         one_way: From its driver to it.
         loop: From it to its driver and back, by pictures and the commands behind them.
@@ -72,13 +72,11 @@ class RobotWindow:
     faults: RobotFaults
     hand: ManualControl
     number: int | None = None
-    emergency: EmergencyShown | None = None
     notice: str = ""
     one_way: Latencies = field(default_factory=Latencies)
     loop: Latencies = field(default_factory=Latencies)
     replies: Latencies = field(default_factory=Latencies)
     newest: int = 0  # of the messages that it has heard
-    over: float = -1.0  # the newest emergency after which it was ordered again [s]
     _sensed: tuple[float, list[SensorShown]] = field(default_factory=lambda: (-math.inf, []))
 
     def sensors(self, now: float) -> list[SensorShown]:
@@ -156,9 +154,6 @@ class RobotWindows:
             message = decode(exchange.data)
         except ProtocolError:
             return
-        if isinstance(message.body, m.Emergency):
-            by = self._labels.get(message.source, message.source)
-            window.emergency = {"at_ms": round(1000 * exchange.arrived), "by": by}
         sent = self._sent_at(exchange.data)
         if sent is not None:
             window.one_way.add(exchange.arrived - sent)
@@ -171,12 +166,10 @@ class RobotWindows:
         """Look for what has ended by itself since the last look."""
         for window in self.by_id.values():
             controller = window.robot.controller
-            if controller.mode is not Mode.IDLE or controller.by_hand is not None:
-                window.over = controller.emergency_at
             if window.number is not None and controller.by_hand is None:
                 window.number = None
-                emergency = controller.emergency_at > window.over
-                why = "an emergency stop" if emergency else "nothing was heard for long"
+                stopped = controller.latch.holds
+                why = "an emergency stop" if stopped else "nothing was heard for long"
                 if window.faults.frozen:
                     why = "its computer is frozen"
                 window.notice = f"manual control has ended: {why}"
@@ -207,13 +200,13 @@ class RobotWindows:
             "t": round(1000 * now),
             "i": self._numbers[id_tag],
             "station": window.station.line(),
-            "mode": self._mode(window),
+            "mode": shown_mode(robot.controller),
             "hand": window.number,
             "holder": self._labels.get(robot.holder[0] or "", robot.holder[0]),
             "stop_reason": reason_of(robot),
             "link_lost": robot.controller.mode is Mode.TELEOPERATION and 0.0 < point.until <= now,
             "notice": window.notice,
-            "emergency": window.emergency,
+            "emergency": latch_shown(robot.controller.latch, self._labels),
             "speed_mps": round(speed, 3),
             "turn_rate_radps": round(turn, 4),
             "now_mps": round(body.speed, 2),
@@ -236,13 +229,3 @@ class RobotWindows:
         spec = robot.body.spec
         most = spec.max_turn_rate
         return min(speed, spec.max_speed), min(max(turn, -most), most)
-
-    @staticmethod
-    def _mode(window: RobotWindow) -> str:
-        """Return its mode, as its page names it: an emergency until somebody orders it again."""
-        controller = window.robot.controller
-        if controller.by_hand is not None:
-            return "Manual"
-        if controller.mode is Mode.IDLE and controller.emergency_at > window.over:
-            return "Emergency"
-        return controller.mode.value

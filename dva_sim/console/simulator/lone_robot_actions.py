@@ -17,6 +17,7 @@ from dva_sim.console.wire.arguments import (
 )
 from dva_sim.console.wire.seats import DoneLine
 from dva_sim.network.addresses import check_address
+from dva_sim.protocol import messages as m
 
 LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
 
@@ -58,6 +59,12 @@ class LoneRobotActions:
         self._hands.stop(self._world.field.robots)
         self._hands.press_emergency(self._world.robot.device.id_tag)
         on_result(True, f"{self._world.robot.device.label} has stopped")
+
+    @does("robot_release")
+    def _release_emergency(self, client: str, line: OfRobot, on_result: OnResult) -> None:
+        robot = self._world.robot
+        reply = self._hands.release_emergency(robot.device.id_tag, client)
+        on_result(reply.code == m.OK, reply.text)
 
     @does("robot_register")
     def _register(self, _: str, line: RegistrationAsked, on_result: OnResult) -> None:

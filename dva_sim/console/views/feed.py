@@ -9,6 +9,7 @@ from dva_sim.agents.people.bystander import SAFE
 from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.console.robots.shown_mode import latch_shown, shown_mode
 from dva_sim.console.robots.stop_reasons import stop_reason
 from dva_sim.console.run.played_run import PlayedRun
 from dva_sim.console.views.things import Things, camera_shown
@@ -108,12 +109,13 @@ class Feed:
     def _robot(self, robot: RobotAgent, held_by_lag: bool) -> RobotRow:
         run, id_tag = self._run, robot.device.id_tag
         now, (holder, held_for) = run.clock.now, robot.holder
-        mode, point = robot.controller.mode, robot.set_point
-        driven = mode is Mode.TELEOPERATION
+        point = robot.set_point
+        driven = robot.controller.mode is Mode.TELEOPERATION
         drive = run.recorder.newest_drive.get(id_tag)
         return {
             "i": self.numbers[id_tag],
-            "mode": mode.value,
+            "mode": shown_mode(robot.controller),
+            "emergency": latch_shown(robot.controller.latch, run.stage.labels),
             "by_hand": robot.controller.by_hand is not None,
             "pattern": self.pattern_of(id_tag),
             "battery": round(robot.charge, 3),

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from typing import Final
 
+from dva_sim.console.robots.shown_mode import EMERGENCY, emergency_shown
 from dva_sim.console.views.feed import Feed
 from dva_sim.console.views.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
-from dva_sim.console.wire.rows import RobotRow
+from dva_sim.console.wire.rows import EmergencyShown, RobotRow
 from dva_sim.core.registry import GUARD, ROBOT, DeviceEntry
 from dva_sim.kernel.labels import distinct
 from dva_sim.simulation.full.run import Run
@@ -18,11 +19,12 @@ from dva_sim.simulation.full.stage import kind_of
 MOST: Final = 64
 
 
-def foreign_robot_row(number: int, mode: str) -> RobotRow:
+def foreign_robot_row(number: int, mode: str, emergency: EmergencyShown | None = None) -> RobotRow:
     """A robot of which little is known; what is not is null."""
     return {
         "i": number,
-        "mode": mode,
+        "mode": mode if emergency is None else EMERGENCY,
+        "emergency": emergency,
         "stop_reason": "",
         "pattern": None,
         "battery": None,
@@ -85,8 +87,14 @@ class ForeignDevices:
 
     def robots(self) -> list[RobotRow]:
         """A row for each robot."""
+        labels = self._run.stage.labels
+        core = self._run.dva.core
+        stopped = {
+            robot: emergency_shown(stop.message(self._run.clock.now), self._run.clock.now, labels)
+            for robot, stop in core.emergencies.stopped().items()
+        }
         return [
-            foreign_robot_row(self._feed.numbers[id_tag], entry.mode)
+            foreign_robot_row(self._feed.numbers[id_tag], entry.mode, stopped.get(id_tag))
             for id_tag, entry in self._here()
             if self._known[id_tag] == "robot"
         ]

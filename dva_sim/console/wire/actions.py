@@ -198,6 +198,15 @@ _LIST = (
         over_link=True,
         waits=Queueing.FIRST,
     ),
+    Action(
+        "release_emergency",
+        "releases robots after an emergency; some, or all that are stopped",
+        OfSome,
+        at=_RUN,
+        role=Role.DISPATCH,
+        audit=Audit.DVA,
+        over_link=True,
+    ),
     Action("link", "changes the link", LinkChange, role=Role.DRIVE),
     Action(
         "pattern", "changes the pattern of a robot's next drive", PatternChoice, role=Role.DRIVE
@@ -232,6 +241,7 @@ _LIST = (
         "robot_register", "registers a robot at a DVA", RegistrationAsked, over_link=True, **_ALONE
     ),
     Action("robot_listen", "opens the robot's port", OfRobot, **_ALONE),
+    Action("robot_release", "releases the robot after an emergency", OfRobot, **_ALONE),
     Action("robot_off", "switches the robot off", OfRobot, stops=True, **_ALONE),
     # --- phones
     Action(

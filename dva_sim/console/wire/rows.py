@@ -37,6 +37,14 @@ class ServerShown(TypedDict):
     role: NotRequired[str]
 
 
+class EmergencyShown(TypedDict):
+    """Emergency that holds a robot; `released_by`: `person`, `drive`, or empty where unknown."""
+
+    at_ms: int
+    by: str
+    released_by: str
+
+
 class RobotRow(TypedDict):
     """State of a robot."""
 
@@ -56,6 +64,7 @@ class RobotRow(TypedDict):
     commands_hz: float | None
     refused: int | None
     timeouts: int | None
+    emergency: EmergencyShown | None
     by_hand: NotRequired[bool]
     camera: NotRequired[str | None]
     sensors: NotRequired[list[str]]
@@ -120,13 +129,6 @@ class FaultsShown(TypedDict):
     replies: bool
     freeze: bool
     camera: bool
-
-
-class EmergencyShown(TypedDict):
-    """An emergency stop that a robot has heard."""
-
-    at_ms: int
-    by: str
 
 
 class RobotWindowLine(TypedDict):

@@ -128,6 +128,7 @@ def _read_events(time: float, content: Mapping[str, Any]) -> o.BookNews:
 
 _EVENTS: Final = _as_named(o.BookNews)
 
+
 def _read_gap(time: float, content: Mapping[str, Any]) -> o.FactGap:
     """Read a gap; earlier versions noted neither its start nor the rules that depend on it."""
     since = float(content.get("since_s", time))

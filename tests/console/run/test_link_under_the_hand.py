@@ -140,7 +140,7 @@ def test_an_emergency_waits_for_no_connection_whatever_the_delay(monkeypatch):
     page.let(0.51)
     assert page.robot().controller.mode is Mode.IDLE
     page.let(0.1)
-    assert page.lines_of("rows")[-1]["robots"][0]["mode"] == "Idle"
+    assert page.lines_of("rows")[-1]["robots"][0]["mode"] == "Emergency"
 
 
 def test_until_the_first_command_comes_the_robot_says_what_it_waits_for(monkeypatch):

@@ -94,13 +94,17 @@
  *   held_by_lag: boolean, jumps?: number}} Clock
  */
 /**
+ * Emergency that holds a robot; `released_by`: `person`, `drive`, or empty where unknown.
+ * @typedef {{at_ms: number, by: string, released_by: string}} Emergency
+ */
+/**
  * State of a robot.
  * @typedef {{i: number, mode: string, stop_reason: string, pattern: string | null, battery: number
  *   | null, holder: string | null, holder_label: string | null, session_age_s: number | null,
  *   watchdog_left_s: number | null, set_speed_mps: number | null, set_turn_rate_radps: number |
  *   null, queue: number | null, lost: number | null, commands_hz: number | null, refused: number |
- *   null, timeouts: number | null, by_hand?: boolean, camera?: string | null, sensors?: string[]}}
- *   RobotRow
+ *   null, timeouts: number | null, emergency: Emergency | null, by_hand?: boolean, camera?: string
+ *   | null, sensors?: string[]}} RobotRow
  */
 /**
  * Activity of somebody on foot.
@@ -222,10 +226,6 @@
  * Station of a robot: off, registered, listening.
  * @typedef {{state: string, address: string | null, dva: string | null, problem: string,
  *   asking?: boolean, by_hand?: boolean}} Station
- */
-/**
- * An emergency stop that a robot has heard.
- * @typedef {{at_ms: number, by: string}} Emergency
  */
 /**
  * Latency of a kind of messages.

@@ -98,6 +98,8 @@ export const mayDispatch = computed(
 export const maySupervise = computed(
   () => !isPast.value && roleIsOneOf('supervise') && allowed.value === 'supervise',
 );
+/** True if robots can be released after an emergency from this page. */
+export const mayRelease = computed(() => (scene.value?.pages ? !isPast.value && isOperator.value : mayDispatch.value));
 /** @param {string[]} roles */
 const roleIsOneOf = (...roles) => roles.includes(you.value?.role ?? '');
 /** True if commands can be sent now. */
@@ -125,7 +127,17 @@ export const doingOf = (i) => doings.value.get(i) ?? '';
 /** @param {number} i */
 export const driveOf = (i) => seat.value?.drives.find((drive) => drive.i === i);
 /**
- * Mode of a robot: as reported to this page as its driver, else as reported to all pages.
+ * Mode of a robot: an emergency or manual control as reported to all pages, else as reported to this
+ * page as its driver.
  * @param {number} i
  */
-export const modeOf = (i) => (rowOf(i)?.by_hand ? 'Manual' : driveOf(i)?.mode || rowOf(i)?.mode || 'Idle');
+export const modeOf = (i) => {
+  const shown = rowOf(i)?.mode || 'Idle';
+  return ['Emergency', 'Manual'].includes(shown) ? shown : driveOf(i)?.mode || shown;
+};
+/** Reason why a robot cannot be started; empty if no emergency holds it, or a start releases it. @param {number} i */
+export const whyStopped = (i) => {
+  const emergency = rowOf(i)?.emergency;
+  if (!emergency || emergency.released_by === 'drive') return '';
+  return `${emergency.by} has stopped it by an emergency: a dispatcher has to release it first.`;
+};

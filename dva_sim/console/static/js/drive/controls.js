@@ -1,6 +1,6 @@
 /** Controls to take, start, drive, stop and release; and the robot's current mode. */
 import { html, useEffect, useRef } from '../../vendor/preact.js';
-import { clock, connection, floorMs, mayDrive, maySteer, modeOf, rowOf, rows, seat } from '../store.js';
+import { clock, connection, floorMs, mayDrive, maySteer, modeOf, rowOf, rows, seat, whyStopped } from '../store.js';
 import { act } from '../net/actions.js';
 import { DriveSliders } from './drive_sliders.js';
 import { gamepad } from './gamepad.js';
@@ -15,7 +15,8 @@ export function Controls({ robots }) {
   const drives = seat.value?.drives ?? [];
   const holds = drives.length > 0;
   const phase = seat.value?.phase ?? 'free';
-  const canStart = drives.some((drive) => drive.phase === 'held');
+  const stopped = drives.map((drive) => whyStopped(drive.i)).find(Boolean) ?? '';
+  const canStart = drives.some((drive) => drive.phase === 'held' && !whyStopped(drive.i));
   const limits = {
     max_speed_mps: Math.min(...robots.map((robot) => robot.max_speed_mps || 0.5)),
     max_turn_rate_radps: Math.min(...robots.map((robot) => robot.max_turn_rate_radps || 0.52)),
@@ -25,13 +26,13 @@ export function Controls({ robots }) {
     <div class="buttons" ref=${useNextButton(may ? NEXT[phase] : undefined)}>
       <button type="button" disabled=${!may || holds}
         onClick=${() => act('take', { robots: robots.map((robot) => robot.i) })}>Take control</button>
-      <button type="button" class=${phase === 'held' ? 'go' : ''} disabled=${!may || !canStart}
+      <button type="button" class=${phase === 'held' && canStart ? 'go' : ''} disabled=${!may || !canStart}
         onClick=${() => act('start')}>Start</button>
       <button type="button" class=${phase === 'driving' ? 'go' : ''} disabled=${!may || !holds}
         onClick=${() => act('stop')}>Stop</button>
       <button type="button" disabled=${!may || !holds} onClick=${() => act('release')}>Release control</button>
     </div>
-    <p class="hint"><${Hint} holds=${holds} /></p>
+    <p class="hint"><${Hint} holds=${holds} stopped=${canStart ? '' : stopped} /></p>
     <div class="steering"><${Stick} disabled=${!may} />
       <${DriveSliders} limits=${limits} disabled=${!may} /></div>
     <p class="keys soft">Hold <kbd>↑</kbd> <kbd>←</kbd> <kbd>→</kbd> or <kbd>W</kbd> <kbd>A</kbd> <kbd>D</kbd>,
@@ -79,14 +80,15 @@ const PHASES = /** @type {Record<string, string>} */ ({
   stopping: 'Stopping …',
 });
 
-/** Next step, or the reason why nothing moves. @param {{holds: boolean}} props */
-function Hint({ holds }) {
+/** Next step, or the reason why nothing moves. @param {{holds: boolean, stopped: string}} props */
+function Hint({ holds, stopped }) {
   if (connection.value !== 'open') return 'Not connected to the simulation. You cannot drive.';
   if (!mayDrive.value) return 'This address is view-only. The address for driving is printed in the terminal where the console was started.';
   if (!maySteer.value) return 'Connecting …';
   if (clock.value.held_by_lag) return 'Stopped: the simulation is behind real time.';
   if (clock.value.paused) return 'The simulation is paused.';
   if (interrupted.value) return `${interrupted.value} The robot was stopped: press Start, then take hold again.`;
+  if (stopped) return stopped;
   if (!holds) return heldByOther() || 'Take control of the robot first.';
   const phase = seat.value?.phase ?? 'free';
   const wait = Math.round(floorMs.value);

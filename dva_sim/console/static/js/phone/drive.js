@@ -6,7 +6,7 @@
  * last resort.
  */
 import { computed, effect, signal } from '../../vendor/preact.js';
-import { connection, notice, robots, rowOf, rows, seat } from '../store.js';
+import { connection, notice, robots, rowOf, rows, seat, whyStopped } from '../store.js';
 import { act, driveLost } from '../net/actions.js';
 import { engaged, interrupt, interrupted, watchInterruptions } from '../drive/hold.js';
 import { choices } from './choices.js';
@@ -65,7 +65,8 @@ export async function start() {
 
 /** Reason why a drive by tilting cannot start; empty if it can. */
 function whyNot() {
-  if (!tilts.peek()) return '';
+  const stopped = whyStopped(robot.peek()?.i ?? -1);
+  if (stopped || !tilts.peek()) return stopped;
   if (sensor.peek() === 'tap') return 'Tap Start to allow access to the motion sensor.';
   if (sensor.peek() !== 'live') return 'No motion sensor data is arriving, so driving was not started. See Calibration.';
   if (isSilent()) return `The motion sensor has been silent for ${silentText()}, so driving was not started. Tilt the phone and start again.`;

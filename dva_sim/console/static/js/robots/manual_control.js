@@ -1,6 +1,6 @@
 /** Manual control at the robot itself: no messages, no session, the same limits and watchdog. */
 import { html, useEffect, useLayoutEffect } from '../../vendor/preact.js';
-import { connection, mayDrive, maySteer } from '../store.js';
+import { connection, mayDrive, maySteer, whyStopped } from '../store.js';
 import { act, driveLost } from '../net/actions.js';
 import { DriveSliders } from '../drive/drive_sliders.js';
 import { driveByGamepad } from '../drive/gamepad.js';
@@ -23,12 +23,13 @@ export function ManualControl({ robot }) {
   const may = maySteer.value;
   const shown = windowOf(robot.i);
   const listens = shown?.station.state === 'listening';
-  const isFree = !mine && !shown?.holder && shown?.hand === null;
+  const stopped = whyStopped(robot.i);
+  const isFree = !mine && !stopped && !shown?.holder && shown?.hand === null;
   const limits = { max_speed_mps: robot.max_speed_mps, max_turn_rate_radps: robot.max_turn_rate_radps };
   return html`<section class="panel controls manual" aria-label="Manual control"><h2>Manual control</h2>
     <${Station} robot=${robot} />
     <div class="buttons">
-      <button type="button" class=${isFree ? 'go' : ''} disabled=${!may || mine || !listens} onClick=${() => take(robot.i)}>Take manual control</button>
+      <button type="button" class=${isFree ? 'go' : ''} disabled=${!may || mine || !listens || Boolean(stopped)} onClick=${() => take(robot.i)}>Take manual control</button>
       <button type="button" disabled=${!may || !mine} onClick=${() => act('manual_release')}>Release manual control</button>
     </div>
     <p class="hint" role="status" aria-label="Manual control">${hint(robot)}</p>
@@ -62,6 +63,7 @@ function hint(robot) {
   if (!shown) return '';
   if (isInHand(robot.i)) return interrupted.value ? `${interrupted.value} The robot was stopped. Hold again to drive.` : 'You control it manually. Hold to drive; everyone else gets the reply Busy.';
   if (shown.station.state !== 'listening') return 'The robot must be registered and listening first.';
+  if (whyStopped(robot.i)) return whyStopped(robot.i);
   if (shown.hand !== null) return 'Another page controls it manually.';
   if (shown.mode !== 'Idle' && shown.mode !== 'Emergency') return `You can only take an idle robot. This one is in mode ${shown.mode}.`;
   if (shown.holder) return `${shown.holder} holds it.`;

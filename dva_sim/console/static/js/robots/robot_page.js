@@ -1,6 +1,6 @@
 /** Page of one robot: its messages, its wheels, and manual control. */
 import { html, useEffect } from '../../vendor/preact.js';
-import { isPast, modeOf } from '../store.js';
+import { isPast, modeOf, rowOf } from '../store.js';
 import { stopRobots } from '../net/emergency.js';
 import { watch } from '../net/sockets.js';
 import { sinceSent } from '../net/world_time.js';
@@ -14,7 +14,7 @@ import { RobotLog } from './robot_log.js';
 import { Sensors } from './sensors.js';
 import { SideView } from './side_view.js';
 import { TopView } from './top_view.js';
-import { shownMode, windowOf } from './window.js';
+import { windowOf } from './window.js';
 
 /** @typedef {import('../lines.js').Thing} Thing */
 
@@ -39,7 +39,7 @@ export function RobotPage({ robot }) {
 /** @param {{robot: Thing}} props */
 function Head({ robot }) {
   const shown = windowOf(robot.i);
-  const mode = shown ? shownMode(robot.i) : modeOf(robot.i);
+  const mode = modeOf(robot.i);
   const reported = shown?.watchdog_left_s ?? null;
   const left = shown && reported !== null ? Math.max(0, reported - sinceSent(shown)) : null;
   return html`<header class="robot-bar">
@@ -62,10 +62,10 @@ function Head({ robot }) {
 function Reasons({ robot }) {
   const shown = windowOf(robot.i);
   if (!shown) return html`<p class="reason" role="status" aria-label="Reason">Waiting for its status …</p>`;
-  const { emergency, mode, stop_reason: stopReason, notice, link_lost: lost } = shown;
-  const stop = mode === 'Emergency' && emergency;
+  const { stop_reason: stopReason, notice, link_lost: lost } = shown;
+  const stop = rowOf(robot.i)?.emergency;
   const text = stop
-    ? `Emergency stop by ${emergency.by} at ${clockText(emergency.at_ms)}: the robot waits for a new order.`
+    ? `Emergency stop by ${stop.by} at ${clockText(stop.at_ms)}: the robot stands until it is released.`
     : lost
       ? `Link lost: ${stopReason}`
       : stopReason && `Stopped: ${stopReason}`;

@@ -1,11 +1,10 @@
 /** All robots, each with a link to its page; or the page of the robot named in the address. */
 import { html } from '../../vendor/preact.js';
-import { robots, rowOf, rows, scene } from '../store.js';
+import { modeOf, robots, rowOf, rows, scene } from '../store.js';
 import { detail } from '../shell/route.js';
 import { ModeMark } from '../ui/icon.js';
 import { percentText } from '../ui/words.js';
 import { RobotPage } from './robot_page.js';
-import { shownMode } from './window.js';
 
 const HEADS = ['Robot', 'Mode', 'Holder', 'Speed', 'Battery', 'Why it is stopped'];
 
@@ -39,7 +38,7 @@ function List() {
 /** @param {{robot: import('../lines.js').Thing}} props */
 function Row({ robot }) {
   const row = rowOf(robot.i);
-  const mode = shownMode(robot.i);
+  const mode = modeOf(robot.i);
   return html`<tr>
     <th scope="row"><a href=${robotAddress(robot.label)}>${robot.label}</a></th>
     <td><${ModeMark} mode=${mode} /> ${mode}</td>

@@ -1,9 +1,9 @@
 /** Stages of a robot: off, registered, listening, and its mode from then on. */
 import { html, useState } from '../../vendor/preact.js';
-import { maySteer } from '../store.js';
+import { maySteer, modeOf } from '../store.js';
 import { act } from '../net/actions.js';
 import { Field } from '../ui/fields.js';
-import { shownMode, windowOf } from './window.js';
+import { windowOf } from './window.js';
 
 const STEPS = ['off', 'registered', 'listening'];
 
@@ -12,7 +12,7 @@ export function Station({ robot }) {
   const station = windowOf(robot.i)?.station;
   if (!station) return null;
   const at = STEPS.indexOf(station.state);
-  const last = station.state === 'listening' ? shownMode(robot.i) : 'Idle, Mission or Teleoperation';
+  const last = station.state === 'listening' ? modeOf(robot.i) : 'Idle, Mission or Teleoperation';
   const now = station.state === 'listening' ? STEPS.length : at;
   return html`<ol class="steps reported" aria-label="State">${[...STEPS, last].map(
     (step, n) => html`<li class=${n <= Math.max(at, now) ? 'past' : ''} aria-current=${n === now ? 'step' : null}>${step}</li>`,

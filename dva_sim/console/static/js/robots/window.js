@@ -17,9 +17,6 @@ export const isInHand = (i) => {
 /** True if this page controls any robot manually. */
 export const holdsByHand = computed(() => [...windows.value.keys()].some(isInHand));
 
-/** Mode as reported by the robot's own window, else as reported to all pages. @param {number} i */
-export const shownMode = (i) => windowOf(i)?.mode ?? (rowOf(i)?.by_hand ? 'Manual' : rowOf(i)?.mode) ?? 'Idle';
-
 const DEGREES = 180 / Math.PI;
 
 /** @param {number} radians */

@@ -3,12 +3,13 @@ import { html } from '../../vendor/preact.js';
 import { thingAt, notice } from '../store.js';
 import { giveUp, refused, stopped, unconfirmed } from '../net/emergency.js';
 import { isStale, newestTime } from '../net/world_time.js';
+import { EmergencyBar } from './emergency_bar.js';
 import { Icon } from './icon.js';
 import { clockText } from './words.js';
 
 /** @param {{others?: any[]}} props `others` are texts that the page shows itself */
 export function Notices({ others = [] }) {
-  return html`<${EmergencyReport} /><${Silence} />
+  return html`<${EmergencyBar} /><${EmergencyReport} /><${Silence} />
     ${notice.value && !others.includes(notice.value) && html`<${Note} text=${notice.value} onDismiss=${() => (notice.value = '')} />`}`;
 }
 

@@ -1,0 +1,50 @@
+"""Releases of several robots after emergencies, answered as one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from functools import partial
+
+from dva_sim.console.asking.refusal import OnResult, Refused, unanswered
+from dva_sim.protocol import messages as m
+
+AskDva = Callable[[m.Body, Callable[[m.Reply], object], Callable[[], object]], object]
+
+
+def release_robots(
+    robots: Collection[str], labels: Mapping[str, str], ask: AskDva, on_result: OnResult
+) -> None:
+    """Ask the DVA to release robots, and answer once it has answered for each.
+
+    Args:
+        robots: Ids of the robots.
+        labels: Labels by id.
+        ask: Sends a request to the DVA.
+        on_result: Callback for the result.
+
+    Raises:
+        Refused: There is no robot to release.
+    """
+    if not robots:
+        raise Refused("no robot is stopped by an emergency")
+    waiting = set(robots)
+    refusals: list[str] = []
+
+    def ended(robot: str, reply: m.Reply | None = None) -> None:
+        waiting.discard(robot)
+        label = labels.get(robot, robot)
+        if reply is None:
+            refusals.append(f"{label}: no answer of the DVA")
+        elif reply.code != m.OK:
+            refusals.append(f"{label}: {reply.text}")
+        if waiting:
+            return
+        if not refusals:
+            on_result(True, f"{', '.join(labels.get(each, each) for each in robots)}: released")
+        elif reply is None:
+            unanswered(on_result, "; ".join(refusals))
+        else:
+            on_result(False, "; ".join(refusals))
+
+    for robot in robots:
+        ask(m.ReleaseEmergency(robot), partial(ended, robot), partial(ended, robot))
