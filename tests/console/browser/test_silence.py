@@ -29,6 +29,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "network": (".figures-panel td.n",),
     "main": (".server .state",),
     "phone#/main": (".cards small", ".link-status"),
+    "phone#/teleoperation": (".figures-phone span", ".figures-phone small", ".picture-age"),
     "guard": (".order-card h2", ".order-card p"),
 }
 
@@ -89,6 +90,9 @@ def address_of(fake: Callable[..., Any], request: pytest.FixtureRequest) -> Call
 
     def address(name: str) -> str:
         document, _, screen = name.partition("#")
+        if screen == "/teleoperation":  # as the console's operator, who needs no registration
+            world = fake(*WORLD)
+            return f"{world.base}phone?{world.drive.partition('?')[2]}#/authentication"
         if name.startswith(("phone", "guard")):
             return f"{fake(*WORLD).phone.replace('/phone?', f'/{document}?')}#{screen}"
         of_robot = name.startswith("robots/")
@@ -103,6 +107,10 @@ def opened(page: Page, cut: Cut, address: str, name: str) -> None:
     cut.open(page, address)
     if name == "guard":
         page.get_by_role("button", name="guard-1").click()
+    if name == "phone#/teleoperation":
+        page.get_by_role("button", name="Take control").tap()
+        page.get_by_role("link", name="Go on").wait_for()
+        page.evaluate("location.hash = '#/teleoperation'")
     if name == "drive":
         page.get_by_role("button", name="Take control").click()
         page.get_by_role("button", name="Start", exact=True).click()
@@ -139,6 +147,15 @@ def test_on_a_network_that_falls_silent_nothing_stands_as_if_it_were_live(
 
 PACES = [({"paused": False, "factor": 1}, 9), ({"paused": False, "factor": 4}, 36)]
 PACES += [({"paused": True}, 0)]
+# Change the pace, and wait until time is known by it: with the second line from then on.
+CHANGE = """async pace => {
+  const {act} = await import('/static/js/net/actions.js');
+  const {rows} = await import('/static/js/store.js');
+  await act('pace', pace);
+  for (let n = 0; n < 2; n += 1) {
+    const before = rows.value;
+    await new Promise(done => rows.subscribe(now => now !== before && done()));
+  } }"""
 AGES = """() => [...document.querySelectorAll(
   '.alarm > b, .events-table tr:not(.over) td:nth-child(5)')].map(one =>
     one.textContent.split(':').reduce((sum, part) => 60 * sum + Number(part), 0))"""
@@ -154,12 +171,10 @@ def test_ages_of_alarms_and_events_follow_the_time_of_the_world(
 ) -> None:
     page = visit.tab()
     opened(page, cut, address_of("events"), "events")
-    changed = "async pace => (await import('/static/js/net/actions.js')).act('pace', pace)"
-    assert page.evaluate(changed, pace)["ok"]
+    page.evaluate(CHANGE, pace)
     expect(page.locator(".bar .time .soft")).to_have_text(
         "paused" if pace["paused"] else f"×{pace['factor']}"
     )
-    page.wait_for_timeout(300)  # lines of the new pace
     cut.now()
     before = page.evaluate(AGES)
     page.clock.run_for(SILENCE_MS)
