@@ -59,6 +59,18 @@ def test_silence_makes_the_page_look_old(fake, page):
     expect(page.locator(".age.old")).to_be_visible()
 
 
+def test_a_picture_that_still_comes_is_hatched_when_all_else_is_silent(fake, page):
+    silent: list[bool] = []
+    sockets_of(page, "state", lambda text: None if silent else text)
+    page.goto(f"{fake(*SMALL).drive}#/drive")
+    expect(page.locator(".picture-age")).to_contain_text("s old")
+    expect(page.locator(".veil")).not_to_have_class("veil hatched")
+    silent.append(True)
+
+    expect(page.locator(".veil")).to_have_class("veil hatched")
+    expect(page.locator(".picture-age")).to_have_text(re.compile(r"s old, no data for \d+\.\d+ s$"))
+
+
 def test_a_hole_in_what_was_heard_is_filled_by_asking_again(fake, page):
     asked, skipped = list[str](), list[str]()
 
