@@ -16,6 +16,7 @@ ADDRESSES: dict[str, tuple[Callable[[Any], str], str]] = {
     "phone": (lambda world: world.phone, "Authentication"),
     "guard": (lambda world: world.phone.replace("/phone?", "/guard?"), "Who are you?"),
 }
+RED = "rgb(163, 0, 0)"
 ALL = "robot-1, robot-2, robot-3 at 0:"
 
 
@@ -39,6 +40,8 @@ def test_every_address_stops_robots_and_says_which_stand(
     press(page)
     expect(page.locator(".stopped")).to_contain_text(ALL)
     expect(page.locator(".unconfirmed-stop")).to_have_count(0)
+    red = page.get_by_role("button", name="Emergency stop")
+    assert red.evaluate("e => getComputedStyle(e).backgroundColor") == RED  # under the pointer, too
     page.locator(".stopped").get_by_role("button", name="Dismiss").click()
     expect(page.locator(".stopped")).to_have_count(0)
 

@@ -41,6 +41,6 @@ function Silence() {
 
 /** @param {{text: string, onDismiss: () => void, look?: string}} props */
 function Note({ text, onDismiss, look = '' }) {
-  return html`<p class=${`warning ${look}`}><span>${text}</span>
+  return html`<p class=${`warning note ${look}`}><span>${text}</span>
     <button type="button" class="plain" aria-label="Dismiss" onClick=${onDismiss}><${Icon} name="x" /></button></p>`;
 }
