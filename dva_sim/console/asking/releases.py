@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from functools import partial
+from typing import Final
 
-from dva_sim.console.asking.refusal import OnResult, Refused, unanswered
+from dva_sim.console.asking.refusal import OnResult, unanswered
 from dva_sim.protocol import messages as m
 
+NOBODY_STOPPED: Final = "no robot is stopped by an emergency"
 AskDva = Callable[[m.Body, Callable[[m.Reply], object], Callable[[], object]], object]
 
 
@@ -21,12 +23,7 @@ def release_robots(
         labels: Labels by id.
         ask: Sends a request to the DVA.
         on_result: Callback for the result.
-
-    Raises:
-        Refused: There is no robot to release.
     """
-    if not robots:
-        raise Refused("no robot is stopped by an emergency")
     waiting = set(robots)
     refusals: list[str] = []
 

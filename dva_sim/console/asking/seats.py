@@ -44,12 +44,12 @@ class Seats:
         self._there: dict[str, float] = {}  # until when, real time [s]
         self._may_drive: frozenset[str] = frozenset()
 
-    def note_open(self, pages: Mapping[str, bool], now: float) -> None:
-        """Note which clients are there at a time [s], each with whether it may take a free seat."""
+    def note_open(self, pages: Mapping[str, str], now: float) -> None:
+        """Note which clients are there at a time [s], each with the role of its page, if any."""
         left = self._there.keys() - pages.keys()
         self._there |= {client: min(self._there[client], now + RELOADED) for client in left}
         self._there |= dict.fromkeys(pages, math.inf)
-        self._may_drive |= {client for client, drives in pages.items() if drives}
+        self._may_drive |= {client for client, role in pages.items() if role}
 
     def manned(self, seats: Iterable[int], now: float) -> set[int]:
         """Return which of some seats are manned at a time [s]."""

@@ -8,7 +8,7 @@ from typing import Final
 from dva_sim.console.asking.answers import BYE
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import OnResult, Refused, unanswered
-from dva_sim.console.asking.releases import release_robots
+from dva_sim.console.asking.releases import NOBODY_STOPPED, release_robots
 from dva_sim.console.attached.decisions import AttachedDecisions
 from dva_sim.console.attached.lines import emergency_of
 from dva_sim.console.attached.pages import AttachedPages
@@ -98,6 +98,8 @@ class AttachedActions:
         robots = [i for i in system.robots() if emergency_of(devices[i], now, {}) is not None]
         if isinstance(wanted, list):
             robots = [i for i in robots if system.numbers.get(i) in wanted]
+        if not robots:
+            raise Refused(NOBODY_STOPPED)
         labels = {robot: system.label_of(robot) for robot in robots}
         release_robots(robots, labels, system.agent.ask, on_result)
 

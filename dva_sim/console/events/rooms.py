@@ -6,7 +6,7 @@ DVA's own: another make of control room, or of DVA, can take either place.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Final, Unpack
@@ -19,7 +19,7 @@ from dva_sim.console.wire.events import ControlLine, RoomEntry
 from dva_sim.console.wire.limits import LONG
 from dva_sim.console.wire.seats import Answered
 from dva_sim.core.registry import FORGET_AFTER
-from dva_sim.core.roles import Roles
+from dva_sim.core.roles import ControlRoomRole, Roles
 from dva_sim.kernel.labels import with_id
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.run import Run
@@ -165,10 +165,18 @@ class ConsoleRooms:
         self._roles.appoint(agent.device.id_tag, role)
         return ConsoleRoom(number, agent, role)
 
-    def attend(self, clients: Container[str]) -> None:
-        """Let the DVA count the rooms as silent whose pages are not open, until they are again."""
+    def attend(self, pages: Mapping[str, str]) -> None:
+        """Let the DVA count on exactly those whose pages are open.
+
+        Args:
+            pages: Role of each open page, by client. The console's own room has the highest, so
+                that the DVA knows of people who have decided nothing yet.
+        """
+        roles = {ControlRoomRole(role) for role in pages.values() if role}
+        highest = max(roles, key=list(ControlRoomRole).index, default=ControlRoomRole.LOOK)
+        self._roles.appoint(self.listener.device.id_tag, highest)
         for client, room in self.by_client.items():
-            if client not in clients:
+            if client not in pages:
                 room.device.withdrawn = True
             elif room.device.withdrawn:
                 room.device.resume()

@@ -6,7 +6,7 @@ Seats are given out here. Whatever ends a drive ends it for good: nothing begins
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
@@ -157,7 +157,7 @@ class Actions:
     @does("here")
     def _here(self, _: str, line: PagesHere) -> None:
         self._seats.note_open(line["pages"], time.monotonic())
-        self._rooms.attend(line["pages"].keys())
+        self._rooms.attend(line["pages"])
         self._man()
 
     def _man(self) -> None:
@@ -221,9 +221,17 @@ class Actions:
         for person in self._world.persons:
             if person is not own or seat is None:
                 person.ended_by_others(robots)
+        self._note_stopper(robots, own.device.id_tag, client)
         for robot in joined.keys() & set(robots):
             own.device.introduce(robot, joined[robot])
         own.emergency(robots, on_result)
+
+    def _note_stopper(self, robots: Sequence[str], device: str, client: str) -> None:
+        """Note the person behind an emergency; of several, the first counts."""
+        here = self._world.run.field.robots
+        for robot in robots:
+            if robot in here and not here[robot].controller.latch.holds:
+                self._world.feed.stoppers[robot] = device, self._world.author(client)
 
     def _joined(self) -> dict[str, str]:
         """Addresses of robots from outside the scenario that can be reached, by id."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Unpack
 
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import OnResult, Refused
-from dva_sim.console.asking.releases import release_robots
+from dva_sim.console.asking.releases import NOBODY_STOPPED, release_robots
 from dva_sim.console.asking.seats import Seats
 from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, place_of, report_of
 from dva_sim.console.events.missions import inspection_of, send_on_mission
@@ -47,9 +47,9 @@ class RoomActions:
         self._world, self._rooms, self._seats = world, world.rooms, seats
         self._robot, self._take = robot, take
 
-    def attend(self, clients: Container[str]) -> None:
+    def attend(self, pages: Mapping[str, str]) -> None:
         """Let rooms take part only while their pages are open."""
-        self._rooms.attend(clients)
+        self._rooms.attend(pages)
 
     def forget(self, client: str) -> None:
         """A page is gone for good."""
@@ -158,8 +158,10 @@ class RoomActions:
         robots = list(dict.fromkeys((*latched, *stopped)))
         named = line.get("robots", "all")
         if named != "all":
-            numbers = self._world.feed.numbers
-            robots = [robot for robot in robots if {robot, numbers.get(robot)} & set(named)]
+            numbers, labels = self._world.feed.numbers, run.stage.labels
+            robots = [r for r in robots if {r, numbers.get(r), labels.get(r)} & set(named)]
+        if not robots:
+            raise Refused(NOBODY_STOPPED)
 
         def release(room: ConsoleRoom, answer: OnResult) -> None:
             release_robots(robots, run.stage.labels, room.agent.ask, answer)

@@ -90,7 +90,6 @@ class RobotLines:
             "stop_reason": row["stop_reason"],
             "link_lost": False,
             "notice": "",
-            "emergency": row["emergency"],
             "speed_mps": row["set_speed_mps"],
             "turn_rate_radps": row["set_turn_rate_radps"],
             "now_mps": round(speed, 2),

@@ -17,7 +17,7 @@ from dva_sim.agents.robot.faults import RobotFaults
 from dva_sim.agents.robot.manual_control import ManualControl
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.robots.latencies import Latencies
-from dva_sim.console.robots.shown_mode import latch_shown, shown_mode
+from dva_sim.console.robots.shown_mode import shown_mode
 from dva_sim.console.wire.rows import RobotWindowLine, SensorShown, StationShown
 from dva_sim.console.wire.scenes import ThingBody
 from dva_sim.kernel.recorder import Recorder
@@ -206,7 +206,6 @@ class RobotWindows:
             "stop_reason": reason_of(robot),
             "link_lost": robot.controller.mode is Mode.TELEOPERATION and 0.0 < point.until <= now,
             "notice": window.notice,
-            "emergency": latch_shown(robot.controller.latch, self._labels),
             "speed_mps": round(speed, 3),
             "turn_rate_radps": round(turn, 4),
             "now_mps": round(body.speed, 2),

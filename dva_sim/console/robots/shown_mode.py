@@ -23,11 +23,21 @@ def shown_mode(controller: RobotController) -> str:
     return MANUAL if controller.by_hand is not None else controller.mode.value
 
 
-def latch_shown(latch: EmergencyLatch, labels: Mapping[str, str]) -> EmergencyShown | None:
-    """Describe the emergency that holds a robot of this process; None if none does."""
+def latch_shown(
+    latch: EmergencyLatch, labels: Mapping[str, str], stopper: tuple[str, str] | None = None
+) -> EmergencyShown | None:
+    """Describe the emergency that holds a robot of this process; None if none does.
+
+    Args:
+        latch: The robot's latch.
+        labels: Labels of devices, by id.
+        stopper: Device and name of the person who last stopped it from a page.
+    """
     if not latch.holds:
         return None
     by = BUTTON if latch.stopped_by is None else labels.get(latch.stopped_by, latch.stopped_by)
+    if stopper is not None and stopper[0] == latch.stopped_by:
+        by = stopper[1]
     return {"at_ms": round(1000 * latch.since), "by": by, "released_by": latch.released_by or ""}
 
 

@@ -26,6 +26,8 @@ def stop_reason(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
         return ""
     if not body.powered:
         return "its battery is empty"
+    if controller.latch.holds:
+        return "emergency stop"
     if controller.mode is Mode.TELEOPERATION:
         if point == STAND and not robot.stale:
             return "waits for the first command: its connection is being opened"
@@ -40,14 +42,9 @@ def stop_reason(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
         return "its manual driver asks it to stand"
     if controller.mode is Mode.MISSION:
         return controller.mission_status.reason or "its mission has it wait"
-    if controller.emergency_at > 0.0 and now - controller.emergency_at < RECENT:
-        return "emergency stop"
     if controller.grant is None:
         return "nobody holds it"
     return "it is held, and not started"
-
-
-RECENT = 10.0  # an emergency is why a robot stands for so long [s]
 
 
 def _without_command(robot: RobotAgent, now: float) -> str:

@@ -35,12 +35,14 @@ class Feed:
     Attributes:
         things: Everybody.
         numbers: By which lines call them, by id or name.
+        stoppers: Device and name of the person who stopped a robot from a page, by its id.
     """
 
     def __init__(self, run: PlayedRun, events: EventTable | None = None) -> None:
         self._run, self._events = run, events or EventTable()
         self.things = Things()
         self.numbers = self.things.numbers
+        self.stoppers: dict[str, tuple[str, str]] = {}
         self._rates: dict[str, Rate] = {}
         self._commands_hz: dict[str, float] = {}
         self._rated = -math.inf
@@ -115,7 +117,9 @@ class Feed:
         return {
             "i": self.numbers[id_tag],
             "mode": shown_mode(robot.controller),
-            "emergency": latch_shown(robot.controller.latch, run.stage.labels),
+            "emergency": latch_shown(
+                robot.controller.latch, run.stage.labels, self.stoppers.get(id_tag)
+            ),
             "by_hand": robot.controller.by_hand is not None,
             "pattern": self.pattern_of(id_tag),
             "battery": round(robot.charge, 3),

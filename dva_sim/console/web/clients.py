@@ -88,6 +88,11 @@ class Client:
         self.driver: Driver | None = None
         self.is_here = True
 
+    @property
+    def page_role(self) -> str:
+        """Role of an open page by which one drives or decides; empty otherwise."""
+        return self.role.name.lower() if self.is_here and self.role >= Role.DRIVE else ""
+
 
 class Clients:
     """All pages that are here, or were a moment ago.
@@ -105,13 +110,14 @@ class Clients:
         """Pages whose state socket is open."""
         return [client for client in self._all.values() if client.is_here]
 
-    def acting(self) -> dict[str, bool]:
-        """Return who is there and may act, pages and programs, each with whether it is a driver's.
+    def acting(self) -> dict[str, str]:
+        """Return who is there and may act, each with the role of its page.
 
-        A phone drives from its own seat, and a program from the one that it asks for.
+        A phone drives from its own seat, and a program from the one that it asks for: their role
+        is empty.
         """
         return {
-            client.name: client.is_here and client.role >= Role.DRIVE
+            client.name: client.page_role
             for client in self._all.values()
             if client.role.acts and (client.is_here or client.asked)
         }

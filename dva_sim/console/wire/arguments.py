@@ -324,9 +324,9 @@ class LogsLooked(TypedDict):
 
 
 class PagesHere(TypedDict):
-    """Clients that are there and may act, each with whether it may take a free seat."""
+    """Clients that are there and may act, each with the role of its page; empty without one."""
 
-    pages: dict[str, bool]
+    pages: dict[str, str]
 
 
 class SampleBatch(TypedDict):

@@ -144,7 +144,6 @@ class RobotWindowLine(TypedDict):
     stop_reason: str
     link_lost: bool
     notice: str
-    emergency: EmergencyShown | None
     speed_mps: float | None
     turn_rate_radps: float | None
     now_mps: float

@@ -20,11 +20,11 @@ def test_a_client_keeps_its_seat_and_the_lowest_free_one_is_given():
 @pytest.mark.parametrize(
     ("pages", "later", "manned"),
     [
-        ({"a": True}, LATER, {0}),
-        ({"phone": False}, LATER, set()),
-        ({"a": True, "b": True}, LATER, {0, 2}),
-        ({"seated": True}, LATER, {1}),
-        ({"seated": True, "a": True}, LATER, {0, 1}),
+        ({"a": "drive"}, LATER, {0}),
+        ({"phone": ""}, LATER, set()),
+        ({"a": "drive", "b": "drive"}, LATER, {0, 2}),
+        ({"seated": "drive"}, LATER, {1}),
+        ({"seated": "drive", "a": "drive"}, LATER, {0, 1}),
         ({}, RELOADED - 0.1, {0, 1}),
         ({}, LATER, set()),
     ],
@@ -34,7 +34,7 @@ def test_a_seat_is_manned_while_somebody_is_there(pages, later, manned):
     seats.sit("a")
     seats.sit("seated")
     seats.stand_up("a")
-    seats.note_open({"a": True, "seated": True}, 0.0)
+    seats.note_open({"a": "drive", "seated": "drive"}, 0.0)
     seats.note_open(pages, 10.0)
     assert seats.manned([0, 1, 2], 10.0 + later) == manned
 

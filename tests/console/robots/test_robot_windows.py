@@ -132,9 +132,11 @@ def test_an_emergency_wins_over_the_hand_and_is_told_with_who_pressed_it(page):
     by_hand(page, 1.0, seconds=2.0)
     shown = window(page)
     assert (shown["mode"], shown["hand"]) == ("Emergency", None)
-    assert shown["emergency"]["by"] == "console-1"
+    assert page.lines_of("rows")[-1]["robots"][0]["emergency"]["by"] == "page c2"
     assert unnamed(shown["notice"], "manual control", "emergency") == []
     assert page.robot().body.speed == pytest.approx(0.0, abs=1e-3)
+    assert page.do("release_emergency", robots="all", role="supervise")[0]
+    page.let(1.0)
     assert page.do("manual_take", robot=0)[0]
     by_hand(page, 1.0, seconds=2.0)
     assert window(page)["mode"] == "Manual"

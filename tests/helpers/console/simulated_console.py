@@ -68,9 +68,9 @@ class Page:
         self.wanted, self._count = None, 0
         self.world.clock.every(0.03, self._want)
 
-    def are_open(self, *clients):
-        """Say which pages of drivers are open."""
-        self.actions.take({"do": "here", "pages": dict.fromkeys(clients, True)})
+    def are_open(self, *clients, role="drive"):
+        """Say which pages are open."""
+        self.actions.take({"do": "here", "pages": dict.fromkeys(clients, role)})
 
     def do(self, what, /, within=30.0, client=None, **about):
         """An action, and its answer once it comes."""

@@ -246,10 +246,9 @@
  * Contents of a robot's windows.
  * @typedef {{k: 'robot', t: number, i: number, station: Station, mode: string, hand: number |
  *   null, holder: string | null, stop_reason: string, link_lost: boolean, notice: string,
- *   emergency: Emergency | null, speed_mps: number | null, turn_rate_radps: number | null,
- *   now_mps: number, now_radps: number, watchdog_left_s: number | null, one_way: LatencyFigures |
- *   null, loop: LatencyFigures | null, replies: LatencyFigures | null, faults: Faults,
- *   sensors: Sensor[]}} RobotWindow
+ *   speed_mps: number | null, turn_rate_radps: number | null, now_mps: number, now_radps: number,
+ *   watchdog_left_s: number | null, one_way: LatencyFigures | null, loop: LatencyFigures | null,
+ *   replies: LatencyFigures | null, faults: Faults, sensors: Sensor[]}} RobotWindow
  */
 /**
  * A device, as the DVA knows it.

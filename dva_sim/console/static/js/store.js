@@ -135,7 +135,7 @@ export const modeOf = (i) => {
   const shown = rowOf(i)?.mode || 'Idle';
   return ['Emergency', 'Manual'].includes(shown) ? shown : driveOf(i)?.mode || shown;
 };
-/** Reason why a robot cannot be started; empty if no emergency holds it, or a start releases it. @param {number} i */
+/** Reason why a robot cannot be started; empty if no emergency holds it, or a start releases it. @param {number | null} i */
 export const whyStopped = (i) => {
   const emergency = rowOf(i)?.emergency;
   if (!emergency || emergency.released_by === 'drive') return '';

@@ -1,6 +1,6 @@
 /** State of the robots whose pages are open. */
 import { computed, signal } from '../../vendor/preact.js';
-import { rowOf, windows } from '../store.js';
+import { windows } from '../store.js';
 
 /** Number of this page's latest manual control; a robot with the same number is controlled by this page. */
 export const myHand = signal(/** @type {number | null} */ (null));

@@ -31,7 +31,7 @@ function Stop({ text, stopped }) {
   const labels = stopped.map((robot) => robot.label).join(', ');
   const byDriver = stopped.every((robot) => rowOf(robot.i)?.emergency?.released_by === 'drive');
   return html`<p class="warning emergency-bar"><${Icon} name="octagon-x" /><span>${text} · ${labels}
-      ${byDriver && html`<span class="soft">A new start by the driver releases it.</span>`}</span>
+      ${byDriver && html` <span class="soft">A new start by the driver releases it.</span>`}</span>
     ${mayRelease.value && html`<button type="button" aria-label=${`Release ${labels}`}
       onClick=${() => release(stopped)}>Release</button>`}</p>`;
 }
