@@ -19,8 +19,15 @@ STDIN: Final = "-"
 LINK: Final = "link"
 OFFER: Final = "a relay of TCP over the loopback can take its place for measurements without loss"
 QUIET: Final = "run as root for real-time priority, or use an idle machine"
-# The highest of all files counts.
-VALID, INVALID, NOT_READ = ExitCode.OK, ExitCode.DOES_NOT_HOLD, ExitCode.MISTAKE
+VALID, NOT_JUDGED = ExitCode.OK, ExitCode.NOT_JUDGED
+INVALID, NOT_READ = ExitCode.DOES_NOT_HOLD, ExitCode.MISTAKE
+WORDS: Final = {
+    VALID: "valid",
+    NOT_JUDGED: "not judged",
+    INVALID: "invalid",
+    NOT_READ: "not read",
+}
+"""Words for the results; the last one that any file has is that of all."""
 _SHOWN: Final = 50  # problems of one file
 
 
@@ -97,10 +104,9 @@ def _try(kind: str, trial: CheckedKind, name: str, options: Mapping[str, Any]) -
 
 def _sum_up(one: str, many: str, codes: Sequence[ExitCode]) -> ExitCode:
     count = Counter(codes)
-    words = {VALID: "valid", INVALID: "invalid", NOT_READ: "not read"}
-    found = ", ".join(f"{count[code]} {word}" for code, word in words.items() if count[code])
+    found = ", ".join(f"{count[code]} {word}" for code, word in WORDS.items() if count[code])
     print(f"{len(codes)} {one if len(codes) == 1 else many}: {found}")
-    return max(codes, default=VALID)
+    return max(codes, key=list(WORDS).index, default=VALID)
 
 
 def print_schema(kind: str) -> None:
@@ -123,8 +129,10 @@ def _check_one(name: str) -> ExitCode:
     for rule in verdict.rules:
         _say(f"{name}: {rule}")
     if not number and not broken:
-        _say(f"{name}: {verdict.kind}: valid" + (f"; {verdict.note}" if verdict.note else ""))
-        return VALID
+        words = filter(None, (verdict.unjudged, verdict.note))
+        code = NOT_JUDGED if verdict.unjudged else VALID
+        _say("; ".join((f"{name}: {verdict.kind}: {WORDS[code]}", *words)))
+        return code
     more = f", the first {_SHOWN} shown" if number > _SHOWN else ""
     found = [f"{number} problem{'s'[: number > 1]}{more}"] if number else []
     found += [f"breaks {broken} safety rule{'s'[: broken > 1]}"] if broken else []

@@ -24,7 +24,7 @@ from dva_sim.live.process import Report, run_part
 from dva_sim.live.supervisor import Summary, Supervisor
 from dva_sim.network.sockets import DEFAULT_PORT
 from dva_sim.serving.open_port import OpenPort, open_port
-from dva_sim.simulation.full.verdicts import Verdict, refuse_broken
+from dva_sim.simulation.full.verdicts import Verdict, refuse_unheld
 from dva_sim.simulation.scenario import contradictions
 
 if TYPE_CHECKING:
@@ -218,7 +218,7 @@ def run_one(part: str, options: LiveOptions, number: int) -> None:
         found = run_part(part, options, say, number)
     console.print(board.table())
     _print_rules(console, found)
-    refuse_broken(found)
+    refuse_unheld(found)
 
 
 class InOrder:
@@ -261,7 +261,7 @@ def _conclude(console: Console, board: Board, summary: Summary, options: LiveOpt
     _print_rules(console, summary.verdicts)
     if summary.lost is not None:
         raise DvaSimError(summary.lost)
-    refuse_broken(summary.verdicts)
+    refuse_unheld(summary.verdicts)
 
 
 def _print_rules(console: Console, found: Sequence[Verdict]) -> None:

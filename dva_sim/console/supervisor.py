@@ -27,7 +27,7 @@ from dva_sim.ros.gateway import RosGateway
 from dva_sim.ros.server import RosbridgeServer
 from dva_sim.serving.open_port import open_port
 from dva_sim.serving.pipes import PipeEnd
-from dva_sim.simulation.full.verdicts import refuse_broken, verdicts
+from dva_sim.simulation.full.verdicts import refuse_unheld, verdicts
 from dva_sim.simulation.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class ConsoleSupervisor:
             raise ChildFailed(self._processes.failed)
         if options.record is not None:
             self._say(f"{options.record} written")
-        refuse_broken(found)
+        refuse_unheld(found)
 
     def _write(self, results: KeptResults) -> None:
         """Write the results even after an earlier error, and report both errors."""

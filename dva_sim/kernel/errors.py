@@ -20,6 +20,7 @@ class ExitCode(IntEnum):
     MISTAKE = 2
     RUNS_FAILED = 3
     GATE_FAILED = 4
+    NOT_JUDGED = 5
     INTERRUPTED = 130
     READER_GONE = 141
 
@@ -35,6 +36,7 @@ _MEANINGS: Final = {
     ExitCode.MISTAKE: "usage error, invalid file, or a file that cannot be read or written",
     ExitCode.RUNS_FAILED: "runs or tables failed (run again to retry), or a plug-in failed",
     ExitCode.GATE_FAILED: "a gate failed: `compare --fail-if` holds, or `validate` misses",
+    ExitCode.NOT_JUDGED: "facts to judge some safety rules are missing; none is broken",
     ExitCode.INTERRUPTED: "stopped by Ctrl-C; what is finished is kept (`live`, `console`: 0)",
     ExitCode.READER_GONE: "the reader of the output has ended, as in `| head`",
 }

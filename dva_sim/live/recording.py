@@ -194,7 +194,7 @@ class LiveRecorder(Recorder):
         return not (self.is_own(device) or device in self.team)
 
     def _note_sent(self, node: str, destination: str, payload: bytes) -> None:
-        """Keep a message of a device of ours; an answer that no rule looks at is no fact."""
+        """Keep a message of a device of ours; answers that no rule looks at are not facts."""
         to_stranger = self._is_stranger(destination)
         if to_stranger and any(word in payload for word in _ORDERED):
             self._ordered.add(destination)

@@ -74,6 +74,15 @@ class FileVerdict:
         """Return the number of safety rules that are broken."""
         return len({verdict.rule for verdict in self.rules if verdict.is_broken})
 
+    @property
+    def unjudged(self) -> str:
+        """Return the safety rules that lack facts in a line; empty: none."""
+        if not self.rules:
+            return ""
+        from dva_sim.simulation.full.verdicts import unjudged_rules  # late: start-up
+
+        return unjudged_rules(self.rules)
+
 
 def check_file(path: Path) -> FileVerdict:
     """Judge one file.

@@ -18,6 +18,7 @@ import dva_sim
 from dva_sim.console.replay.console import ReplayOptions
 from dva_sim.console.replay.player import playing
 from dva_sim.core.dva import Dva
+from dva_sim.core.events import EventTable
 from dva_sim.core.store import Store
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
@@ -30,11 +31,13 @@ from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import dva_server
 from dva_sim.simulation.full.dva_trace import TracedDva, replay_dva, traced
+from dva_sim.simulation.full.observations import STATIONARY, FactLog, Page
 from dva_sim.simulation.full.run import Run
-from dva_sim.simulation.full.stage import id_of
+from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.testing.evidence import check_recording, check_trace
 
 ROBOT, PHONE = id_of("robot", 1), id_of("operator", 1)
+PAGE = Page(EventTable(1.0), (), True)
 Change = Callable[[list[dict[str, Any]]], object]
 
 
@@ -197,6 +200,47 @@ def test_a_part_says_no_more_in_a_second_than_was_agreed(monkeypatch):
         for number in range(1, 101):
             recorder.message(PHONE, message(number), True)
     assert 95 <= recorder.counters["not recorded"] < 100
+
+
+@pytest.mark.parametrize("source", [PHONE, "AA:BB:CC:DD:EE:01"])
+def test_strangers_leave_half_of_the_room_to_the_devices_of_the_run(monkeypatch, source):
+    monkeypatch.setattr(recording, "BYTES_PER_SECOND", 100_000)
+    monkeypatch.setattr(recording.time, "monotonic", lambda: 5.0)
+    clock = Clock()
+    with Path(os.devnull).open("wb") as nowhere:
+        recorder = LiveRecorder(clock, PipeEnd(nowhere.fileno()), keeps=False)
+        recorder.team = {PHONE, ROBOT}
+        recorder.log = FactLog(recorder.observe, {ROBOT}, lambda _: STATIONARY, keeps_sent=False)
+        for number in range(1, 1001):
+            recorder.message(ROBOT, message(number, source), False)
+        used = recording.BYTES_PER_SECOND - recorder._room
+        most = 100_000 if source == PHONE else 50_000
+        assert most <= used < most + 1000
+        assert [gap.missing > 500 for gap in recorder._gaps.values()] == [True]
+        recorder.message(ROBOT, message(1, PHONE), True)
+        assert (False in recorder._gaps) == (source == PHONE)
+
+
+@pytest.mark.parametrize("has_order", [False, True])
+def test_registrations_of_strangers_without_an_order_are_no_facts(has_order):
+    reads, writes = os.pipe()
+    recorder = LiveRecorder(Clock(), PipeEnd(writes), keeps=False)
+    recorder.is_own = {DVA}.__contains__
+    recorder.log = FactLog(
+        recorder.observe, (), lambda _: STATIONARY, lambda: PAGE, keeps_sent=False
+    )
+    stranger = "AA:BB:CC:DD:EE:01"
+    if has_order:
+        order = m.Order(1, "fire", m.Position(1.0, 2.0), None)
+        recorder.message(DVA, encode(m.Message(stranger, 1, DVA, "12:00:00", 0, order)), True)
+    wish = m.Registration("mine", "Guard", "127.0.0.1:9999")
+    recorder.message(DVA, encode(m.Message(DVA, 5, stranger, "12:00:00", 0, wish)), False)
+    recorder.log.shows(0.0, PAGE)
+    lines = [json.loads(line) for line in os.read(reads, 1 << 20).splitlines()]
+    facts = [line[2] for line in lines if line[0] == "seen"]
+    assert facts == (["book", "arrived", "book"] if has_order else ["heard", "book"])
+    os.close(reads)
+    os.close(writes)
 
 
 def test_of_strangers_what_arrives_is_kept_of_others_what_they_send():

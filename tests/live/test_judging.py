@@ -3,11 +3,13 @@
 import json
 import random
 from collections import defaultdict
+from contextlib import nullcontext
 from typing import Any
 
 import pytest
 
 from dva_sim.agents.robot.controller import Decision, RobotController
+from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.recorder import Sent
 from dva_sim.live.judging import FRAME, HERE, SEEN, SENT_LINE, LiveJudge
 from dva_sim.protocol import messages as m
@@ -17,14 +19,16 @@ from dva_sim.simulation.full.observation_json import as_plain
 from dva_sim.simulation.full.observations import (
     Arrived,
     BookNews,
+    FactGap,
     Heard,
     MotionNews,
     RobotMotion,
+    Slowed,
     terms_of,
 )
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA, id_of, kind_of
-from dva_sim.simulation.full.verdicts import RULES
+from dva_sim.simulation.full.verdicts import RULES, Judge, Verdict, refuse_unheld, rules_on
 
 ROBOT, PHONE, OTHER = id_of("robot", 1), id_of("operator", 1), id_of("operator", 2)
 WORLD, AT_DVA, REST = 1, 0, 2  # parts
@@ -133,6 +137,72 @@ def test_what_could_not_be_said_leaves_every_rule_unjudged():
     lines = lines_by_part(run)
     lines[WORLD].insert(50, [SEEN, lines[WORLD][50][1], "gap", {"missing": 3}])
     assert judged(run, lines) == dict.fromkeys(RULES, "not judged")
+
+
+@pytest.mark.parametrize(
+    ("rules", "unjudged"),
+    [((), set(RULES)), (("S6",), {"S6"}), (("S1", "S2"), {"S1", "S2"})],
+)
+def test_a_gap_leaves_only_the_rules_that_depend_on_it_unjudged(rules, unjudged):
+    run = drive(10.0)
+    lines = lines_by_part(run)
+    gap = {"missing": 3, "since_s": 4.0, "rules": list(rules)}
+    lines[WORLD].insert(50, [SEEN, lines[WORLD][50][1], "gap", gap])
+    found = judged(run, lines)
+    assert {rule for rule, state in found.items() if state == "not judged"} == unjudged
+
+
+@pytest.mark.parametrize(
+    ("time", "state"),
+    [
+        (3.9, "broken"),
+        (4.0, "not judged"),
+        (6.0, "not judged"),
+        (10.9, "not judged"),
+        (11.1, "broken"),
+    ],
+)
+def test_a_gap_voids_breaches_of_its_own_span_alone(time, state):
+    judge = Judge(terms_of(scenarios.build(scenarios.load("drive-to-event"), {})))
+    gap = FactGap(6.0, 3, 4.0, ("S4",))
+    for moment in sorted({time, gap.time}):
+        if moment == gap.time:
+            judge.take(gap)
+        if moment == time:
+            judge.recorder.violated("S4", time, "robot-1", "too fast")
+            judge.take(Slowed(time, 0.0))
+    assert {v.rule: v.state for v in judge.verdicts()}["S4"] == state
+
+
+@pytest.mark.parametrize(
+    ("sees", "of_strangers", "rules"),
+    [
+        ((True, False), False, "S1 S2 S3 S4 S5"),
+        ((True, False), True, "S1 S2 S3 S5"),
+        ((False, True), False, "S2 S5 S6 S7"),
+        ((False, True), True, "S2 S6"),
+        ((False, False), False, "S1 S2 S3 S5"),  # an operator
+        ((True, True), False, "S1 S2 S3 S4 S5 S6 S7"),
+    ],
+)
+def test_a_rule_depends_on_the_facts_of_some_parts(sees, of_strangers, rules):
+    assert rules_on(*sees, of_strangers) == tuple(rules.split())
+
+
+@pytest.mark.parametrize(
+    ("found", "code"),
+    [
+        ([], 0),
+        ([Verdict("S1", "held", "")], 0),
+        ([Verdict("S1", "not judged", "")], 0),  # no robot takes part
+        ([Verdict("S1", "not judged", "", lacks_facts=True)], 5),
+        ([Verdict("S1", "not judged", "", lacks_facts=True), Verdict("S2", "broken", "")], 1),
+    ],
+)
+def test_each_outcome_has_an_exit_code(found, code):
+    with pytest.raises(DvaSimError) if code else nullcontext() as failure:
+        refuse_unheld(found)
+    assert (failure.value.exit_code if failure else 0) == code
 
 
 def test_a_judge_that_has_failed_has_held_nothing():

@@ -74,7 +74,7 @@ def test_a_recording_without_facts_is_not_taken_to_hold_any_rule(tmp_path, monke
     monkeypatch.setattr(run.recorder, "facts", None)
     write_recording(run, tmp_path / "old.mcap")
     code, rules, lines = checked(tmp_path / "old.mcap")
-    assert (code, rules) == (0, dict.fromkeys(RULES, "not judged"))
+    assert (code, rules) == (5, dict.fromkeys(RULES, "not judged"))
     assert unnamed(lines, "how robots moved", "the DVA's book") == []
 
 

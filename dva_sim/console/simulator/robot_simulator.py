@@ -20,7 +20,7 @@ from dva_sim.network.keys import KeyRing
 from dva_sim.simulation.full.verdicts import (
     EVENTS_UNKNOWN,
     OF_THE_DVA,
-    refuse_broken,
+    refuse_unheld,
     verdicts,
 )
 from dva_sim.simulation.scenario import Scenario
@@ -103,7 +103,7 @@ class RobotSimulator:
             self._say(str(verdict))
         if self._processes.failed:
             raise ChildFailed(self._processes.failed)
-        refuse_broken(found)
+        refuse_unheld(found)
 
     def _run(self, world: RobotWorld) -> None:
         about = {"robot": world.robot.device.label}

@@ -44,11 +44,13 @@ class Verdict:
         rule: Name of the rule, such as `S1`.
         state: `held`, `broken` or `not judged`.
         text: The rule in words, a breach of it, or the reason why it was not judged.
+        lacks_facts: True if it was not judged because facts are missing that should be there.
     """
 
     rule: str
     state: str
     text: str
+    lacks_facts: bool = False
 
     @property
     def is_broken(self) -> bool:
@@ -88,7 +90,10 @@ def broken_lines(broken: Iterable[Breach]) -> dict[str, list[str]]:
 
 
 def verdicts(
-    recorder: Recorder, not_judged: Mapping[str, str] | None = None, until: str = ""
+    recorder: Recorder,
+    not_judged: Mapping[str, str] | None = None,
+    until: str = "",
+    lost: Mapping[str, str] | None = None,
 ) -> list[Verdict]:
     """Return a verdict on each rule, in order; one for each agent where several broke it.
 
@@ -96,12 +101,15 @@ def verdicts(
         recorder: Holds the breaches that an audit has found.
         not_judged: Rules that could not be judged, each with the reason.
         until: Time up to which the run was judged, in words; empty: all of it.
+        lost: Rules that lack facts which should be there, each with the reason.
     """
-    broken, why_not = broken_lines(recorder.broken.values()), not_judged or {}
+    broken, why_not, lost = broken_lines(recorder.broken.values()), not_judged or {}, lost or {}
     found: list[Verdict] = []
     for rule, says in RULES.items():
         if rule in broken:
             found += [Verdict(rule, BROKEN, line) for line in broken[rule]]
+        elif rule in lost:
+            found.append(Verdict(rule, NOT_JUDGED, lost[rule], lacks_facts=True))
         elif rule in why_not:
             found.append(Verdict(rule, NOT_JUDGED, why_not[rule]))
         else:
@@ -115,14 +123,29 @@ class RulesBroken(DvaSimError):
     exit_code = ExitCode.DOES_NOT_HOLD
 
 
-def refuse_broken(found: Iterable[Verdict]) -> None:
-    """Raise an error if any rule was broken.
+class RulesNotJudged(DvaSimError):
+    """Facts are missing to judge a run by all safety rules; no rule is known to be broken."""
+
+    exit_code = ExitCode.NOT_JUDGED
+
+
+def refuse_unheld(found: Sequence[Verdict]) -> None:
+    """Raise an error if any rule was broken, or could not be judged for lack of facts.
 
     Raises:
         RulesBroken: one was broken.
+        RulesNotJudged: none was broken, but facts are missing.
     """
     if broken := broken_rules(found):
         raise RulesBroken(broken)
+    if unjudged := unjudged_rules(found):
+        raise RulesNotJudged(unjudged)
+
+
+def unjudged_rules(found: Iterable[Verdict]) -> str:
+    """Return the names of all rules that lack facts in a line; empty: none."""
+    unjudged = [verdict.rule for verdict in found if verdict.lacks_facts]
+    return f"facts are missing to judge {', '.join(unjudged)}" if unjudged else ""
 
 
 def broken_rules(found: Iterable[Verdict]) -> str:
@@ -193,10 +216,11 @@ class Judge:
 
     def verdicts(self, until: str = "") -> list[Verdict]:
         """Return the verdicts so far; see the function `verdicts`."""
-        return verdicts(self.recorder, self._not_judged(), until)
+        lost = {rule: _lost(gaps) for rule in RULES if (gaps := self._gaps_of(rule))}
+        return verdicts(self.recorder, self._not_judged(), until, lost)
 
     def _not_judged(self) -> dict[str, str]:
-        why_not = {rule: _lost(gaps) for rule in RULES if (gaps := self._gaps_of(rule))}
+        why_not: dict[str, str] = {}
         if not self._terms.motors:
             why_not |= dict.fromkeys(OF_ROBOTS, "no robot of the scenario takes part")
         elif not self._sees_robots:
@@ -240,7 +264,7 @@ def judged(
     if facts is None or terms is None:
         lacks = dict.fromkeys(RULES, "it lacks what the DVA's book showed")
         lacks |= dict.fromkeys(OF_ROBOTS, "it lacks how robots moved, and what reached them when")
-        return verdicts(Recorder(), lacks)
+        return verdicts(Recorder(), lost=lacks)
     judge = Judge(terms)
     for fact in facts:
         judge.take(fact)
