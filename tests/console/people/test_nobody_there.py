@@ -3,6 +3,7 @@
 import pytest
 from helpers.console.simulated_phone import PhonePage
 
+from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.asking.seats import RELOADED
 from dva_sim.core.roles import ControlRoomRole
 from dva_sim.ros.gateway import RosGateway
@@ -117,3 +118,17 @@ def test_a_control_room_decides_only_while_its_page_is_open(page, is_open):
     page.are_open("c1")
     page.let(2.0)
     assert dispatcher.somebody_decides()
+
+
+def test_an_emergency_stop_needs_no_open_page(page):
+    """A program asks for it, whose seat nobody has ever manned."""
+    page.are_open()
+    gateway = RosGateway(page.world.run.stage, lambda: page.world.console)
+    page.let(5.0)
+    driver, answers = gateway.driver(), []
+    robot = page.robot()
+    driver.take(robot.device.id_tag, lambda done, text: answers.append(done))
+    page.until(lambda: answers)
+    assert (answers, robot.controller.mode) == ([True], Mode.TELEOPERATION)
+    assert page.do("emergency", robots="all", client="program")[0]
+    assert robot.controller.mode is Mode.IDLE
