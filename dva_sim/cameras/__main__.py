@@ -13,7 +13,6 @@ import signal
 import socket
 import sys
 import threading
-import time
 from collections.abc import Sequence
 
 from starlette.applications import Starlette
@@ -21,17 +20,16 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
-from starlette.types import ASGIApp, Receive, Scope, Send
 
 from dva_sim.cameras.painting import NICENESS, run
 from dva_sim.cameras.streaming import PictureStream
 from dva_sim.cameras.streams import MOST_VIEWERS, CameraStreams, headers_of
-from dva_sim.serving.connection import place_of
+from dva_sim.serving.admission import Admission, own_names
 from dva_sim.serving.pipes import PipeEnd, WatchedEnd
+from dva_sim.serving.port_guard import CLIENT, PortGuard
 from dva_sim.serving.port_listener import fitting_places
 from dva_sim.serving.server import Server, serve
 
-ANYBODY = 1  # rank of all viewers: nobody shows a token here
 MOST_REQUEST = 16 * 1024  # of which a path and headers consist [B]
 REPEATED = 1.0  # so often is said again who is watched [s]
 NOT_KEPT = {"Cache-Control": "no-store"}
@@ -54,7 +52,7 @@ class CameraPages:
         robot = self._robot(request)
         if request.method == "HEAD":
             return Response(headers=NOT_KEPT, media_type=PictureStream.media_type)
-        viewer = self._streams.admit(robot, ANYBODY)
+        viewer = self._streams.admit(robot, CLIENT)
         if viewer is None:
             raise HTTPException(503, f"{MOST_VIEWERS} viewers are looking already")
         return PictureStream(self._streams, viewer)
@@ -62,7 +60,7 @@ class CameraPages:
     async def still(self, request: Request) -> Response:
         """`GET /camera/LABEL.jpg`."""
         robot = self._robot(request)
-        viewer = self._streams.admit(robot, ANYBODY)
+        viewer = self._streams.admit(robot, CLIENT)
         picture = None if viewer is None else await self._streams.one(viewer)
         if picture is None:
             raise HTTPException(503, "no picture")
@@ -84,7 +82,7 @@ async def _refused(_: Request, error: Exception) -> Response:
     return PlainTextResponse(f"{error.detail}\n", error.status_code, headers=headers)
 
 
-async def _serve(world: int, listener: socket.socket, labels: Sequence[str]) -> None:
+async def _serve(world: int, listener: socket.socket, host: str, labels: Sequence[str]) -> None:
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
     painter, ours = socket.socketpair()
 
@@ -118,26 +116,13 @@ async def _serve(world: int, listener: socket.socket, labels: Sequence[str]) -> 
     ]
     app = Starlette(routes=routes, exception_handlers={HTTPException: _refused})
     closing = asyncio.ensure_future(_close_when(ended, streams))
-    server = Server.of(_counted(app), MOST_REQUEST, ws="none")
+    # Pictures have no token: their address goes to all devices, by messages of the DVA.
+    guarded = PortGuard(app, Admission(own_names(host)))
+    server = Server.of(guarded, MOST_REQUEST, ws="none")
     await serve(server, listener, fitting_places(1), ended)
     for task in (saying, closing):
         task.cancel()
     pictures.close()
-
-
-def _counted(app: ASGIApp) -> ASGIApp:
-    """An application whose connections count as served while a request is in progress."""
-
-    async def counted(scope: Scope, receive: Receive, send: Send) -> None:
-        place = place_of(scope)
-        served = place.begin(ANYBODY, time.monotonic())
-        answer = app if served else PlainTextResponse("too many connections are in use\n", 503)
-        try:
-            await answer(scope, receive, send)
-        finally:
-            place.end(time.monotonic())
-
-    return counted
 
 
 async def _close_when(ended: asyncio.Event, streams: CameraStreams) -> None:
@@ -150,6 +135,7 @@ def main(given: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="dva_sim.cameras", description=__doc__)
     parser.add_argument("--fd", type=int, required=True, help="socket to the run")
     parser.add_argument("--listen-fd", type=int, required=True, help="listening socket")
+    parser.add_argument("--host", required=True, help="host that it listens on")
     parser.add_argument("--labels", type=json.loads, required=True, help="of the robots, as JSON")
     options = parser.parse_args(given)
     # Ctrl-C reaches all processes of a terminal; the run says when it is over.
@@ -157,7 +143,7 @@ def main(given: Sequence[str] | None = None) -> int:
     os.nice(NICENESS)
     listener = socket.socket(fileno=options.listen_fd)
     listener.setblocking(False)
-    asyncio.run(_serve(options.fd, listener, options.labels))
+    asyncio.run(_serve(options.fd, listener, options.host, options.labels))
     return 0
 
 

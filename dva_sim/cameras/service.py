@@ -49,7 +49,7 @@ class CameraService:
             self._listener = listen(host, port)
         except ConfigError:
             self._listener = listen(host, 0)
-        self._clock, self._tell = clock, tell
+        self._clock, self._tell, self._host = clock, tell, host
         shown = f"[{host}]" if ":" in host else host
         self.base = f"http://{shown}:{self._listener.getsockname()[1]}/"
         self._run: FilmedRun | None = None
@@ -79,7 +79,8 @@ class CameraService:
     def _begin(self) -> None:
         """Start the process that draws and serves; it accepts the first viewer."""
         self._clock.unwatch(self._listener.fileno())
-        words = ["--listen-fd", str(self._listener.fileno()), "--labels", json.dumps(self._labels)]
+        words = ["--listen-fd", str(self._listener.fileno()), "--host", self._host]
+        words += ["--labels", json.dumps(self._labels)]
         child = self._child = Child("camera process", MODULE, words, [self._listener], PAINTED)
         self._clock.watch(child.pipe.fileno(), self._hear)
         self._greet(child)

@@ -53,13 +53,8 @@ class HttpProtocol(H11Protocol):
 
     def cut(self) -> None:
         """End the connection at once, also under a WebSocket; what is on its way is lost."""
-        if self._is_lost:
-            return
-        sock = self.transport.get_extra_info("socket")
-        if sock is not None:
-            with suppress(OSError):
-                sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_LINGERING)
-        self.transport.abort()
+        if not self._is_lost:
+            reset(self.transport)
 
     def send_400_response(self, msg: str) -> None:
         """Reject input that is not HTTP; if an answer has begun or ended, only close."""
@@ -78,6 +73,15 @@ class HttpProtocol(H11Protocol):
         self._is_lost = True
         super().connection_lost(exc)
         self._place.leave()
+
+
+def reset(transport: Any) -> None:
+    """End a connection at once; what is on its way is lost."""
+    sock = transport.get_extra_info("socket")
+    if sock is not None:
+        with suppress(OSError):
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_LINGERING)
+    transport.abort()
 
 
 def extended(app: Any, more: dict[str, Any]) -> ASGIApp:

@@ -10,7 +10,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.exceptions import InvalidState
 
-from dva_sim.serving.connection import PLACE, WIRE, extended, wire_of
+from dva_sim.serving.connection import PLACE, WIRE, extended, reset, wire_of
 from dva_sim.serving.port_connections import PortConnection
 
 STALLED: Final = 5.0  # without a byte taken, a client is dropped [s]
@@ -38,7 +38,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
     def keepalive_timeout(self) -> None:
         """Cut a client that answers no ping; it will not read what waits for it either."""
         super().keepalive_timeout()
-        self.transport.abort()
+        reset(self.transport)
 
     @property
     def waiting(self) -> int:
