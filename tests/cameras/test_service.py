@@ -6,7 +6,7 @@ import os
 import re
 import signal
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from threading import Thread
 
 import pytest
@@ -83,13 +83,13 @@ class LiveWorld:
         self.clock.run(self.clock.now + PATIENCE_S)
         assert condition()
 
-    def asked(self, path: str) -> tuple[int, bytes]:
+    def asked(self, path: str, headers: Mapping[str, str] | None = None) -> tuple[int, bytes]:
         """The answer to a request that ends."""
         answers = list[tuple[int, bytes]]()
 
         def ask() -> None:
             connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
-            connection.request("GET", path)
+            connection.request("GET", path, headers=headers or {})
             answer = connection.getresponse()
             answers.append((answer.status, answer.read()))
             connection.close()
@@ -161,13 +161,28 @@ def test_a_single_picture_and_what_there_is_not(world):
     assert world.asked("/camera/..%2f..%2fetc/passwd.jpg")[0] == 404
 
 
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"Host": "evil.example"}, 421),
+        ({"Origin": "https://evil.example"}, 403),
+        ({"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors"}, 403),
+        ({"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "navigate"}, 200),
+        ({"Sec-Fetch-Site": "same-origin"}, 200),
+    ],
+    ids=str,
+)
+def test_a_page_of_another_site_sees_no_pictures(world, headers, status):
+    assert world.asked("/camera/robot-1.jpg", headers)[0] == status
+
+
 def test_more_viewers_than_there_is_room_for_are_refused(world):
     viewers = [socket.create_connection(("127.0.0.1", world.port)) for _ in range(MOST_VIEWERS)]
 
     def look() -> None:
         for viewer in viewers:
             viewer.settimeout(PATIENCE_S)
-            viewer.sendall(b"GET /camera/robot-1.mjpg HTTP/1.1\r\nHost: here\r\n\r\n")
+            viewer.sendall(b"GET /camera/robot-1.mjpg HTTP/1.1\r\nHost: localhost\r\n\r\n")
         for viewer in viewers:
             assert viewer.recv(100).startswith(b"HTTP/1.1 200")
 

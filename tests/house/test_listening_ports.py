@@ -1,4 +1,4 @@
-"""The same questions to every port that the program listens on, and a reason where one is left out.
+"""Questions that every port of the program has to answer, and a reason where one is left out.
 
 Visitors of all kinds come to all ports at once, and in greater number than there are places. While
 they are there, a client with the token is let in; those that say nothing of use are cut in time.
@@ -116,16 +116,16 @@ class Port:
         return upgrade(url, **more | headers)
 
     def answer(self, sock: socket.socket, hello: bytes) -> int:
-        """Status of the answer; for ZMTP 0 if the peer is greeted and made ready."""
-        sock.settimeout(20.0)
-        sock.sendall(hello)
-        if self.status:
-            return int(sock.recv(12).split()[1])
-        sock.sendall(READY)
+        """Status of the answer, 0 for a greeting by ZMTP; -1: there is none."""
         data = b""
-        while len(data) < 72:
-            data += sock.recv(100)
-        return 0 if data[0] == 0xFF and b"READY" in data else -1
+        with contextlib.suppress(OSError):
+            sock.settimeout(20.0)
+            sock.sendall(hello if self.status else hello + READY)
+            while len(data) < (12 if self.status else 72) and (more := sock.recv(12)):
+                data += more
+        if not self.status:
+            return 0 if b"READY" in data else -1
+        return int(data.split()[1]) if data else -1
 
     def asked(self, **headers: str) -> int:
         """Status of the answer to one request."""
