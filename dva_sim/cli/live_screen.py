@@ -46,14 +46,18 @@ COLUMNS = (
 
 
 class Board:
-    """State of all devices, assembled from the reports of all parts."""
+    """State of all devices, assembled from the reports of all parts.
+
+    Attributes:
+        addresses: Lines that say where others connect, to be printed once the DVA listens.
+    """
 
     def __init__(self) -> None:
         self.devices: dict[str, dict[str, Any]] = {}
         self.events: list[dict[str, Any]] = []
         self.story: list[list[Any]] = []
         self.time = 0.0
-        self.dva = ""
+        self.dva, self.addresses = "", list[str]()
         self._registered: set[str] = set()
 
     def hear(self, report: Report) -> list[list[Any]]:
@@ -134,7 +138,7 @@ def run_all(options: LiveOptions) -> None:
     door = None
     if options.rosbridge is not None:
         door = open_port(options.host, options.rosbridge, "--rosbridge", options.token)
-        _print(console, f"rosbridge: {door.url}")
+        board.addresses.append(f"rosbridge: {door.url}")
     with ExitStack() as at_end:
         viewer = None
         if options.foxglove is not None:
@@ -143,7 +147,7 @@ def run_all(options: LiveOptions) -> None:
             port = open_port(LOCALHOST, options.foxglove, "--foxglove", options.token)
             viewer = FoxgloveServer(options.read(), options.seed, port)
             at_end.callback(viewer.close)
-            _print(console, viewer.where)
+            board.addresses.append(viewer.where)
         summary = _watched(console, board, partial(Supervisor, options), door, viewer)
     _conclude(console, board, summary, options)
 
@@ -179,9 +183,11 @@ def warn(console: Console, options: LiveOptions) -> None:
 
 
 def _say_where(console: Console, board: Board, report: Report) -> None:
-    """Say once where the DVA listens, for those who want to join."""
+    """Print once where the DVA listens, and with it all other addresses: all can be reached."""
     if report.dva is not None and report.dva != board.dva:
-        _print(console, f"DVA: {report.dva}")
+        for line in (f"DVA: {report.dva}", *board.addresses):
+            _print(console, line)
+        board.addresses.clear()
 
 
 def _print(console: Console, line: str) -> None:

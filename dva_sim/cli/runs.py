@@ -227,7 +227,13 @@ def live(
         ),
         "modelled",
     ),
-    dva_port=(count("With --links real: port of the DVA; 0: any free port.", **_PORT), 0),
+    dva_port=(
+        count(
+            "With --links real: first of the two ports of the DVA; 0: any two free ports.",
+            **_PORT,
+        ),
+        0,
+    ),
     transport=_TRANSPORT,
     link=(text("With --links real: " + _LINK, metavar="KEY=VALUE|FILE", of=list[str] | None), None),
     dva=(text("Show the system of this DVA; SCENARIO provides the map.", metavar=_ADDRESS), None),
@@ -357,7 +363,10 @@ def console(
     number=(count("Number of the robot, which gives its id and label.", least=1, most=1000), 1),
     ros=(text("Control a ROS robot through its rosbridge server.", metavar="ws://HOST:PORT"), None),
     namespace=(text("With --ros: namespace of its topics.", metavar="NAME", of=str), "robot_1"),
-    listen=(count("Port for requests; 0: any free port.", **_PORT), 0),
+    listen=(
+        count("Port for requests; publications take the next one. 0: any two free ports.", **_PORT),
+        0,
+    ),
     port=PAGE["port"],
     host=PAGE["host"],
     keys=(folder("Folder of keys; see `dva-sim keys`."), None),

@@ -32,7 +32,7 @@ class ConsoleOptions(PageOptions):
         seed: Random seed.
         changes: Changes of the scenario, `KEY=VALUE`.
         links: `modelled` as in a study, or `real`: sockets, which others may join.
-        dva_port: Port of the DVA on real links; 0: any that is free.
+        dva_port: First of the two ports of the DVA on real links; 0: any two that are free.
         transport: Transport of the messages on real links, as on the command line.
         emulated: The scenario's link is emulated between the robots and everybody else.
         record: Recording to be made, if any.

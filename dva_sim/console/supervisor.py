@@ -25,7 +25,7 @@ from dva_sim.network.emulator.process import LinkEnded
 from dva_sim.network.emulator.report import LinkReport
 from dva_sim.ros.gateway import RosGateway
 from dva_sim.ros.server import RosbridgeServer
-from dva_sim.serving.open_port import open_port
+from dva_sim.serving.open_port import OpenPort, open_port
 from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation.full.verdicts import refuse_unheld, verdicts
 from dva_sim.simulation.scenario import Scenario
@@ -53,6 +53,8 @@ class ConsoleSupervisor:
         self._options, self._say = options, say
         self._processes = ConsoleProcesses(options, say)
         self.packets: LinkReport | None = None
+        self._rosbridge: OpenPort | None = None
+        self._foxglove: OpenPort | None = None
         self._viewer: FoxgloveServer | None = None
 
     def run(self) -> None:
@@ -76,6 +78,9 @@ class ConsoleSupervisor:
     def _play(self, scenario: Scenario, seed: int, results: KeptResults | None) -> None:
         """Run it, and write all that is wanted of it, whatever else goes wrong."""
         options = self._options
+        # All ports are open before the world begins, and before any address is printed.
+        self._rosbridge = self._open("--rosbridge", options.host, options.rosbridge)
+        self._foxglove = self._open("--foxglove", LOCALHOST, options.foxglove)
         world = ConsoleWorld(
             *(scenario, options.scenario, seed),
             sockets=options.sockets(),
@@ -116,7 +121,7 @@ class ConsoleSupervisor:
     def _recorded(self, world: ConsoleWorld) -> Iterator[None]:
         """Keep a recording of what happens, if one is wanted; in the end all is closed."""
         options, keeper, outlet, inlets = self._options, None, None, None
-        viewer = self._viewer = self._open_foxglove(world)
+        viewer = self._viewer = self._show_to_foxglove(world)
         also = None if viewer is None else viewer.keep
         if options.record is not None:
             keeper = Keeper(options.record, world.scenario, world.seed, also=also)
@@ -147,17 +152,16 @@ class ConsoleSupervisor:
             if lost is not None and sys.exc_info()[0] is None:
                 raise DvaSimError(lost)
 
-    def _open_foxglove(self, world: ConsoleWorld) -> FoxgloveServer | None:
-        """Serve the run to Foxglove, if that is wanted."""
-        options = self._options
-        if options.foxglove is None:
+    def _open(self, option: str, host: str, port: int | None) -> OpenPort | None:
+        """Open a port for programs of other makes, if it is wanted."""
+        return None if port is None else open_port(host, port, option, self._options.token)
+
+    def _show_to_foxglove(self, world: ConsoleWorld) -> FoxgloveServer | None:
+        if self._foxglove is None:
             return None
         from dva_sim.live.foxglove_server import FoxgloveServer  # late: start-up
 
-        port = open_port(LOCALHOST, options.foxglove, "--foxglove", options.token)
-        viewer = FoxgloveServer(world.scenario, world.seed, port)
-        self._say(viewer.where)
-        return viewer
+        return FoxgloveServer(world.scenario, world.seed, self._foxglove)
 
     def _about(self, world: ConsoleWorld) -> dict[str, Any]:
         options = self._options
@@ -170,8 +174,10 @@ class ConsoleSupervisor:
             self._processes.start(world, actions.take, audit=path)
             if world.sockets is not None:
                 self._say(f"DVA: {world.sockets.dva}")
-            rosbridge = self._serve_ros(world)
+            port = self._rosbridge
+            rosbridge = None if port is None else self._serve_ros(world, port)
             if self._viewer is not None:
+                self._say(self._viewer.where)
                 self._viewer.camera_base = str(self._processes.serving["base"])
                 self._viewer.camera_token = self._look_token
             if not ending.is_asked:
@@ -185,12 +191,8 @@ class ConsoleSupervisor:
                 rosbridge.close()
             self._leave(world)
 
-    def _serve_ros(self, world: ConsoleWorld) -> RosbridgeServer | None:
-        """Serve the robots to clients of ROS, if that is wanted."""
-        options = self._options
-        if options.rosbridge is None:
-            return None
-        port = open_port(options.host, options.rosbridge, "--rosbridge", options.token)
+    def _serve_ros(self, world: ConsoleWorld, port: OpenPort) -> RosbridgeServer:
+        """Serve the robots to clients of ROS."""
         stage = world.run.stage
         gateway = RosGateway(stage, lambda: world.console)
         gateway.camera_base = str(self._processes.serving["base"])

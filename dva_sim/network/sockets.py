@@ -317,10 +317,10 @@ class SocketNetwork(RealNetwork):
                     router.unbind(_text(router.last_endpoint))
                 if port or error.errno != zmq.EADDRINUSE:
                     self._discard(router, publisher)
-                    ports = f", ports {port} and {port + 1}" if port else ""
-                    text = f"cannot listen on {host}{ports}: {error.strerror}"
+                    ports = f" ports {port} and {port + 1}" if port else ""
+                    text = f"cannot listen on {host}{ports}: {zmq.strerror(error.errno or 0)}"
                     if error.errno == zmq.EADDRINUSE:
-                        text += "; give another --port, or --port 0 for any that is free"
+                        text += "; a device takes two ports: give another, or 0 for any two"
                     raise NetworkError(text) from None
             else:
                 break

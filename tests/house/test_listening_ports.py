@@ -18,6 +18,9 @@ import pytest
 from helpers.network.port_visitors import is_closed, request, upgrade
 from helpers.paths import ROOT
 from helpers.processes.programs import all_gone_after
+from helpers.wording import unnamed
+
+from dva_sim.console.robots.robot_station import two_free_ports
 
 CALLS = {
     *("bind", "bind_to_random_port", "create_server", "create_unix_server", "start_server"),
@@ -332,3 +335,31 @@ def test_every_port_in_the_table_is_asked():
 )
 def test_a_new_listener_would_be_found(source):
     assert listening_calls(source)
+
+
+@pytest.mark.system
+@pytest.mark.parametrize(
+    ("words", "takes_two"),
+    [
+        (("console", "--links", "real", "--dva-port"), True),
+        (("live", "--port"), True),
+        (("console", "--rosbridge"), False),
+        (("console", "--foxglove"), False),
+        (("live", "--rosbridge"), False),
+        (("live", "--foxglove"), False),
+    ],
+    ids=str,
+)
+def test_no_address_is_printed_unless_all_ports_are_open(tmp_path, words, takes_two):
+    command, *options = words
+    others = ("--no-open", "--port", "0") if command == "console" else ("--for", "5")
+    others += () if "--rosbridge" in words else ("--rosbridge", "0")
+    first = two_free_ports("127.0.0.1")
+    with socket.create_server(("127.0.0.1", first + 1)):
+        port = first if takes_two else first + 1
+        for programs in all_gone_after(tmp_path):
+            program = programs.start(command, "fire-drill", *others, *options, str(port))
+            assert program.ends() == 2
+            assert program.output == ""
+            (line,) = program.complained
+    assert unnamed(line, port, first + 1) == []
