@@ -56,7 +56,7 @@ class Dva:
         ask_first: True if the policy asks a person before it sends anybody.
         policy_name: Name of the policy.
         audit: True to keep facts about decisions.
-        release: Who releases a robot after an emergency; None: a person if one who may is
+        release: Rule after an emergency: `person` or `drive`; None: a person if one who may is
             registered, else a new start by its driver.
 
     Attributes:

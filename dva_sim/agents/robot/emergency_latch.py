@@ -31,7 +31,7 @@ class EmergencyLatch:
         since: Time of the first emergency [s].
         tick: The robot's own clock at the newest emergency [ms].
         released: Person who released it last.
-        released_by: How this emergency ends, as far as the DVA has said.
+        released_by: Rule of this emergency, as far as the DVA has said.
     """
 
     rule: ReleasedBy | None = None

@@ -48,7 +48,7 @@ class SafetyTerms:
         motors: Limits of the robots by id.
         labels: Names by id, for what is said of somebody.
         dva: Id of the DVA.
-        release: How robots are released after an emergency; None: as the DVA says.
+        release: Rule by which robots are released after an emergency; None: as the DVA says.
     """
 
     watchdog: float

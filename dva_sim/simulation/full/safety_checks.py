@@ -115,7 +115,7 @@ class Unanswered(NamedTuple):
 
 @dataclass
 class StopTold:
-    """What the DVA has heard of a robot's emergency.
+    """News of a robot's emergency at the DVA.
 
     Attributes:
         at: Time at which the robot last said that it is stopped [s].
@@ -167,7 +167,7 @@ class Witness:
         hand: Person in manual control, until released.
         let_go: Time at which the last one released it.
         latched: True from an emergency on until it is released.
-        released_by: How that ends: `person` or `drive`; None: the DVA has not said.
+        released_by: Rule of that: `person` or `drive`; None: the DVA has not said.
         emergency: Clock of the robot at the newest emergency, as it says [ms].
         reported_at: Time at which it first said that [s].
         questions: Numbers of its newest requests for a release.
@@ -293,7 +293,7 @@ class Witness:
 
         Args:
             when: Time [s].
-            rule: How robots are released, where the DVA is not asked.
+            rule: Rule of releases, where the DVA is not asked.
         """
         self.note_stand(when)
         if not self.latched:

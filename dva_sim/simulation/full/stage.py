@@ -182,7 +182,7 @@ class Stage:
 
     @property
     def release(self) -> ReleasedBy | None:
-        """How robots are released after an emergency, as in `release_of`."""
+        """Rule by which robots are released after an emergency, as in `release_of`."""
         return release_of(self.scenario, self.attended)
 
     def pattern_for(self, robot: str) -> Pattern:

@@ -461,8 +461,8 @@ class EmergencyConfig(Config):
     """Emergencies.
 
     Attributes:
-        release: How a robot that an emergency has stopped takes orders again. `person`: a control
-            room that may dispatch releases it. `drive`: its holder starts it anew. Left out: in the
+        release: Rule by which a stopped robot takes orders again. `person`: a control room that
+            may dispatch releases it. `drive`: its holder starts it once more. Left out: in the
             console and in `live` a person, where one who may is registered; else a new start.
     """
 
