@@ -26,6 +26,7 @@ MOST_DROPPED: Final = 20_000  # design: operations of a flood, after which it is
 MOST_TOPICS: Final = 256
 MOST_BEHIND: Final = 200_000  # design: with so much on its way a peer gets no more readings [B]
 SAY_AGAIN: Final = 5.0  # design: the same refusal is said no more often [s]
+EMERGENCY: Final = b"/emergency_stop"
 ALIASES: Final = frozenset({"geometry_msgs/Twist", "geometry_msgs/TwistStamped"})
 
 
@@ -84,8 +85,8 @@ class RosPeer:
         self._reported_at: dict[str, float] = {}
 
     def take(self, data: bytes) -> None:
-        """Take a message, unless too many have come."""
-        if not self._has_room():
+        """Take a message, unless too many have come; an emergency is always taken."""
+        if not self._has_room() and EMERGENCY not in data:
             self._drop()
             return
         try:
