@@ -17,8 +17,8 @@ from helpers.processes.patience import PATIENCE_S, becomes
 from playwright.sync_api import expect
 
 ROBOTS = ("robot-1", "robot-2", "robot-3")
-PAGES = ("map", "events", "robots", "robots/robot-1", "drive", "devices", "network", "main", "audit")
 WITH_MODES = ("map", "robots", "robots/robot-1", "drive", "devices", "network")
+PAGES = (*WITH_MODES, "events", "main", "audit")
 WATCHED_S = 120.0
 FASTER = 8
 
