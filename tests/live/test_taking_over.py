@@ -1,4 +1,4 @@
-"""A robot taken over, and sensors that the DVA heeds: the same in virtual time and over sockets."""
+"""Robots taken over and released, sensors that the DVA heeds: in virtual time and over sockets."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -11,6 +11,7 @@ from helpers.network.scripted_session import OPERATOR, PATIENT, ROBOT, _quick_ne
 from helpers.network.scripted_session import Scene as AnyScene
 from helpers.network.transports import WITH_MQTT, MqttWorld
 
+from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.operator.scripted import Ask, Pause, Script, ScriptedOperator
 from dva_sim.core.events import State
 from dva_sim.kernel.recorder import Recorder
@@ -27,6 +28,7 @@ from dva_sim.simulation.full.stage import DVA, Stage, id_of
 pytestmark = pytest.mark.system
 
 SUPERVISOR, OTHER = id_of("operator", 2), id_of("operator", 3)
+ROOM = id_of("control-room", 1)
 SHOWS_SMOKE = {"robot.sensors": [{"name": "smoke", "low": 0.5}], "dva.sensors": ["smoke"]}
 
 
@@ -41,7 +43,8 @@ def network(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Transpor
         return
     ring = None
     if request.param == "sockets with keys":
-        create_keys(tmp_path, [DVA, ROBOT, OPERATOR, SUPERVISOR, OTHER, id_of("detector", 1)])
+        devices = [DVA, ROBOT, OPERATOR, SUPERVISOR, OTHER, id_of("detector", 1), ROOM]
+        create_keys(tmp_path, devices)
         ring = KeyRing(tmp_path)
     live = SocketNetwork(LiveClock(), ring)
     yield live
@@ -245,3 +248,37 @@ def test_what_a_detector_reports_beside_the_robot_is_confirmed_by_it(network):
     assert events.total == 1
     assert set(events.closed[1].sources) >= {detector.id_tag}
     assert replace(events.closed[1]).position == place
+
+
+def stops_and_starts_anew(heard: list[m.Reply]) -> Callable[[ScriptedOperator], Script]:
+    """Drives, stops the robot by an emergency, and asks for a start until that is granted."""
+
+    def script(_: ScriptedOperator) -> Script:
+        granted: list[m.Reply] = []
+        yield from until_granted(None, granted)
+        session = session_of(granted)
+        yield from starts(session)
+        yield Ask(ROBOT, m.SetTeleOp(0.3, 0.3), session)
+        yield Ask(ROBOT, m.Emergency(), session)
+        while not heard or heard[-1].code != m.OK:
+            reply = yield Ask(ROBOT, m.StartTeleOp(), session)
+            assert reply is not None
+            heard.append(reply)
+            yield Pause(0.1)
+
+    return script
+
+
+@pytest.mark.invariant("S3")
+def test_an_emergency_holds_until_a_control_room_releases_the_robot(network):
+    changes = {"emergency.release": "person", "dva.control_rooms": {"control-room-1": "dispatch"}}
+    scene, heard, answers = Scene(network, **changes), list[m.Reply](), list[m.Reply]()
+    room = ControlRoomAgent(scene.stage.device("control-room", 1))
+    room.start()
+    driver = scene.enters(1, stops_and_starts_anew(heard))
+    scene.until(lambda: len(heard) > 20)
+    assert {reply.code for reply in heard} == {m.BUSY}
+    room.ask(m.ReleaseEmergency(ROBOT), answers.append)
+    scene.until(lambda: driver.done)
+    assert answers[0].code == m.OK
+    assert scene.robot.controller.latch.released.device == ROOM
