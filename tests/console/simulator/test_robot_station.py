@@ -159,6 +159,10 @@ def test_whoever_holds_it_drives_it_and_its_own_button_stops_it_without_a_broken
     bench.until(lambda: abs(bench.world.robot.body.speed) < 0.01)
     assert bench.say(m.SetTeleOp(0.4, 0.0, None), 1 << 33).code == m.WRONG_MODE
     assert bench.do("manual_take")[0] is False  # somebody still holds it
+    assert bench.say(m.StartTeleOp(), 1 << 33).code == m.BUSY
+    assert bench.do("robot_release", robot=0)[0]
+    assert bench.do("robot_release", robot=0)[0] is False
+    assert bench.say(m.StartTeleOp(), 1 << 33).code == m.OK
     assert not bench.world.recorder.violations
 
 
