@@ -53,14 +53,14 @@ typedef Letter { mtype kind; byte by; byte session; byte age; byte waits; bool h
 Letter letter[LETTERS];
 
 /* --- what only the rules look at ------------------------------------------------------------ */
-bool latched;                   /* an emergency, and no new drive since */
+bool latched;                   /* an emergency, and nobody has released the robot since */
 byte ended;                     /* sessions whose end the robot has heard of the DVA */
 byte since, picture;            /* age of the command in force, and of its picture */
 
 /* --- the step of the robot ------------------------------------------------------------------- */
 hidden mtype message, state;
 hidden byte source, named, at, i;       /* of the message; the session that it names; its letter */
-hidden byte right, newer, still, later, fresh, somebody, current;
+hidden byte right, newer, still, later, released, fresh, somebody, current;
 
 #define BIT(s) (1 << (s))
 
@@ -106,7 +106,8 @@ inline acts() {
 inline drive() {
   acts();
   assert(!moving);                                                      /* S2 */
-  driven = true; latched = false
+  assert(!latched);                                                     /* S3 */
+  driven = true
 }
 inline move() {
   acts();
@@ -135,6 +136,10 @@ inline obey() {
            (holder == source -> (driven -> DRIVES : HELD) : (driven -> OTHER_DRIVES : OTHER_HELD)));
   right = (holder != NOBODY && named == session);
   still = !moving;
+  released = !latched;
+#ifdef NO_LATCH
+  released = true;
+#endif
 #ifdef NO_SESSION
   if :: message == START || message == SET || message == STOP -> right = true :: else fi;
 #endif
@@ -157,7 +162,7 @@ inline obey() {
 #endif
   rules();
   message = 0; state = 0; source = 0; named = 0; at = 0; i = 0;
-  right = false; newer = false; still = false; later = false; fresh = false; somebody = false; current = false
+  right = false; newer = false; still = false; later = false; released = false; fresh = false; somebody = false; current = false
 }
 
 inline remove(n) {
@@ -235,6 +240,14 @@ active proctype RobotStops() {
 #endif
   od
 }
+
+#ifndef LIVE                            /* to stop, and to end a drive, takes nobody */
+active proctype Person() {
+  do
+  :: d_step { latched -> latched = false }
+  od
+}
+#endif
 
 /* --- claims in the DVA's name, and its answers ------------------------------------------------ */
 inline claim(kind, who, which) {

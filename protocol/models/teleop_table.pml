@@ -10,7 +10,7 @@ inline decide() {
   :: state == FREE && message == ANSWER && somebody && current -> accept(); hold()
   :: state == FREE && message == ANSWER && somebody && !current -> accept(); ask()
   :: state == FREE && message == ANSWER && !somebody -> accept()
-  :: state == HELD && message == START && right && newer && still && later -> accept(); count_order(); count_set(); drive(); stand(); heard()
+  :: state == HELD && message == START && right && newer && still && later && released -> accept(); count_order(); count_set(); drive(); stand(); heard()
   :: state == HELD && message == START && !right -> ask()
   :: state == HELD && message == STOP && right && newer -> accept(); count_order(); stand()
   :: state == HELD && message == EMERGENCY -> accept(); stand(); latch()

@@ -82,6 +82,7 @@ def test_a_drive_whose_time_is_over_ends(tmp_path, rule, bound):
         ("EMERGENCY_RESUMES", OWNERS, ""),
         ("NO_ORDER", ORDER, ""),
         ("QUEUE_SURVIVES", ORDER, ""),
+        ("NO_LATCH", ORDER, ""),
         ("NO_LEASE", DRIVER, "drive_ends"),
         ("NO_REMINDER", DRIVER, "drive_ends"),
         ("EMERGENCY_QUEUES", EMERGENCY, "emergency_stops"),

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from dva_sim.agents.robot.controller import Limits, Mode, RobotController
+from dva_sim.agents.robot.emergency_latch import EmergencyLatch
 from dva_sim.protocol import messages as m
 
 TABLE = Path(__file__).parents[3] / "protocol" / "models" / "teleop_table.pml"
@@ -28,7 +29,7 @@ STATES = {
 """Holder and mode of the robot; the holder is the sender, or whom a claim or an answer names."""
 
 FACTS = {
-    "START": ("right", "newer", "still", "later"),
+    "START": ("right", "newer", "still", "later", "released"),
     "SET": ("right", "newer", "still", "later", "fresh"),
     "STOP": ("right", "newer", "still", "later"),
     "EMERGENCY": ("right", "still"),
@@ -36,7 +37,7 @@ FACTS = {
     "REVOKE": ("right",),
     "ANSWER": ("somebody", "right", "current"),
 }
-"""Other facts that may matter: session, order, wheels, last emergency, age."""
+"""Other facts that may matter: session, order, wheels, last emergency and its release, age."""
 
 Facts = Mapping[str, bool]
 
@@ -44,7 +45,8 @@ Facts = Mapping[str, bool]
 def robot_in(state: str) -> RobotController:
     """A robot that has been in use for a while."""
     holder, mode = STATES[state]
-    robot = RobotController(ROBOT, DVA, Limits(watchdog=3.0, max_age=6.0))
+    latch = EmergencyLatch("person")
+    robot = RobotController(ROBOT, DVA, Limits(watchdog=3.0, max_age=6.0), latch=latch)
     if holder is not None:
         robot.inquiry.about_holder(holder)
         robot.inquiry.next(0.0)
@@ -97,6 +99,7 @@ def _deliver(robot: RobotController, kind: str, facts: Facts) -> tuple[int, bool
 def outcome(state: str, kind: str, facts: Facts) -> tuple[str, ...]:
     """Reaction of the controller, in the words of the model; empty if none."""
     robot = robot_in(state)
+    robot.latch.holds = not facts.get("released", True)
     drove, grant = robot.owner, robot.grant
     code, moves = _deliver(robot, kind, facts)
     session = robot.grant.session if robot.grant is not None else None
