@@ -389,7 +389,14 @@ class ControlRooms:
             text = f"no emergency of {robot.device.label} is known"
             return self._refuse(body, sender, action, m.WRONG_MODE, text, now)
         reason = body.reason or ""
-        choice = Choice(sender.id_tag, sender.label, action, now, reason, robot.device.label)
+        choice = Choice(
+            author=sender.id_tag,
+            label=sender.label,
+            action=action,
+            time=now,
+            reason=reason,
+            device=robot.device.label,
+        )
         emergencies.release(body.device, choice)
         self._note(sender, action, now, device=body.device, cause=reason)
         notice = Send(body.device, m.ReleaseEmergency(body.device))

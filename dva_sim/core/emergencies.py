@@ -16,7 +16,7 @@ UNCONFIRMED_AFTER = 30.0  # a robot says each second that it is stopped, if it i
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class RobotStop:
     """Emergency of one robot.
 
     Attributes:
@@ -47,29 +47,30 @@ class Emergencies:
     """
 
     changes: int = 0
-    _stops: dict[str, Stop] = field(default_factory=dict)
+    _stops: dict[str, RobotStop] = field(default_factory=dict)
 
     def holds(self, robot: str) -> bool:
         """Return True if a robot is stopped, and nobody has released it."""
         stop = self._stops.get(robot)
         return stop is not None and stop.released is None
 
-    def stopped(self) -> dict[str, Stop]:
+    def stopped(self) -> dict[str, RobotStop]:
         """Return the robots that nobody has released."""
         return {robot: stop for robot, stop in self._stops.items() if stop.released is None}
 
-    def hear(self, robot: str, emergency: m.RobotEmergency, now: float) -> Stop:
+    def hear(self, robot: str, emergency: m.RobotEmergency, now: float) -> RobotStop:
         """Note what a robot says of its emergency; a newer one ends an earlier release."""
         stop = self._stops.get(robot)
         if stop is not None and stop.tick == emergency.tick:
             stop = replace(stop, heard=now)
         else:
-            stop = Stop(emergency.stopped_by, emergency.tick, now, now - emergency.stopped_for)
+            since = now - emergency.stopped_for
+            stop = RobotStop(emergency.stopped_by, emergency.tick, heard=now, since=since)
             self.changes += 1
         self._stops[robot] = stop
         return stop
 
-    def restore(self, robot: str, stop: Stop) -> None:
+    def restore(self, robot: str, stop: RobotStop) -> None:
         """Take over an emergency of an earlier life of the DVA."""
         self._stops[robot] = stop
 

@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from dva_sim.core.dva import Dva
-from dva_sim.core.emergencies import Stop
+from dva_sim.core.emergencies import RobotStop
 from dva_sim.core.events import KEPT_CLOSED, Event, State
 from dva_sim.core.handling import Choice, Handling
 from dva_sim.core.registry import DeviceEntry
@@ -294,7 +294,7 @@ class Store:
             dva.sessions.tell_robot(PermissionRevocation(*json.loads(data)))
         for robot, data in self._sessions["stops"].items():
             stopped_by, tick = json.loads(data)
-            dva.emergencies.restore(robot, Stop(stopped_by, tick, now, now))
+            dva.emergencies.restore(robot, RobotStop(stopped_by, tick, now, now))
         self._session_changes, self._held = _session_changes(dva), _held(dva)
         self._lasting = dva.with_something_open()
         permissions.count = max(permissions.count, self._about("sessions"))

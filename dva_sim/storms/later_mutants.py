@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 from dva_sim.agents.robot.controller import Decision, Mode
-from dva_sim.core.emergencies import Stop
+from dva_sim.core.emergencies import RobotStop
 from dva_sim.core.events import State
 from dva_sim.core.handling import Choice
 from dva_sim.core.handovers import Step
@@ -104,8 +104,8 @@ def _takes_any_release(original: Original, bug: Bug) -> Original:
 
 
 def _releases_unasked(original: Original, bug: Bug) -> Original:
-    def wrong(self: Any, robot: str, emergency: m.RobotEmergency, now: float) -> Stop:
-        stop: Stop = original(self, robot, emergency, now)
+    def wrong(self: Any, robot: str, emergency: m.RobotEmergency, now: float) -> RobotStop:
+        stop: RobotStop = original(self, robot, emergency, now)
         if stop.released is None:
             bug.act(f"{robot} is released by nobody")
             return replace(stop, released=Choice(DVA, "dva", "release_emergency", now))
