@@ -18,7 +18,8 @@ from dva_sim.kernel.suggestions import listed
 from dva_sim.protocol.mistakes import Problem, check_message
 
 if TYPE_CHECKING:  # late: start-up
-    from dva_sim.network.link.recorded import DelayLog
+    from dva_sim.network.link.delay_logs import DelayLog
+    from dva_sim.network.link.recorded import Floats
     from dva_sim.recordings.reading import Opened
     from dva_sim.simulation.full.verdicts import Verdict
 
@@ -112,14 +113,16 @@ def check_audit_log(path: Path) -> Found:
 
 def check_recorded_link(path: Path) -> Found:
     """Check a recorded link: packet opportunities, a log of delays, or bare delays."""
-    from dva_sim.network.link import recorded  # late: start-up
+    from dva_sim.network.link import delay_logs, recorded  # late: start-up
 
     file = str(path)
     try:
-        if recorded.columns_of(file) > 1:
-            return [], [], _of_delay_log(recorded.read_delay_log(file))
+        if delay_logs.is_delay_log(file):
+            log = delay_logs.read_delay_log(file)
+            return [], list(log.doubts), _of_delay_log(log)
         if path.suffix not in OPPORTUNITIES and not recorded.is_trace(file):
-            return [], [], f"{len(recorded.read_delays(file))} delays"
+            delays = np.array(recorded.read_delays(file))
+            return [], [], f"{len(delays)} delays, {_spread_of(delays)}"
         times = recorded.read_trace(file)
     except ConfigError as error:
         return [Problem(error.line or 1, error.column or 1, error.problem)], [], ""
@@ -139,7 +142,16 @@ def check_recorded_link(path: Path) -> Found:
 
 def _of_delay_log(log: DelayLog) -> str:
     lost, lasts = float(np.isnan(log.delays).mean()), log.times[-1] - log.times[0]
-    return f"{len(log.times)} probes in {lasts:,.6g} s, {lost:.1%} of them lost"
+    runs = f" in {log.runs} runs of ping" if log.runs > 1 else ""
+    return (
+        f"{len(log.times)} probes{runs} in {lasts:,.6g} s, {lost:.1%} of them lost, "
+        f"{_spread_of(log.delays)}; times in {log.units[0]}, delays in {log.units[1]}"
+    )
+
+
+def _spread_of(delays: Floats) -> str:
+    usual, long = np.nanpercentile(delays, (50, 95)) * 1000
+    return f"{usual:.3g} ms in the median, {long:.3g} ms at 95 %"
 
 
 class _Replayed(NamedTuple):

@@ -48,8 +48,11 @@ _RECORDED: Final = (
     *(b"\x28\xb5\x2f\xfd", b"\x1f\x8b", b"\x04\x22\x4d\x18"),  # compressed: zstd, gzip, lz4
 )
 _OF_LINK: Final = re.compile(
-    rb"(\xef\xbb\xbf|#[^\n]*\n|\s)*(\d[\d.]*[\s,;]*(\d[\d.]*|-|\*|lost|nan)?\r?\n|PING )"
+    rb"(\xef\xbb\xbf|#[^\n]*\n|\s)*(\d[\d.]*[\s,;]*(\d[\d.]*|-|\*|lost|nan)?\r?\n|PING "
+    rb"|\[\d[\d.]*\] [^\n]*icmp_seq=|[^\n{<]*(rtt|delay|latency|throughput|bps)[^\n:]*\r?\n)",
+    re.IGNORECASE,
 )
+_IPERF: Final = b'"bits_per_second"'
 
 
 class NotReadError(DvaSimError):
@@ -90,7 +93,9 @@ def check_file(path: Path) -> FileVerdict:
     Raises:
         NotReadError: not there, not a file, or not readable.
     """
-    kind = _SUFFIXES.get(path.suffix.lower()) or _by_content(_read(path, READ_BYTES))
+    kind = _SUFFIXES.get(path.suffix.lower())
+    if kind is None or path.suffix.lower() == ".json":
+        kind = _by_content(_read(path, READ_BYTES)) or kind
     if kind == "message":
         return FileVerdict(kind, check_message(_read(path, READ_BYTES)))
     if kind == "plan":
@@ -111,8 +116,9 @@ def _by_content(head: bytes) -> str | None:
         return "audit log"
     if head.startswith(_RECORDED):
         return "recording"
-    if text.startswith(b"{") and b'"FeatureCollection"' in text:
-        return "plan"
+    if text.startswith(b"{"):
+        features = b'"FeatureCollection"' in text
+        return "plan" if features else "recorded link" if _IPERF in text else None
     return "recorded link" if _OF_LINK.match(text) else None
 
 

@@ -108,14 +108,22 @@ def link_file(folder, text, name="link.up", encoding="utf-8"):
     return folder / name
 
 
+PING = """\
+[1700000000.1] 64 bytes from 10.0.0.1: icmp_seq=1 ttl=64 time=80.0 ms
+[1700000001.06] 64 bytes from 10.0.0.1: icmp_seq=2 ttl=64 time=40.0 ms
+"""
+
+
 @pytest.mark.parametrize(
     ("name", "text", "names"),
     [
         ("a.up", "10\n20\n30\n", ["3 packet", "0.03 s", "1,200 kbit/s"]),
         ("a.down", "10\r\n20\r\n30", ["3 packet"]),
         ("trace.txt", "10\n20\n30\n", ["3 packet"]),
-        ("delays.txt", "20.5\n30\n10\n", ["3 delays"]),
-        ("log.csv", "# s, ms\n0,20\n1,lost\n2,30.5\n", ["3 probes", "33.3%"]),
+        ("delays.txt", "20.5\n30\n10\n", ["3 delays", "20.5 ms in the median", "29.1 ms"]),
+        ("log.csv", "# s, ms\n0,20\n1,lost\n2,30.5\n", ["3 probes", "33.3%", "25.2 ms"]),
+        ("log.csv", "rtt_us,time_s\n20000,1\n40000,2\n", ["30 ms in the median", "in us"]),
+        ("lab.log", PING, ["2 probes in 1 s", "60 ms in the median", "times in s"]),
     ],
 )
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
@@ -129,6 +137,22 @@ def test_a_line_of_a_trace_that_is_no_millisecond_is_told_with_its_number(tmp_pa
     (problem,) = check_file(link_file(tmp_path, "10\n2o\n30\n")).problems
     assert problem.line == 2
     assert "'2o'" in problem.text
+
+
+@pytest.mark.parametrize("name", ["iperf.json", "iperf.txt", "iperf.up"])
+def test_a_report_of_iperf3_is_named_for_what_it_is(tmp_path, name):
+    text = '{"intervals": [{"sum": {"bits_per_second": 5e6}}]}'
+    verdict = check_file(link_file(tmp_path, text, name))
+    assert verdict.kind == "recorded link"
+    assert unnamed(verdict.problems[0].text, "iperf3", "5,000,000 bit/s", "link.rate_bps") == []
+
+
+def test_a_doubtful_unit_of_a_delay_log_is_a_warning_of_the_file_and_the_scenario(tmp_path):
+    file = link_file(tmp_path, "0 0.04\n1 0.05\n", "log.txt")
+    (doubt,) = check_file(file).doubts
+    assert "0.045 ms" in doubt
+    scenario = scenarios.build(scenarios.load("drive-to-event"), {"link.delay_log": str(file)})
+    assert [report for report in contradictions(scenario) if doubt in report]
 
 
 EPOCH = "1596042000000\n1596042000010\n1596042000030\n"

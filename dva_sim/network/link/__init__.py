@@ -1,6 +1,7 @@
 """One direction of a link: delay, jitter, loss, rate, queue, recorded weather, outages."""
 
 from dva_sim.network.link.config import Direction, LinkConfig, Way
+from dva_sim.network.link.delay_logs import read_delay_log
 from dva_sim.network.link.link import (
     Link,
     PartedLink,
@@ -11,7 +12,7 @@ from dva_sim.network.link.link import (
 )
 from dva_sim.network.link.outages import Gap, Outage, Partition
 from dva_sim.network.link.rates import ConstantRate, PacketQueue, Serialiser, TraceRate
-from dva_sim.network.link.recorded import read_delay_log, read_trace
+from dva_sim.network.link.recorded import read_trace
 from dva_sim.network.link.time_noise import FastNoise
 
 __all__ = [

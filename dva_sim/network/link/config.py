@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from dva_sim.kernel.config import AlsoCalled, Config, Key
+from dva_sim.network.link.delay_logs import read_delay_log
 from dva_sim.network.link.delays import ConstantDelay, DelayLaw
 from dva_sim.network.link.losses import Bursts
 from dva_sim.network.link.outages import Outage, Partition
-from dva_sim.network.link.recorded import read_delay_log
 from dva_sim.network.link.replay import moments_of
 
 Direction = Literal["up", "down"]

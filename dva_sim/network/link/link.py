@@ -19,11 +19,12 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.suggestions import hint
 from dva_sim.network.link.config import Direction, LinkConfig
+from dva_sim.network.link.delay_logs import read_delay_log
 from dva_sim.network.link.delays import Wobble, by_quantile
 from dva_sim.network.link.losses import Fate, chance
 from dva_sim.network.link.outages import Gap, Partition, gaps_of
 from dva_sim.network.link.rates import ConstantRate, PacketQueue, Serialiser, TraceRate
-from dva_sim.network.link.recorded import read_delay_log, read_trace
+from dva_sim.network.link.recorded import read_trace
 from dva_sim.network.link.replay import Replay, period_of
 from dva_sim.network.link.time_noise import FastNoise, MakeNumbers, PacketNumbers
 

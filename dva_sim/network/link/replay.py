@@ -7,7 +7,8 @@ from bisect import bisect_right
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.network.link.recorded import DelayLog, Floats
+from dva_sim.network.link.delay_logs import DelayLog
+from dva_sim.network.link.recorded import Floats
 
 Flags = NDArray[np.bool_]
 

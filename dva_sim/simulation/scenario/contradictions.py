@@ -10,6 +10,7 @@ import itertools
 from collections.abc import Iterator
 
 from dva_sim.agents.robot.controller import LEASE_S
+from dva_sim.network.link.delay_logs import read_delay_log
 from dva_sim.network.link.recorded import longest_gap_s, read_trace
 from dva_sim.simulation.scenario.scenario import (
     Scenario,
@@ -97,6 +98,8 @@ def _of_link(scenario: Scenario) -> Iterator[str]:
         for key in _OVER_TRACE:
             if key in scenario.link.model_fields_set:
                 yield f"link.{key} has no effect where link.trace_up or trace_down gives the rate"
+    if file := scenario.link.delay_log:
+        yield from (f"link.delay_log {file!r}: {doubt}" for doubt in read_delay_log(file).doubts)
     for key, file in (
         ("trace_up", scenario.link.trace_up),
         ("trace_down", scenario.link.trace_down),

@@ -62,7 +62,7 @@ def test_the_same_seed_gives_the_same_drive_over_bursts_and_slow_delays():
         ("link:\n  outages: [{from_s: 1}]\n", r":2:13: missing key 'link.outages.0.for_s'"),
         ("link:\n  up: {dely_s: 1}\n", r":2:8: unknown key 'link.up.dely_s'; did you mean"),
         ("link:\n  bursts: {mean_s: 1}\n  loss: 2\n", r":3:3: link.loss: should be at most"),
-        ("link:\n  delay_log: bad.log\n", r"bad\.log:2:1: should be a time \[s\], not 'x'"),
+        ("link:\n  delay_log: bad.log\n", r"bad\.log:2:1: should be a time, not 'x'"),
         ("link:\n  partitions: [{source: a, from_s: 1, for_s: 1}]\n", "'a' of a partition is nob"),
     ],
 )
