@@ -19,20 +19,22 @@ def tell(path: Path, as_json: bool, unit: Unit | None) -> None:
     Raises:
         ConfigError: it is no such file, or too short.
     """
-    found = figures_of(_motion(path, unit), path)
+    motion, guesses = _motion(path, unit)
+    found = figures_of(motion, path)
     if as_json:
         print_json(found._asdict())
         return
-    for line in lines(found):
+    for line in (*lines(found), *guesses):
         print(line)
 
 
-def _motion(path: Path, unit: Unit | None) -> PhoneMotion:
-    """Samples from a file of a console, or from the export of a logger app."""
+def _motion(path: Path, unit: Unit | None) -> tuple[PhoneMotion, list[str]]:
+    """Read samples from a console's file or a logger app's, and name the units that were guessed."""
     try:
-        return read_motion(path)
+        return read_motion(path), []
     except NoMotionOfOursError:
-        return PhoneMotion(read_sensor_log(path, unit))
+        log = read_sensor_log(path, unit)
+        return PhoneMotion(log.samples), [f"guessed: {guess}" for guess in log.guesses]
 
 
 def lines(found: MotionFigures) -> list[str]:
@@ -72,7 +74,8 @@ def write_part(path: Path, out: Path, unit: Unit | None) -> None:
     Raises:
         ConfigError: it is no such file, or `out` exists or cannot be written.
     """
-    part = part_of(figures_of(_motion(path, unit), path))
+    motion, guesses = _motion(path, unit)
+    part = part_of(figures_of(motion, path))
     text = "".join(f"{key}: {_yaml(value)}\n" for key, value in part.items())
     try:
         with out.open("x", encoding="utf-8") as file:
@@ -81,7 +84,8 @@ def write_part(path: Path, out: Path, unit: Unit | None) -> None:
         raise ConfigError("already exists", out) from None
     except OSError as error:
         raise ConfigError(f"cannot be written: {error.strerror}", out) from None
-    print(f"{out} written: name it as phone.accelerometer")
+    for line in (*guesses, f"{out} written: name it as phone.accelerometer"):
+        print(line)
 
 
 def _yaml(value: object) -> str:

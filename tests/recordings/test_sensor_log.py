@@ -1,6 +1,7 @@
 """Accelerometer logs as logger apps export them."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -54,7 +55,7 @@ LOGS = {
 @pytest.mark.parametrize("kind", LOGS)
 def test_a_log_is_read_in_seconds_and_metres(tmp_path, kind):
     head, lines, delimiter = LOGS[kind]
-    samples = read_sensor_log(log_of(tmp_path, head, lines, delimiter))
+    samples, _ = read_sensor_log(log_of(tmp_path, head, lines, delimiter))
     assert len(samples) == LASTS
     assert samples[0].stamp == 0.0
     if kind != "epoch in milliseconds":  # of which nine digits are seconds
@@ -63,13 +64,71 @@ def test_a_log_is_read_in_seconds_and_metres(tmp_path, kind):
     assert samples[-1].xyz == pytest.approx(XYZ, rel=1e-6)
 
 
-def test_a_unit_that_nothing_tells_is_asked_for_and_taken(tmp_path):
-    file = log_of(tmp_path, ["t", "x", "y", "z"], rows(axes=0.5))
+@pytest.mark.parametrize(
+    ("head", "axes", "guesses"),
+    [
+        (["t", "x", "y", "z"], 1.0, ["times in s", "0.01 apart", "m/s2", "9.79"]),
+        (["t (s)", "x", "y", "z"], 1 / GRAVITY, ["in g", "0.998"]),
+        (["t (s)", "accX (g)", "accY (g)", "accZ (g)"], 1 / GRAVITY, []),
+    ],
+)
+def test_what_was_guessed_is_said_with_its_reason(tmp_path, head, axes, guesses):
+    file = log_of(tmp_path, head, rows(axes=axes))
+    log = read_sensor_log(file)
+    assert bool(log.guesses) is bool(guesses)
+    assert unnamed(" ".join(log.guesses), *guesses) == []
+    assert call("phone-log", file).stdout.count("guessed: ") == len(log.guesses)
+
+
+def test_a_unit_that_nothing_tells_is_asked_for_and_taken_if_gravity_allows(tmp_path):
+    file = log_of(tmp_path, ["t", "x", "y", "z"], rows(axes=0.7))
     with pytest.raises(ConfigError) as error:
         read_sensor_log(file)
-    assert unnamed(str(error.value), "--unit", "4.89") == []
-    assert read_sensor_log(file, "g")[0].xyz[2] == pytest.approx(XYZ[2] / 2 * GRAVITY)
-    assert read_sensor_log(file, "m/s2")[0].xyz[2] == pytest.approx(XYZ[2] / 2)
+    assert unnamed(str(error.value), "--unit", "6.85") == []
+    assert read_sensor_log(file, "m/s2").samples[0].xyz[2] == pytest.approx(XYZ[2] * 0.7)
+    with pytest.raises(ConfigError) as error:
+        read_sensor_log(file, "g")
+    assert unnamed(str(error.value), "6.85", "not g") == []
+
+
+def turning(size, hertz, lift=0.0, ripple=0.0):
+    """Rows of a vector that turns about x, on top of a steady one."""
+    for n in range(3 * LASTS):
+        angle = 2 * math.pi * hertz * n / RATE
+        length = size * (1 + ripple * (-1) ** n)
+        yield [
+            f"{n / RATE}",
+            "0",
+            f"{length * math.cos(angle)}",
+            f"{lift + length * math.sin(angle)}",
+        ]
+
+
+@pytest.mark.parametrize(
+    ("lines", "unit", "names"),
+    [
+        (turning(1.0, 1.8), None, ["without gravity", "TotalAcceleration"]),
+        (turning(9.8, 1.8), None, ["without gravity"]),
+        (turning(1.0, 1.8), "m/s2", ["1 in the median", "not m/s2"]),
+        (turning(9.8, 0.1), None, ["gravity alone", "TotalAcceleration"]),
+        (turning(9.8, 0.1, ripple=0.001), None, None),
+        (turning(1.0, 1.8, lift=9.8), None, None),
+    ],
+)
+def test_a_log_without_gravity_or_of_gravity_alone_is_refused(tmp_path, lines, unit, names):
+    file = log_of(tmp_path, ["t", "x", "y", "z"], lines)
+    if names is None:
+        assert len(read_sensor_log(file, unit).samples) == 3 * LASTS
+        return
+    with pytest.raises(ConfigError) as error:
+        read_sensor_log(file, unit)
+    assert unnamed(str(error.value), "log.csv", *names) == []
+
+
+def test_columns_with_gravity_are_taken_before_those_without(tmp_path):
+    head = ["t", *(f"userAcceleration{a}" for a in "XYZ"), *(f"accelerometer{a}" for a in "XYZ")]
+    lines = [[row[0], "0", "0", "0", *row[1:]] for row in rows()]
+    assert read_sensor_log(log_of(tmp_path, head, lines)).samples[0].xyz == pytest.approx(XYZ)
 
 
 @pytest.mark.parametrize(
