@@ -29,7 +29,7 @@ def tell(path: Path, as_json: bool, unit: Unit | None) -> None:
 
 
 def _motion(path: Path, unit: Unit | None) -> tuple[PhoneMotion, list[str]]:
-    """Read samples from a console's file or a logger app's, and name the units that were guessed."""
+    """Read samples from a console's file or a logger app's, and list units that were guessed."""
     try:
         return read_motion(path), []
     except NoMotionOfOursError:
