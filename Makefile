@@ -12,7 +12,7 @@ DEMO := results/demo
 SITE := build/docs
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-extras test-long test-soak storms tools check docs release-check same-bytes bench goals clean
+.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-extras extras test-long test-soak storms tools check docs release-check same-bytes bench goals clean
 
 # Compiled files are kept whatever a shell says: without them each program that a test starts
 # compiles all modules again.
@@ -115,6 +115,8 @@ $(DEV): pyproject.toml constraints.txt | $(VENV)
 	@echo "Installing dva-sim and its development tools (about a minute the first time) ..."
 	@$(PIP) install -c constraints.txt -e '.[dev]'
 	@touch $@ $(RUNTIME)
+
+extras: $(EXTRAS)  ## install the extras: middleware for transports, Gymnasium, a client of ROS
 
 $(EXTRAS): $(DEV)
 	@echo "Installing the extras: middleware for transports, Gymnasium ..."

@@ -314,8 +314,8 @@ def report(folder: Folder, *, pdf: bool = False, figure: str | Sequence[str] = (
 
 def show(
     folder: Folder, *, table: str | None = None, rows: int = 20, columns: bool = False
-) -> None:
-    """Print what results hold: the answer and every cell, a table, or what columns mean.
+) -> ResultsData:
+    """Print the answer and every cell of results, a table, or its columns; return the results.
 
     For a running study, the results so far are shown.
 
@@ -333,6 +333,7 @@ def show(
 
     results = load_so_far(folder) if isinstance(folder, str | Path) else folder
     terminal.show(results, table, columns, rows)
+    return results
 
 
 def export(

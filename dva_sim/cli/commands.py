@@ -98,6 +98,9 @@ class PanelGroup(TyperGroup):
         """Resolve a command; for an unknown one, suggest the nearest."""
         name = args[0]
         if not ctx.resilient_parsing and self.get_command(ctx, name) is None and name[0] != "-":
+            if name == "help":
+                call = " ".join((ctx.command_path, *args[1:], "--help"))
+                ctx.fail(f"'help' is not a command; did you mean {call!r}?")
             ctx.fail(f"{name!r} is not a command; {hint(name, self.list_commands(ctx))}")
         return super().resolve_command(ctx, args)
 

@@ -19,7 +19,7 @@ from dva_sim.cli.commands import Command, PanelGroup, Panels, name_of, typer_of
 from dva_sim.cli.plain_output import replace_what_cannot_be_shown
 from dva_sim.kernel import early_stop
 from dva_sim.kernel.errors import DvaSimError, ExitCode, error_line
-from dva_sim.kernel.suggestions import hint
+from dva_sim.kernel.suggestions import either, hint
 
 
 def in_a_line(error: Any) -> str:
@@ -67,7 +67,18 @@ def _options(error: Any, more: str) -> str:
         return more
     known = [opt for param in error.ctx.command.get_params(error.ctx) for opt in param.opts]
     near = hint(error.option_name, [opt for opt in known if opt.startswith("--")])
-    return near if near.startswith("did you") else more
+    if near.startswith("did you"):
+        return near
+    keys = _keys(error.option_name.lstrip("-")) if "--set" in known else []
+    return f"did you mean {either(f'--set {key}=VALUE' for key in keys)}?" if keys else more
+
+
+def _keys(name: str) -> list[str]:
+    from dva_sim.experiments.study.study import Study  # late: start-up
+    from dva_sim.kernel.config import keys_meant  # late: start-up
+    from dva_sim.simulation.scenario import Scenario  # late: start-up
+
+    return keys_meant((name.replace("-", "_"),), None, Study, Scenario)
 
 
 class Stopped(DvaSimError):

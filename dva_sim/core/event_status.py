@@ -37,7 +37,7 @@ def status_of(event: Event, question: Question | None, now: float) -> m.EventSta
         kind=event.kind,
         position=event.position,
         severity=event.severity,
-        confidence=max(0.0, min(event.confidence, 1.0)),
+        confidence=round(max(0.0, min(event.confidence, 1.0)), 6),
         event_state=event.state.value.replace(" ", "_"),
         age=_ago(times.get("detected", now), now),
         state_for=_ago(state_since(event), now),

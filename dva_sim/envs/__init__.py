@@ -1,6 +1,6 @@
 """Gymnasium environments: who goes where, and driving a robot whose pictures come late.
 
-Importing this makes them known to Gymnasium, which is the extra `rl` (`pip install 'dva-sim[rl]'`):
+Importing this makes them known to Gymnasium, which is the extra `rl` (`pip install -e '.[rl]'`):
 
 ```
 import dva_sim.envs
@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from dva_sim.kernel.errors import ConfigError
 
 if find_spec("gymnasium") is None:
-    raise ConfigError("environments need Gymnasium: pip install 'dva-sim[rl]'")
+    raise ConfigError("environments need Gymnasium: pip install -e '.[rl]'")
 
 import gymnasium
 

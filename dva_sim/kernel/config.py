@@ -7,6 +7,7 @@ name. `Key` and `AlsoCalled` say at a field how a key is called.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -93,21 +94,25 @@ def meant(path: KeyPath, value: Any, *models: Any) -> str:
         value: Value given for the key.
         models: Models that the file may have; the first has the place of the key.
     """
+    keys = keys_meant(path, value, *models)
+    if keys:
+        return _ask(str(path[-1]), keys)
+    here = fields_at(models[0], path[:-1])
+    return f"known here: {listed(sorted(here), most=24)}" if here else ""
+
+
+def keys_meant(path: KeyPath, value: Any, *models: Any) -> list[str]:
+    """Return the keys that an unknown key may mean, for the same arguments as `meant`."""
     given, here = str(path[-1]), fields_at(models[0], path[:-1])
     known = {} if isinstance(value, Mapping) else _every_name(models)
     exact = [key for name, key in known.items() if plain_name(name) == plain_name(_dotted(path))]
     if exact:
-        return _ask(given, exact)
+        return exact
     beside = {name: name for name in here} | {
         other: name for name, info in here.items() for other in _others(info)
     }
     near = guess(given, beside)
-    if near is not None:
-        return _ask(given, [beside[near]])
-    found = _elsewhere(path, known)
-    if found:
-        return _ask(given, found)
-    return f"known here: {listed(sorted(here), most=24)}" if here else ""
+    return _elsewhere(path, known) if near is None else [beside[near]]
 
 
 def fields_at(model: Any, path: KeyPath) -> Mapping[str, Any]:
@@ -263,8 +268,20 @@ def _explain(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> 
             return f"{key.removesuffix(f'.{item}')}: should have at least {item + 1} items"
         return f"missing key {key!r}"
     message = _in_words(problems)
+    if first["type"] in _BOUNDS:
+        message += _measure(fields_at(model, path[:-1]).get(str(path[-1])), str(path[-1]), first)
     message += f"{_given(first, message)}{_instead(model, problems, path)}"
     return f"{key}: {message}" if key else message
+
+
+def _measure(info: Any, name: str, problem: Any) -> str:
+    """Return the unit of a bound: of the key's name, or a share where 1 is the most."""
+    unit = name.rpartition("_")[2]
+    if unit in _UNITS and unit != name:
+        return f" {_UNITS[unit]}"
+    bound = problem["ctx"].get("le", problem["ctx"].get("lt", math.inf))
+    is_whole = info is not None and "int" in str(info.annotation)
+    return "" if bound > 1 or is_whole else " (a share: 0.05 is 5 %)"
 
 
 def _given(problem: Any, message: str) -> str:

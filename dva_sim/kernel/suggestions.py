@@ -24,8 +24,10 @@ def guess(given: str, known: Iterable[str]) -> str | None:
         return None
     slips = {name: _slips(wanted, plain_name(name)) for name in names}
     near = min(slips, key=lambda name: slips[name], default=None)
-    if near is not None and slips[near] <= (len(wanted) + 1) // _A_SLIP and len(wanted) > _LETTERS:
-        return near
+    if near is not None and slips[near] <= (len(wanted) + 1) // _A_SLIP:
+        exchanged = sorted(wanted) == sorted(plain_name(near))
+        if len(wanted) > _LETTERS or (len(wanted) == _LETTERS and exchanged):
+            return near
     begun = {name: plain_name(name) for name in names if _begins(wanted, plain_name(name))}
     halves = [name for name, plain in begun.items() if _is_half(wanted, plain)]
     return halves[0] if halves else next(iter(begun)) if len(begun) == 1 else None

@@ -44,7 +44,7 @@ def write_bag(playback: Playback, folder: Path) -> None:
         from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
-        raise ConfigError("ROS 2 bags need rosbags: pip install 'dva-sim[ros2]'") from None
+        raise ConfigError("ROS 2 bags need rosbags: pip install -e '.[ros2]'") from None
     if folder.exists():
         raise ConfigError("already exists; give a new folder for the bag", folder)
     store = get_typestore(Stores.ROS2_HUMBLE)

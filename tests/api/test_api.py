@@ -157,7 +157,7 @@ def test_results_are_told_shown_and_exported(results, tmp_path, capsys):
     assert len(runs.read_text().splitlines()) == 3
     files = dva_sim.export(results.folder, tmp_path, table="events", format="parquet")
     assert [path.name for path in files] == ["events.parquet", "columns.csv"]
-    dva_sim.show(results, table="runs", rows=1)
+    assert dva_sim.show(results, table="runs", rows=1) is results
     assert "1 more" in capsys.readouterr().out
 
 

@@ -36,6 +36,24 @@ def study(tmp_path):
     return write
 
 
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        ("rnu fire-drill", ["'rnu'", "'run'?"]),
+        ("help run", ["'dva-sim run --help'?"]),
+        ("help", ["'dva-sim --help'?"]),
+        ("episode drive-to-event --delay 1", ["--set link.delay_s=VALUE"]),
+        ("run req-rep-vs-pub-sub --persons 4", ["--set persons=VALUE"]),
+        ("run keep-alive --quick", ["'quick'", "req-rep-vs-pub-sub"]),
+        ("show .", ["manifest.json", "'dva-sim run'"]),
+    ],
+)
+def test_a_word_of_the_command_line_that_is_not_there_names_what_is_meant(tmp_path, words, names):
+    result = call(*words.split(), cwd=tmp_path)
+    assert result.returncode == 2
+    assert unnamed(result.stderr, *names) == []
+
+
 PATTERNS = "pattern: [req-rep, latest-wins]"
 
 

@@ -13,6 +13,7 @@ from helpers.dva.dispatch_office import (
 )
 
 from dva_sim.core.assignments import Rules
+from dva_sim.core.event_status import status_of
 from dva_sim.core.events import KEPT_CLOSED, MOST_SOURCES, EventTable, State
 from dva_sim.protocol import messages as m
 
@@ -69,6 +70,13 @@ def test_two_sources_of_06_and_05_that_err_independently_make_08(office):
     office.fire(12, confidence=0.6)
     office.fire(12, confidence=0.5, source=OTHER_DETECTOR)
     assert office.event().confidence == pytest.approx(0.8)
+
+
+def test_a_status_rounds_its_confidence(office):
+    office.fire(12, confidence=0.7)
+    office.fire(12, confidence=0.7, source=OTHER_DETECTOR)
+    assert office.event().confidence != 0.91
+    assert status_of(office.event(), None, 0.0).confidence == 0.91
 
 
 def test_an_event_is_as_severe_as_the_worst_report(office):

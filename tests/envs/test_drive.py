@@ -2,7 +2,7 @@
 
 import pytest
 
-gymnasium = pytest.importorskip("gymnasium", reason="needs Gymnasium: pip install 'dva-sim[rl]'")
+gymnasium = pytest.importorskip("gymnasium", reason="needs Gymnasium: pip install -e '.[rl]'")
 
 import numpy as np
 from gymnasium.utils.env_checker import check_env

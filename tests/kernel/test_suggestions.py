@@ -14,6 +14,7 @@ from dva_sim.kernel.suggestions import either, guess, hint, listed, unknown
         ("Fire_Drill", ["fire-drill", "patrol-shift"], "fire-drill"),
         ("req-rep-vs-pubsub", ["req-rep-vs-pub-sub", "retry-livelock"], "req-rep-vs-pub-sub"),
         ("req-rep", ["req-rep-vs-pub-sub", "retry-livelock"], "req-rep-vs-pub-sub"),
+        ("rnu", ["run", "new", "robot"], "run"),
         ("delay", ["delay_s", "delay_law", "jitter_s"], "delay_s"),
     ],
 )

@@ -6,7 +6,7 @@ import pytest
 from helpers.processes.patience import PATIENCE_S
 from helpers.ros.served_world import ServedWorld
 
-roslibpy = pytest.importorskip("roslibpy", reason="needs roslibpy: pip install 'dva-sim[ros]'")
+roslibpy = pytest.importorskip("roslibpy", reason="needs roslibpy: pip install -e '.[ros]'")
 
 pytestmark = pytest.mark.system
 

@@ -152,7 +152,7 @@ def test_a_transport_or_an_option_that_does_not_exist_is_refused_in_a_line(name,
 
 def test_what_is_not_installed_is_said_with_the_extra_that_brings_it(monkeypatch):
     made = type("Needy", (Over,), {"title": "Needy", "library": "no_such_library", "extra": "much"})
-    assert made().lacks() == "Needy needs no_such_library: pip install 'dva-sim[much]'"
+    assert made().lacks() == "Needy needs no_such_library: pip install -e '.[much]'"
     made = type("Needy", (Over,), {"title": "Needy", "program": "no-such-program"})
     assert made().lacks() == "Needy needs the program no-such-program"
     with pytest.raises(ConfigError, match="no-such-program"):

@@ -63,7 +63,7 @@ class DaskCluster(Workers):
         except ImportError:
             raise ConfigError(
                 "--scheduler needs dask.distributed, which is not installed: "
-                "pip install 'dva-sim[cluster]'"
+                "pip install -e '.[cluster]'"
             ) from None
         self.deaths = (KilledWorker,)
         self._open = ExitStack()

@@ -122,12 +122,15 @@ class Frame(dict[str, Array]):
         return Frame({name: values[rows] for name, values in self.items()})
 
     def to_pandas(self) -> Any:
-        """Convert to a pandas.DataFrame; pandas must be installed.
+        """Convert to a pandas.DataFrame.
 
         Raises:
-            ModuleNotFoundError: it is not.
+            ConfigError: pandas is not installed.
         """
-        return import_module("pandas").DataFrame(dict(self))
+        try:
+            return import_module("pandas").DataFrame(dict(self))
+        except ModuleNotFoundError:
+            raise ConfigError("to_pandas needs pandas: pip install pandas") from None
 
     def to_duckdb(self) -> DuckDBPyRelation:
         """Convert to a DuckDB relation for SQL queries; missing numbers are NULL."""
@@ -455,7 +458,10 @@ def _not_results(folder: Path) -> str:
             f"{folder} holds a study that is not finished; the command that began it goes on "
             "from there, and 'dva-sim show' and 'report' tell what is known so far"
         )
-    return f"{folder} holds no finished results: it has no {MANIFEST}; finish the study first"
+    return (
+        f"{folder} holds no finished results: it has no {MANIFEST}; give the folder that "
+        "'dva-sim run' wrote"
+    )
 
 
 _FAILED = "plugin_failures", "policy_failed"  # columns, of which a model has one

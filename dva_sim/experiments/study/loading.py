@@ -27,8 +27,8 @@ from dva_sim.kernel.config import Config, meant, validate
 from dva_sim.kernel.config_overrides import blame, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.streams import derive_seed
-from dva_sim.kernel.suggestions import hint
-from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml, parse_scalar
+from dva_sim.kernel.suggestions import either, hint
+from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml, parse_scalar, read_text
 from dva_sim.simulation.models import MODELS, model_of
 from dva_sim.simulation.scenario import load as load_scenario
 
@@ -241,8 +241,14 @@ def _in_version(document: Document, version: Version | None) -> tuple[Study, Cha
     if version is None:
         return study, written
     if version not in made:
-        raise document.error(f"has no {SIZES[version]} version: no key {version!r}")
+        names = either(_studies_with(version))
+        raise document.error(f"has no {SIZES[version]} version: no key {version!r}; {names} have")
     return made[version]
+
+
+def _studies_with(version: Version) -> list[str]:
+    files = resources.available(FOLDER).items()
+    return [name for name, file in files if f"\n{version}:" in read_text(file)]
 
 
 def _version_of(

@@ -64,11 +64,13 @@ class LinkConfig(Config):
     """
 
     delay_s: Annotated[
-        Seconds, AlsoCalled("latency", "latency_s"), Key("one-way delay", zero="delay")
+        Seconds, AlsoCalled("delay", "latency", "latency_s"), Key("one-way delay", zero="delay")
     ] = 0.0
     jitter_s: Annotated[Seconds, Key("jitter", stated="jitter (half-width)", zero=True)] = 0.0
     delay_law: Annotated[DelayLaw | None, Key("law of the delay")] = None
-    delay_log: Annotated[str | None, Key("recorded delays")] = None
+    delay_log: Annotated[str | None, AlsoCalled("recorded", "ping_log"), Key("recorded delays")] = (
+        None
+    )
     delay_log_share: Share = 0.5
     reorder: Annotated[bool, Key("packets may overtake")] = False
     loss: Annotated[

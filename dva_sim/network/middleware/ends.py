@@ -106,7 +106,7 @@ class CommandTransport(ABC):
     def lacks(self) -> str:
         """One line that says what is not installed here; empty if nothing is missing."""
         if self.library and find_spec(self.library) is None:
-            how = f": pip install 'dva-sim[{self.extra}]'" if self.extra else ""
+            how = f": pip install -e '.[{self.extra}]'" if self.extra else ""
             return f"{self.title or type(self).__name__} needs {self.library}{how}"
         if self.program and shutil.which(self.program) is None:
             return f"{self.title or type(self).__name__} needs the program {self.program}"

@@ -51,7 +51,7 @@ def find_ffmpeg() -> str:
         found = imageio_ffmpeg.get_ffmpeg_exe()
     if found is None:
         raise ConfigError(
-            "mp4 needs ffmpeg: pip install 'dva-sim[video]', or install ffmpeg, or write a .gif"
+            "mp4 needs ffmpeg: pip install -e '.[video]', or install ffmpeg, or write a .gif"
         )
     return found
 

@@ -57,7 +57,7 @@ def test_sql_can_be_asked_of_a_table(results):
 
 def test_pandas_is_needed_only_by_who_asks_for_it(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pandas", None)
-    with pytest.raises(ModuleNotFoundError, match="pandas"):
+    with pytest.raises(ConfigError, match="pip install pandas"):
         Frame({"t_s": np.array([1.0])}).to_pandas()
 
 

@@ -54,7 +54,7 @@ def test_what_is_not_installed_is_said_before_the_first_run(monkeypatch):
     monkeypatch.setattr("shutil.which", lambda _: None)
     monkeypatch.setattr("dva_sim.network.middleware.ends.find_spec", lambda _: None)
     scenario = build(SHORT | {"transport": {"name": "mqtt"}})
-    assert unnamed(lacks(scenario), "paho", "dva-sim[mqtt]") == []
+    assert unnamed(lacks(scenario), "paho", "pip install -e '.[mqtt]'") == []
     with pytest.raises(ConfigError, match="paho"):
         measure(scenario, 1)
     with pytest.raises(ConfigError, match="paho") as refused:
