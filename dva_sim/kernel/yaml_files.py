@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import lru_cache
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -96,8 +96,14 @@ def with_named_files(path: Path) -> list[Path]:
         data = load_yaml(path).data
     except ConfigError:  # whatever it is, it is no document that names files
         return [path]
-    beside = (path.parent / file_in(text) for text in texts_in(data) if "." in text)
-    return [path, *filter(resources.is_file, beside)]
+    names = [file_in(text) for text in texts_in(data) if "." in text]
+    files = (file for name in names for file in (path.parent / name, beside(path, name)))
+    return [path, *dict.fromkeys(filter(resources.is_file, files))]
+
+
+def beside(path: Path, name: str) -> Path:
+    """Return the file in the folder of `path` that is called as the last part of a path `name`."""
+    return path.parent / PureWindowsPath(name).name
 
 
 def file_in(name: str) -> str:

@@ -12,13 +12,13 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.read_once import read_once
 from dva_sim.kernel.suggestions import guess
-from dva_sim.kernel.yaml_files import Document, load_yaml, with_named_files
+from dva_sim.kernel.yaml_files import Document, beside, load_yaml, with_named_files
 from dva_sim.worlds.geo import Pose
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, 255
@@ -26,6 +26,7 @@ FREE, OCCUPIED, UNKNOWN = 0, 100, 255
 # What map_saver writes for "never seen" in a trinary map.
 UNKNOWN_SHADE = 205
 NEAR_SHADE = 10  # shades this near may have been that one
+FEW = 0.01  # share of a scale map that may have that shade by chance
 JPEG_BLUR = 12.0  # by how much the shades of a JPEG may be off: a half step to white
 USUAL_CELLS = 0.005, 1.0  # of a map [m]
 
@@ -174,6 +175,19 @@ def _runs(
     return lines, starts, ends
 
 
+_YES = "1", "true", "yes", "y", "on"
+_NO = "0", "false", "no", "n", "off"
+
+
+def _as_bool(value: Any) -> Any:
+    text = str(value).lower()
+    return True if text in _YES else False if text in _NO else value
+
+
+def _in_small(value: Any) -> Any:
+    return value.lower() if isinstance(value, str) else value
+
+
 class RosMap(Config):
     """The YAML file of a ROS map, as map_server reads it; keys of other tools are left alone.
 
@@ -186,10 +200,15 @@ class RosMap(Config):
     image: str
     resolution: Annotated[float, Field(gt=0)]
     origin: tuple[float, float, float]
-    negate: Annotated[int, Field(ge=0, le=1)] = 0
+    negate: Annotated[bool, BeforeValidator(_as_bool)] = False
     occupied_thresh: Annotated[float, Field(ge=0, le=1)]
     free_thresh: Annotated[float, Field(ge=0, le=1)]
-    mode: Literal["trinary", "scale", "raw"] = "trinary"
+    mode: Annotated[Literal["trinary", "scale", "raw"], BeforeValidator(_in_small)] = "trinary"
+
+    @property
+    def unknown_shade(self) -> int:
+        """Shade of cells never seen in a trinary map."""
+        return 255 - UNKNOWN_SHADE if self.negate else UNKNOWN_SHADE
 
     @model_validator(mode="after")
     def _thresholds_in_order(self) -> RosMap:
@@ -205,8 +224,9 @@ def load_ros_map(path: str | Path) -> OccupancyGrid:
     """Read a map in ROS map_server form (YAML beside PGM or PNG).
 
     Occupied is above `occupied_thresh`, free below `free_thresh`, all else unknown. The
-    shade 205 of a trinary map is unknown whatever the thresholds: map_saver writes it for
-    cells never seen, and with a `free_thresh` above 0.196 they would pass for free.
+    shade 205 of a trinary map, 50 if it is negated, is unknown whatever the thresholds:
+    map_saver writes it for cells never seen, and with a `free_thresh` above 0.196 they would
+    pass for free. An image that is not at its path is looked for beside the YAML file.
 
     Raises:
         ConfigError: a missing or unknown key, a bad value, an image that cannot be read.
@@ -243,14 +263,16 @@ def doubts_of_map(path: str | Path) -> tuple[str, ...]:
     if blur > 1:
         doubts.append(
             f"{config.image!r} is a JPEG, whose shades are blurred: those within {blur:g} of "
-            f"{UNKNOWN_SHADE} count as never seen; save it as PGM or PNG"
+            f"{config.unknown_shade} count as never seen; save it as PGM or PNG"
         )
-    near = (np.abs(shades - UNKNOWN_SHADE) <= NEAR_SHADE) & (shades != UNKNOWN_SHADE)
-    free = near & (_classify(shades, blur, config) == FREE)
-    if share := float(free.mean()):
+    is_scale = config.mode == "scale"  # other shades than that of the unknown are measured there
+    near = np.abs(shades - config.unknown_shade) <= (0 if is_scale else NEAR_SHADE)
+    share = float((near & (_classify(shades, blur, config) == FREE)).mean())
+    if share > (FEW if is_scale else 0):
         doubts.append(
-            f"{share:.1%} of its cells have a shade near {UNKNOWN_SHADE}, which map_saver writes "
-            f"for cells never seen, and count as free (free_thresh {config.free_thresh:g})"
+            f"{share:.1%} of its cells have {'the shade' if is_scale else 'a shade near'} "
+            f"{config.unknown_shade}, which cells never seen have in trinary maps, and count as "
+            f"free (free_thresh {config.free_thresh:g})"
         )
     return tuple(sorted(doubts))
 
@@ -262,7 +284,9 @@ def _read_shades(document: Document, config: RosMap) -> tuple[NDArray[np.float64
     """
     from PIL import Image
 
-    file = document.file.parent / config.image
+    file = document.file.parent / Path(config.image).expanduser()
+    if not file.is_file():
+        file = beside(document.file, config.image)
     try:
         with Image.open(file) as opened:
             blur = JPEG_BLUR if opened.format == "JPEG" else 0.0
@@ -304,8 +328,8 @@ def _classify(shades: NDArray[np.float64], blur: float, config: RosMap) -> NDArr
     cells = np.full(shades.shape, UNKNOWN, np.uint8)
     cells[occupancy > config.occupied_thresh] = OCCUPIED
     cells[occupancy < config.free_thresh] = FREE
-    if config.mode == "trinary" and not config.negate:
-        cells[np.abs(shades - UNKNOWN_SHADE) <= blur] = UNKNOWN
+    if config.mode == "trinary":
+        cells[np.abs(shades - config.unknown_shade) <= blur] = UNKNOWN
     return cells
 
 

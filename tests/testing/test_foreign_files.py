@@ -68,6 +68,28 @@ def test_shades_near_that_of_the_unknown_that_count_as_free_are_doubted(tmp_path
 
 
 @pytest.mark.parametrize(
+    ("keys", "shade", "names"),
+    [
+        ({"mode": "scale"}, NEVER, ["the shade 205", "free_thresh 0.25"]),
+        ({"mode": "scale", "negate": 1}, 255 - NEVER, ["the shade 50"]),
+        ({"mode": "scale"}, NEVER + 4, []),  # measured there
+        ({"negate": "true"}, 255 - NEVER, []),
+        ({"negate": "true"}, 255 - NEVER - 4, ["a shade near 50"]),
+    ],
+)
+def test_unknown_cells_of_scale_and_negated_maps_that_count_as_free_are_doubted(
+    tmp_path, keys, shade, names
+):
+    shades = floor()
+    never = shades == NEVER
+    shades = 255 - shades if "negate" in keys else shades
+    shades[never] = shade
+    doubts = check_file(ros_map(tmp_path, shades=shades, **keys)).doubts
+    assert len(doubts) == bool(names)
+    assert unnamed(" ".join(doubts), *names) == []
+
+
+@pytest.mark.parametrize(
     ("keys", "names"),
     [
         ({"frame_id": "map"}, ["'frame_id'"]),

@@ -9,6 +9,7 @@ from helpers.wording import unnamed
 from PIL import Image
 
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import with_named_files
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.maps import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, load_ros_map, outline
 from dva_sim.worlds.site import map_site
@@ -58,6 +59,27 @@ def test_thresholds_are_exclusive_on_both_sides(tmp_path):
 def test_negate_swaps_black_and_white(tmp_path):
     grid = load_ros_map(write_map(tmp_path, [[0, 255, 120]], negate=1))
     assert grid.cells.tolist() == [[FREE, OCCUPIED, UNKNOWN]]
+
+
+@pytest.mark.parametrize("negate", [1, "true", "True", "yes"])
+def test_50_is_unknown_in_a_negated_map_whatever_the_thresholds(tmp_path, negate):
+    grid = load_ros_map(write_map(tmp_path, [[0, 50, 255]], negate=negate, free_thresh=0.25))
+    assert grid.cells.tolist() == [[FREE, UNKNOWN, OCCUPIED]]
+
+
+@pytest.mark.parametrize(
+    "image",
+    ["/home/robot/maps/map.pgm", "~/nowhere/map.pgm", "C:\\\\maps\\\\map.pgm", "maps/map.pgm"],
+)
+def test_an_image_whose_path_is_of_another_machine_is_found_beside_its_map(tmp_path, image):
+    path = write_map(tmp_path, [[0, 254]], image=f'"{image}"')
+    assert load_ros_map(path).cells.tolist() == [[OCCUPIED, FREE]]
+    assert tmp_path / "map.pgm" in with_named_files(path)
+
+
+def test_a_mode_may_be_in_capitals(tmp_path):
+    grid = load_ros_map(write_map(tmp_path, [[0, 100]], mode="Raw"))
+    assert grid.cells.tolist() == [[FREE, OCCUPIED]]
 
 
 def test_raw_mode_reads_percent_and_takes_the_rest_for_unknown(tmp_path):
