@@ -39,9 +39,9 @@ from dva_sim.validation.dispatch.cases import CaseFile, load_cases
 from dva_sim.validation.network.reference import PlanConfig, load_plan
 from dva_sim.worlds.drawn_plan import make_plan
 from dva_sim.worlds.geo import GeoFrame
-from dva_sim.worlds.geojson import read_features
+from dva_sim.worlds.geojson import read_features, storeys
 from dva_sim.worlds.maps import RosMap, doubts_of_map
-from dva_sim.worlds.site import DEFAULT_FRAME, SiteFile, load_site, map_site
+from dva_sim.worlds.site import DEFAULT_FRAME, SiteFile, doubts_of_site, load_site, map_site
 
 PROBE: Final = "drive-to-event"  # the scenario that a map is tried with
 PROBES: Final = 6  # its runs
@@ -82,6 +82,8 @@ def doubts(kind: FileKind, document: Document) -> list[str]:
         return contradictions_in(cell_grid.cells(load_study(document.file)))
     if kind.model is RosMap:
         return [*doubts_of_map(document.file), *_without_a_place(document)]
+    if kind.model is SiteFile:
+        return doubts_of_site(document)
     if kind.model not in _SCENARIOS:
         return []
     model = model_of(document)
@@ -108,7 +110,9 @@ def check_plan(path: Path) -> list[Problem]:
     """List the mistakes in a drawn plan; its site decides if the bases are free."""
 
     def read() -> Iterator[ConfigError]:
-        make_plan(read_features(path, _frame_of(path)))
+        levels: list[str | None] = [*storeys(path)]
+        for level in levels or [None]:
+            make_plan(read_features(path, _frame_of(path), level))
         return iter(())
 
     return _collect(path, read, lambda error: error)

@@ -151,8 +151,10 @@ def _flawed(path: Path, limit: int) -> list[Problem]:
 
 def _check_plan(path: Path) -> FileVerdict:
     from dva_sim.testing.file_kinds import check_plan  # late: start-up
+    from dva_sim.worlds.geojson import doubts_of_plan  # late: start-up
 
-    return FileVerdict("plan", _flawed(path, PLAN_BYTES) or check_plan(path))
+    problems = _flawed(path, PLAN_BYTES) or check_plan(path)
+    return FileVerdict("plan", problems, () if problems else doubts_of_plan(path))
 
 
 _EVIDENCE: Final = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -22,12 +23,17 @@ from dva_sim.kernel.suggestions import listed, unknown
 from dva_sim.kernel.yaml_files import read_text
 from dva_sim.worlds.drawn_features import KINDS
 from dva_sim.worlds.geo import GeoFrame
+from dva_sim.worlds.storeys import storeys_of, to_choose_from
 
 Points = NDArray[np.float64]
 Fail = Callable[[str], ConfigError]
 
 FARTHEST = 10e3  # from the origin, where a plane still is as good as the earth [m]
 IN_PARTS = frozenset({"wall", "zone", "wifi"})  # may be drawn as several shapes in one feature
+GEOMETRIC = frozenset(
+    {"storey", "floor", "floor_level", "level_id", "ordinal", "layer", "min_level", "max_level"}
+    | {"height", "min_height", "elevation", "ele", "z", "width", "thickness", "radius", "rotation"}
+)  # properties that other programs draw by, and plans here ignore
 DIGITS = 9  # of a coordinate [deg]: a tenth of a millimetre
 
 
@@ -55,24 +61,91 @@ class Feature:
 
 
 # --- reading ---------------------------------------------------------------------------
-def read_features(path: Path, frame: GeoFrame) -> Iterator[Feature]:
-    """The features of a GeoJSON file, in its order.
+def read_features(path: Path, frame: GeoFrame, level: str | None = None) -> Iterator[Feature]:
+    """Read the features of a GeoJSON file, in its order.
+
+    Args:
+        path: The file.
+        frame: Plane of the site.
+        level: Storey to read; features that name no storey are on each.
 
     Raises:
         ConfigError: not GeoJSON, an unknown kind, a shape that does not suit its kind, a position
-            that is no longitude and latitude or far from the origin, no room.
+            that is no longitude and latitude or far from the origin, no room, no such storey, or
+            several of which none was chosen.
     """
     text = read_text(path)
     collection = _collection(path, text)
     crs = _crs(collection)
     kinds = set()
+    on = [storeys_of(_properties(data)) for data in collection["features"]]
+    _require_storey(path, on, level)
     for index, data in enumerate(collection["features"]):
+        if level is not None and on[index] and level not in on[index]:
+            continue
         fail = partial(_error, path, text, index)
         for feature in _parts(data, frame, crs, fail):
             kinds.add(feature.kind)
             yield feature
     if "room" not in kinds:
         raise ConfigError("the plan has no feature of kind 'room'", path)
+
+
+def storeys(path: Path) -> list[str]:
+    """Return the storeys of which a site has to choose one; empty if its plan has only one.
+
+    Raises:
+        ConfigError: not GeoJSON.
+    """
+    features = _collection(path, read_text(path))["features"]
+    return to_choose_from(map(storeys_of, map(_properties, features)))
+
+
+def doubts_of_plan(path: Path) -> list[str]:
+    """List ignored properties that mean geometry elsewhere, in sentences without full stop.
+
+    Raises:
+        ConfigError: not GeoJSON.
+    """
+    features = _collection(path, read_text(path))["features"]
+    counts = Counter(key for data in features for key in _properties(data) if key in GEOMETRIC)
+    doubts = [f"property {key!r} of {n} features is ignored" for key, n in sorted(counts.items())]
+    lifted = sum(any(map(_has_height, _positions(data))) for data in features)
+    if lifted:
+        doubts.append(f"{lifted} features have positions with a height, which is ignored")
+    return doubts
+
+
+def _positions(data: Any) -> Iterator[list[Any]]:
+    geometry = data.get("geometry") if isinstance(data, dict) else None
+    nested = [geometry.get("coordinates")] if isinstance(geometry, dict) else []
+    while nested:
+        item = nested.pop()
+        if not isinstance(item, list):
+            continue
+        if item and not isinstance(item[0], list):
+            yield item
+        else:
+            nested += item
+
+
+def _has_height(position: list[Any]) -> bool:
+    return len(position) > 2 and position[2] not in (0, None)
+
+
+def _properties(data: Any) -> Mapping[str, Any]:
+    properties = data.get("properties") if isinstance(data, dict) else None
+    return properties if isinstance(properties, dict) else {}
+
+
+def _require_storey(path: Path, on: list[frozenset[str]], level: str | None) -> None:
+    labels = to_choose_from(on) or sorted(frozenset().union(*on))
+    if level is None and to_choose_from(on):
+        text = f"has {len(labels)} storeys, by 'level': {listed(labels)}"
+        raise ConfigError(f"{text}; a site reads one: add 'level: {labels[0]}' to it", path)
+    if level is not None and level not in labels:
+        there = f"its features are on {listed(labels)}" if labels else "no feature has a 'level'"
+        raise ConfigError(f"has no storey {level}; {there}", path)
 
 
 def _collection(path: Path, text: str) -> dict[str, Any]:

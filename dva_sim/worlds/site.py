@@ -30,7 +30,7 @@ from dva_sim.kernel.yaml_files import Document, load_yaml, with_named_files
 from dva_sim.worlds.compartments import NOWHERE, FloorPartition, of_floor, of_rooms
 from dva_sim.worlds.drawn_plan import make_plan
 from dva_sim.worlds.geo import GeoFrame, Pose
-from dva_sim.worlds.geojson import Feature, read_features
+from dva_sim.worlds.geojson import Feature, doubts_of_plan, read_features
 from dva_sim.worlds.maps import FREE, OccupancyGrid, load_ros_map, outline, rasterise, side
 from dva_sim.worlds.office_block import OfficeBlock, office_block
 from dva_sim.worlds.site_parts import (
@@ -44,6 +44,7 @@ from dva_sim.worlds.site_parts import (
     RadioCoverage,
     Room,
 )
+from dva_sim.worlds.storeys import label_of
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
@@ -417,6 +418,7 @@ class SiteFile(Config):
     description: str = ""
     origin: Origin
     plan: str | None = None
+    level: float | str | None = None
     generate: OfficeBlock | None = None
     resolution_m: Annotated[float, Field(gt=0.005, le=0.5)] = 0.05
     ceiling_m: Annotated[float, Field(ge=1.5, le=50)] = CEILING
@@ -425,6 +427,8 @@ class SiteFile(Config):
     def _one_plan(self) -> SiteFile:
         if (self.plan is None) == (self.generate is None):
             raise ValueError("should have a plan (a GeoJSON file) or generate, and not both")
+        if self.level is not None and self.plan is None:
+            raise ValueError("a level is a storey of a plan, and generate makes one storey")
         return self
 
 
@@ -471,6 +475,12 @@ def _load_site(path: Path, options: str) -> Site:
     return site
 
 
+def doubts_of_site(document: Document) -> list[str]:
+    """List what a valid site's plan has that is ignored, in sentences without full stop."""
+    plan = document.data.get("plan")
+    return [] if plan is None else doubts_of_plan(document.file.parent / plan)
+
+
 def _site_of_plan(path: Path) -> str:
     """Name the site that has a plan, or explain how one is written."""
     for file in sorted(path.parent.glob("*.yaml")):
@@ -504,7 +514,8 @@ def _features(
     file = document.file.parent / str(config.plan)
     if not resources.is_file(file):
         raise document.error(f"plan {config.plan!r} not found", ("plan",))
-    return tuple(read_features(file, frame))
+    level = None if config.level is None else label_of(config.level)
+    return tuple(read_features(file, frame, level))
 
 
 def _with_options(name: str, block: OfficeBlock, options: Mapping[str, Any]) -> OfficeBlock:
