@@ -100,6 +100,7 @@ _PLAIN = {
     "x_m": "Position, east",
     "y_m": "Position, north",
     "ceiling_m": "Height of rooms that do not state theirs",
+    "level": "Storey of the plan to read, by the property `level` of its features",
     "correlation_s": "Time constant of the correlation; 0: independent",
 }
 """Meanings of keys that their models leave to the name."""

@@ -101,6 +101,15 @@ def test_a_panel_where_no_run_went_on_takes_nothing_from_the_others(view):
         assert CommandRate().draw(both, NOTHING_ELSE) is not None
 
 
+@blank
+@pytest.mark.filterwarnings("error::UserWarning")
+def test_a_rate_of_zero_everywhere_has_an_axis(view):
+    silent = with_columns(view, command_rate_hz=np.zeros_like(view.part.treated["drive_time_s"]))
+    with styled():
+        (axes, *_) = CommandRate().draw(silent, NOTHING_ELSE).figure.axes
+    assert axes.get_ylim()[0] == 0
+
+
 def test_names_of_lines_that_end_together_are_moved_apart_within_the_axes():
     placed = apart([0.95, 0.96, 0.97], gap=0.1)
     assert np.diff(placed).min() == pytest.approx(0.1)

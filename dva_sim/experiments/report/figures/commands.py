@@ -86,7 +86,7 @@ class CommandRate(style.ReportFigure):
             _closed_form(ax, view, found)
             every.append(ends)
         tops = [ax.dataLim.y1 for ax in axes if np.isfinite(ax.dataLim.y1)]  # a panel may be empty
-        axes[0].set_ylim(0, _ROOM * max(tops, default=1.0))
+        axes[0].set_ylim(0, _ROOM * (max(tops, default=0.0) or 1.0))
         style.label_panels(axes, view, style.axis_label("command_rate_hz"))
         if style.has_lines(view):
             name_lines(axes, every, view.line)
