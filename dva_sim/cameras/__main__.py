@@ -117,7 +117,7 @@ async def _serve(world: int, listener: socket.socket, host: str, labels: Sequenc
     app = Starlette(routes=routes, exception_handlers={HTTPException: _refused})
     closing = asyncio.ensure_future(_close_when(ended, streams))
     # Pictures have no token: their address goes to all devices, by messages of the DVA.
-    guarded = PortGuard(app, Admission(own_names(host)))
+    guarded = PortGuard(app, Admission(own_names(host, any_port=True)))
     server = Server.of(guarded, MOST_REQUEST, ws="none")
     await serve(server, listener, fitting_places(1), ended)
     for task in (saying, closing):

@@ -68,7 +68,7 @@ class OwnNames:
         if facts.origin is not None:
             if not self._may_ask(facts.origin.lower(), facts):
                 return 403, "a page of another site may not ask here"
-        elif facts.site in ("cross-site", "same-site"):
+        elif facts.site == "cross-site" or (facts.site == "same-site" and not self.any_port):
             opened = facts.is_page and facts.mode == "navigate" and not facts.changes
             if not opened:
                 return 403, "a page of another site may not ask here"

@@ -61,6 +61,13 @@ def test_another_site_may_lead_a_person_to_the_page_but_embed_nothing():
     )
 
 
+def test_a_page_that_another_port_serves_embeds_where_any_port_may():
+    names = own_names("127.0.0.1", any_port=True)
+    assert names.refusal(RequestFacts("127.0.0.1:8123", site="same-site", mode="no-cors")) is None
+    refused = names.refusal(RequestFacts("127.0.0.1:8123", site="cross-site", mode="no-cors"))
+    assert refused[0] == 403
+
+
 @pytest.mark.parametrize(
     ("origin", "status"),
     [

@@ -2,7 +2,12 @@
 
 import re
 import signal
-from contextlib import suppress
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 
 from helpers.console.console_program import started
 from helpers.console.keyboard_driver import NEAR_FIRE, Driver
@@ -92,12 +97,24 @@ def test_a_fire_is_reached_by_keys_over_500_ms_and_confirmed(tmp_path, visit, pr
     assert checked.ends() == 0, checked.complained
 
 
-def test_an_image_element_shows_what_a_robot_of_a_live_run_sees(programs, browser):
+@contextmanager
+def page_of_this_machine(folder: Path, text: str) -> Iterator[str]:
+    """Address of a page that another port of this machine serves."""
+    (folder / "page.html").write_text(text, encoding="utf-8")
+    handler = partial(SimpleHTTPRequestHandler, directory=folder)
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}/page.html"
+        server.shutdown()
+
+
+def test_an_image_element_shows_what_a_robot_of_a_live_run_sees(programs, browser, tmp_path):
     run = programs.start("live", "drive-to-event", "--camera-port", "0")
     run.wait_to_say("shows pictures of the robots at http://")
     url = re.search(r"at (http://127\.0\.0\.1:\d+/camera/)LABEL", run.output)
     assert url is not None
     page = browser.new_page()
-    page.set_content(f'<img src="{url[1]}robot-1.mjpg">', wait_until="commit")
-    page.wait_for_function("document.images[0].naturalWidth === 320")
-    page.close()
+    with page_of_this_machine(tmp_path, f'<img src="{url[1]}robot-1.mjpg">') as address:
+        page.goto(address, wait_until="commit")
+        page.wait_for_function("document.images[0]?.naturalWidth === 320")
+        page.close()
