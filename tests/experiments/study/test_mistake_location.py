@@ -96,7 +96,7 @@ def test_a_mistake_of_the_file_itself_stays_there_whatever_is_set(tmp_path):
     ("setting", "expected"),
     [
         ("robots=2", "'robot.count'"),
-        ("link.delay_s=-1", "at least 0, not -1"),
+        ("link.delay_s=-1", "at least 0 seconds, not -1"),
         ("robot.count=0", "robot.count and guard.count"),
         ("dva.supervisors=[operator-7]", "'operator-7' is unknown; known: operator-1"),
     ],
