@@ -71,10 +71,10 @@ def _ready_at_once(original: Original, bug: Bug) -> Original:
 
 
 def _ignores_latch(original: Original, bug: Bug) -> Original:
-    def wrong(self: Any, arrived: float, moving: bool, is_start: bool = False) -> Any:
+    def wrong(self: Any, arrived: float, moving: bool, releases: bool = False) -> Any:
         was_held = self.latch.holds
         self.latch.holds = False
-        refusal = original(self, arrived, moving, is_start)
+        refusal = original(self, arrived, moving, releases)
         self.latch.holds = was_held
         if was_held and refusal is None:
             bug.act(f"{self.id_tag} takes an order though nobody has released it")

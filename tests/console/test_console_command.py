@@ -279,7 +279,8 @@ def test_a_second_address_is_for_those_who_only_look(programs, console):
     seen = urllib.request.Request(f"{base}api/state", headers=headers)
     with urllib.request.urlopen(seen) as answer:
         assert answer.status == 200
-    acts = urllib.request.Request(f"{base}api/emergency", b'{"id": "a"}', headers)
+    body = b'{"id": "a", "action": "pace", "arguments": {"paused": true}}'
+    acts = urllib.request.Request(f"{base}api/actions", body, headers)
     with pytest.raises(urllib.error.HTTPError) as error:
         urllib.request.urlopen(acts)
     with error.value as refused:

@@ -245,7 +245,7 @@ class RobotController:
             return Decision(m.BUSY, f"held by {self.grant.holder}")
         if self.inquiry.is_open and now < self.inquiry.asked_at + PATIENCE:
             return Decision(m.BUSY, "the DVA is being asked who holds it")
-        refusal = self._begin(math.inf, moving, is_start=True)
+        refusal = self._begin(math.inf, moving, releases=self.latch.starts())
         if refusal is not None:
             return refusal
         if self.latch.holds:
@@ -474,17 +474,17 @@ class RobotController:
         self.last_order_id = message.message_id
         return None
 
-    def _begin(self, arrived: float, moving: bool, is_start: bool = False) -> Decision | None:
+    def _begin(self, arrived: float, moving: bool, releases: bool = False) -> Decision | None:
         """Return why no new activity may begin now, or None.
 
         Args:
             arrived: Arrival time of the order [s].
             moving: True while the robot's wheels still turn.
-            is_start: True for a person's start, which releases the robot where nobody else can.
+            releases: True if the order releases the robot after an emergency.
         """
         if arrived <= self.emergency_at:
             return Decision(m.STALE, "sent before the emergency")
-        if self.latch.holds and not (is_start and self.latch.starts()):
+        if self.latch.holds and not releases:
             return Decision(m.BUSY, self.latch.refusal)
         if self.mode is not IDLE:
             return Decision(m.BUSY, f"in mode {self.mode}")
@@ -499,7 +499,7 @@ class RobotController:
         if refusal is not None:
             return refusal._replace(waits=not self.knows(message))
         again = self.mode is TELEOPERATION and self.owner == message.source
-        refusal = None if again else self._begin(arrived, moving, is_start=True)
+        refusal = None if again else self._begin(arrived, moving, self.latch.starts())
         refusal = refusal or self._order(message)
         if refusal is not None:
             return refusal
@@ -556,9 +556,12 @@ class RobotController:
         refusal = self._refusal(message, "missions")
         if refusal is not None:
             return refusal._replace(waits=not self.knows(message))
-        refusal = self._begin(arrived, moving) or self._order(message)
+        releases = message.source != self.dva and self.latch.takes_any_order
+        refusal = self._begin(arrived, moving, releases) or self._order(message)
         if refusal is not None:
             return refusal
+        if self.latch.holds:
+            self.latch.release(None)
         self.mode, self.owner, self.mission = MISSION, message.source, body
         left = len(body.waypoints) if isinstance(body, m.GoTo | m.Patrol) else 1
         self.mission_status = m.MissionStatus(message.message_id, "under_way", left, "")

@@ -76,6 +76,11 @@ class EmergencyLatch:
         return not self.holds or self.released_by == DRIVE
 
     @property
+    def takes_any_order(self) -> bool:
+        """True where a run knows no release at all: then each new order of the holder is one."""
+        return self.rule == DRIVE
+
+    @property
     def refusal(self) -> str:
         """Reason for which orders are refused."""
         if self.released_by == DRIVE:

@@ -624,8 +624,9 @@ class SafetyAudit:
             if motion.mode != Mode.IDLE:  # else it repeats what it once said
                 yield "S3", "obeys an order from before the emergency"
             return
-        is_refused = witness.latched if level == "missions" else not witness.starts_anew()
-        if is_refused:
+        is_mission_alone = level == "missions" and self._release != DRIVE
+        may_release = message.source != self._dva and not is_mission_alone
+        if witness.latched and not (may_release and witness.starts_anew()):
             yield "S3", f"obeys {message.source} before anybody has released it"
         if witness.in_hand(now) and motion.mode != Mode.IDLE:
             yield "S2", f"obeys {message.source} while it is driven by hand"

@@ -36,7 +36,7 @@ def device_state(kind: str = "Robot", **more: object) -> DeviceState:
 
 
 def test_of_a_robot_that_has_said_nothing_everything_is_unknown():
-    row = lines.robot_row(device_state(), 0, 5.0)
+    row = lines.robot_row(device_state(), 0, 5.0, {})
     assert (row["mode"], row["holder"], row["camera"]) == ("unknown", None, None)
     assert lines.device_row(device_state(), 5.0, False, False)["link"] is None
     assert lines.device_row(device_state(), 5.0, False, False)["holder_known"] is False
@@ -48,7 +48,7 @@ def test_a_robot_is_shown_as_it_says_itself():
     status = m.RobotStatus("Teleoperation", m.Position(latitude, longitude), 1.0, 0.25, 0.0, 7)
     holder = m.RobotHolder(id_of("operator", 1), "ana", 10.0), 2.0
     robot = device_state(status=status, holder=holder, heard=4.0)
-    row = lines.robot_row(robot, 3, 5.0)
+    row = lines.robot_row(robot, 3, 5.0, {})
     shown = (row["mode"], row["holder_label"], row["session_age_s"])
     assert shown == ("Teleoperation", "ana", 13.0)
     assert lines.positions({ROBOT: robot}, {ROBOT: 3}, HERE) == [[3, 300, -400, 1000, 250]]
@@ -174,7 +174,7 @@ def test_it_shows_what_runs_there_and_outlives_the_dva(programs):
     assert robots()  # what was told last stays
     live(programs, dva, "dva")
     assert becomes(lambda: console.story().count("dva answers") == 2)
-    assert becomes(lambda: robots() == [("robot-1", "Idle"), ("robot-2", "Idle")])
+    assert becomes(lambda: robots() == [("robot-1", "Emergency"), ("robot-2", "Emergency")])
 
 
 def test_with_keys_it_attaches_as_the_control_room_of_its_key_and_decides(programs, tmp_path):
