@@ -423,14 +423,16 @@ class RobotController:
     @property
     def free(self) -> bool:
         """True if it is idle and nobody holds it: then it can be sent somewhere."""
-        idle = self.mode is IDLE and self.by_hand is None and not self.latch.holds
+        stopped = self.latch.holds and not self.latch.takes_any_order
+        idle = self.mode is IDLE and self.by_hand is None and not stopped
         return idle and self.owner is None and self.grant is None
 
     def _auction(self, message: m.Message) -> Decision:
         """A task is on offer, or was won. An award moves nothing: an operator has to drive."""
         if message.source != self.dva:
             return Decision(m.NOT_PERMITTED, "only the DVA holds auctions")
-        if isinstance(message.body, m.TaskAward) and self.latch.holds:
+        stopped = self.latch.holds and not self.latch.takes_any_order
+        if isinstance(message.body, m.TaskAward) and stopped:
             return Decision(m.BUSY, self.latch.refusal)
         if isinstance(message.body, m.TaskAward) and not self.free:
             return Decision(m.BUSY, f"in mode {self.mode}, held by {self._holder()}")
