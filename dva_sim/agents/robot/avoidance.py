@@ -118,7 +118,9 @@ class Avoidance:
         way = np.arange(0.0, min(AHEAD, route.length - along) + STEP, STEP)
         base = np.array([route.point_at(along + s) for s in way.tolist()])
         left = _to_the_left(base)
-        offset = float((np.array(here) - base[0]) @ left[0])
+        # Written out: a product of arrays is rounded as the processor's library likes.
+        east, north = here[0] - float(base[0, 0]), here[1] - float(base[0, 1])
+        offset = east * float(left[0, 0]) + north * float(left[0, 1])
         places = self._foreseen(way, here, others)
         if last == 0.0:  # then nothing is better than the planned way
             points = base + _shifts(way, offset, _SIDES[:1], _HOLDS[:1])[..., None] * left
