@@ -262,8 +262,11 @@ class OperatorAgent:
             self._give_back(drive.robot, drive.session)
 
         if outcome == "lost link":
-            # Whatever still gets through shall stop the robot; nobody waits for the answer.
-            device.ask(drive.robot, m.Emergency(), session=drive.session)
+            # Whatever still gets through shall stop the robot; nobody waits for the answer. A
+            # mission is called back: nothing but a start would release it from an emergency.
+            ending = drive.ending()
+            stop = m.Emergency() if isinstance(ending, m.StopTeleOp) else ending
+            device.ask(drive.robot, stop, session=drive.session)
             give_back()
         elif drive.log.started is None and not (drive.session and by_dva):
             give_back()

@@ -423,16 +423,14 @@ class RobotController:
     @property
     def free(self) -> bool:
         """True if it is idle and nobody holds it: then it can be sent somewhere."""
-        stopped = self.latch.holds and not self.latch.takes_any_order
-        idle = self.mode is IDLE and self.by_hand is None and not stopped
+        idle = self.mode is IDLE and self.by_hand is None and not self.latch.holds
         return idle and self.owner is None and self.grant is None
 
     def _auction(self, message: m.Message) -> Decision:
         """A task is on offer, or was won. An award moves nothing: an operator has to drive."""
         if message.source != self.dva:
             return Decision(m.NOT_PERMITTED, "only the DVA holds auctions")
-        stopped = self.latch.holds and not self.latch.takes_any_order
-        if isinstance(message.body, m.TaskAward) and stopped:
+        if isinstance(message.body, m.TaskAward) and self.latch.holds:
             return Decision(m.BUSY, self.latch.refusal)
         if isinstance(message.body, m.TaskAward) and not self.free:
             return Decision(m.BUSY, f"in mode {self.mode}, held by {self._holder()}")
@@ -482,7 +480,7 @@ class RobotController:
         Args:
             arrived: Arrival time of the order [s].
             moving: True while the robot's wheels still turn.
-            releases: True if the order releases the robot after an emergency.
+            releases: True for a start that releases the robot after an emergency.
         """
         if arrived <= self.emergency_at:
             return Decision(m.STALE, "sent before the emergency")
@@ -558,12 +556,9 @@ class RobotController:
         refusal = self._refusal(message, "missions")
         if refusal is not None:
             return refusal._replace(waits=not self.knows(message))
-        releases = message.source != self.dva and self.latch.takes_any_order
-        refusal = self._begin(arrived, moving, releases) or self._order(message)
+        refusal = self._begin(arrived, moving) or self._order(message)
         if refusal is not None:
             return refusal
-        if self.latch.holds:
-            self.latch.release(None)
         self.mode, self.owner, self.mission = MISSION, message.source, body
         left = len(body.waypoints) if isinstance(body, m.GoTo | m.Patrol) else 1
         self.mission_status = m.MissionStatus(message.message_id, "under_way", left, "")

@@ -76,15 +76,10 @@ class EmergencyLatch:
         return not self.holds or self.released_by == DRIVE
 
     @property
-    def takes_any_order(self) -> bool:
-        """True where a run knows no release at all: then each new order of the holder is one."""
-        return self.rule == DRIVE
-
-    @property
     def refusal(self) -> str:
         """Reason for which orders are refused."""
         if self.released_by == DRIVE:
-            return "stopped by an emergency: its driver has to start it anew"
+            return "stopped by an emergency: its driver has to start it again"
         return "stopped by an emergency: a person has to release it"
 
     def message(self, now: float) -> m.RobotEmergency:

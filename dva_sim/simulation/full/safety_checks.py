@@ -61,7 +61,7 @@ CHECKED: Final = {
     "and knows it before it is given",
     "S3": "after an emergency nothing moves a robot until a person has asked the DVA to release it "
     "from the newest one, and the DVA has told it so, or somebody has at the robot itself; where "
-    "the DVA knows nobody who may, until its holder starts it anew; nothing that came before moves "
+    "the DVA knows nobody who may, until its holder starts it again; nothing from before moves "
     "it then, and the DVA sends none out that tells it that it is stopped; slack: as for S1 and S2",
     "S4": "speed and turn rate, and what the motors are asked for, stay within their limits; "
     f"slack: {SLACK - 1:.0%}, and "
@@ -624,9 +624,7 @@ class SafetyAudit:
             if motion.mode != Mode.IDLE:  # else it repeats what it once said
                 yield "S3", "obeys an order from before the emergency"
             return
-        is_mission_alone = level == "missions" and self._release != DRIVE
-        may_release = message.source != self._dva and not is_mission_alone
-        if witness.latched and not (may_release and witness.starts_anew()):
+        if witness.latched and (level == "missions" or not witness.starts_anew()):
             yield "S3", f"obeys {message.source} before anybody has released it"
         if witness.in_hand(now) and motion.mode != Mode.IDLE:
             yield "S2", f"obeys {message.source} while it is driven by hand"

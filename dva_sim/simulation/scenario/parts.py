@@ -462,7 +462,7 @@ class EmergencyConfig(Config):
 
     Attributes:
         release: Rule by which a stopped robot takes orders again. `person`: a control room that
-            may dispatch releases it. `drive`: its holder gives it a new order. Left out: in the
+            may dispatch releases it. `drive`: its holder starts it again. Left out: in the
             console and in `live` a person, where one who may is registered; else a new start.
     """
 

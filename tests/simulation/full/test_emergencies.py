@@ -72,6 +72,13 @@ def test_a_robot_stays_stopped_over_restarts_of_its_program_and_of_the_dva():
     assert run.recorder.violations == {}
 
 
+def test_without_anybody_who_may_release_only_a_start_of_its_holder_does():
+    """The operators here send missions, which release nothing."""
+    run, _ = patrol(None)
+    assert max(driven(run, STOPPED_AT + 3.0, 300.0).values()) < 0.01
+    assert run.recorder.violations == {}
+
+
 @pytest.mark.parametrize("name", ["policy-drives-on", "releases-unasked"])
 def test_a_dva_that_lets_the_policy_go_on_is_found(name):
     with planted(name) as bug:
