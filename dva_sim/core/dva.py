@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from itertools import chain
-from typing import Literal
 
 import numpy as np
 
@@ -33,7 +32,6 @@ from dva_sim.core.travel_times import SiteKnowledge, Travel
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.control_room import ControlRoomBody
 
-ReleasedBy = Literal["person", "drive"]
 Reaction = tuple[m.Reply, list[Send]]
 FOUND_WITHIN = 20.0  # of its event a finding has to be [m]
 
@@ -88,7 +86,7 @@ class Dva:
         ask_first: bool = False,
         policy_name: str = "",
         audit: bool = True,
-        release: ReleasedBy | None = None,
+        release: m.ReleasedBy | None = None,
     ) -> None:
         self.sessions, self.access = sessions, access or Access()
         self.registry, self.events = Registry(), EventTable(rules.merge_distance)

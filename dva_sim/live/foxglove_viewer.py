@@ -54,7 +54,7 @@ class ViewedChannel:
 
 
 class FoxgloveViewer:
-    """One viewer, in the thread of the event loop.
+    """Viewer that the thread of the event loop serves.
 
     Args:
         session: Id of the run.

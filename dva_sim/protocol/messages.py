@@ -8,7 +8,7 @@ as `70:1A:04:F9:81:D6`, with capital letters, so that one device has one spellin
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from dva_sim.kernel.makers import maker
 from dva_sim.protocol.control_room import (
@@ -174,6 +174,10 @@ class RobotEmergency:
     stopped_for: float
     tick: int
     released: ByWhom | None = None
+
+
+ReleasedBy = Literal["person", "drive"]
+"""Rule by which a robot is released: by a permitted person, or by a new start of its holder."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ from dva_sim.simulation.full.stage import Stage
 LOOK_AROUND: Final = 2.0  # design: between two looks at who is there [s]
 MOST_ROBOTS: Final = 64
 MOST_DRIVERS: Final = 8  # clients that may be in control at a time
-SILENT: Final = 0.5  # design: without a command a robot is told to stand [s]; 25 of a joystick
+SILENT: Final = 0.5  # design: a robot whose driver sends no command for that long is stopped [s]
 TAKE_TRIES: Final = 3  # design: a long link takes a permission's time to be connected over
 SCAN_HZ: Final = 5.0
 RENEW: Final = 30.0  # design: of a subscription to a sensor [s]

@@ -1,4 +1,4 @@
-"""Registrations of one peer: many at once, then so many a second, whatever others do."""
+"""Registrations of one peer: limited at once and per second, whatever other peers do."""
 
 import pytest
 

@@ -8,11 +8,10 @@ Pure.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
 from dva_sim.protocol import messages as m
 
-ReleasedBy = Literal["person", "drive"]
 PERSON: Final = "person"
 DRIVE: Final = "drive"
 LONGEST_STOP_S = 1e6  # the protocol's limit
@@ -34,13 +33,13 @@ class EmergencyLatch:
         released_by: Rule of this emergency, as far as the DVA has said.
     """
 
-    rule: ReleasedBy | None = None
+    rule: m.ReleasedBy | None = None
     holds: bool = False
     stopped_by: str | None = None
     since: float = 0.0
     tick: int = 0
     released: m.ByWhom | None = None
-    released_by: ReleasedBy | None = None
+    released_by: m.ReleasedBy | None = None
 
     def close(self, stopped_by: str | None, now: float, tick: int) -> None:
         """Hold the robot; an emergency that comes while it is held needs a release of its own."""

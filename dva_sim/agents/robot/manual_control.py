@@ -78,7 +78,7 @@ class ManualControl:
         """Release the robot at the robot itself, after an emergency."""
         robot = self._robot
         decision = self._controller.release_by_hand(who)
-        if decision.text == "released":
+        if decision.code == m.OK:
             now = robot.device.clock.now
             self._done(who, "releases", decision, now)
             if robot.trace is not None:

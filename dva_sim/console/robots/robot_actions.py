@@ -154,10 +154,9 @@ class RobotActions:
         """The button at the robot itself."""
         self._windows.by_id[robot].hand.press_emergency()
 
-    def release_emergency(self, robot: str, who: str) -> m.Reply:
+    def release_emergency(self, robot: str, who: str) -> Decision:
         """Release a robot at the robot itself."""
-        decision = self._windows.by_id[robot].hand.release(who)
-        return m.Reply(0, decision.code, decision.text)
+        return self._windows.by_id[robot].hand.release(who)
 
     # --- faults ------------------------------------------------------------------------
 

@@ -63,8 +63,8 @@ class LoneRobotActions:
     @does("robot_release")
     def _release_emergency(self, client: str, line: OfRobot, on_result: OnResult) -> None:
         robot = self._world.robot
-        reply = self._hands.release_emergency(robot.device.id_tag, client)
-        on_result(reply.code == m.OK, reply.text)
+        decision = self._hands.release_emergency(robot.device.id_tag, client)
+        on_result(decision.code == m.OK, decision.text)
 
     @does("robot_register")
     def _register(self, _: str, line: RegistrationAsked, on_result: OnResult) -> None:

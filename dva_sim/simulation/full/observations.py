@@ -13,12 +13,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, Protocol
 
 from dva_sim.agents.robot.command_queue import mean_of
-from dva_sim.agents.robot.emergency_latch import DRIVE, ReleasedBy
+from dva_sim.agents.robot.emergency_latch import DRIVE
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import Event, EventTable, State
 from dva_sim.kernel.recorder import Accepted, ByHand, Sent
-from dva_sim.protocol.messages import Position
+from dva_sim.protocol.messages import Position, ReleasedBy
 from dva_sim.simulation.full.control_room import at_event_m
 from dva_sim.simulation.full.dva_server import DvaAgent
 from dva_sim.simulation.full.stage import DVA, id_of, label_of, release_of

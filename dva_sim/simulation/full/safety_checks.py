@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple
 
 from dva_sim.agents.observation import CameraFrame
 from dva_sim.agents.robot.controller import Mode
-from dva_sim.agents.robot.emergency_latch import DRIVE, PERSON, ReleasedBy
+from dva_sim.agents.robot.emergency_latch import DRIVE, PERSON
 from dva_sim.kernel.recorder import Accepted, ByHand, Recorder
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
@@ -207,7 +207,7 @@ class Witness:
     restarts: int = 0
     restarts_shown: dict[str, int] = field(default_factory=dict)
     latched: bool = False
-    released_by: ReleasedBy | None = None
+    released_by: m.ReleasedBy | None = None
     emergency: int | None = None
     reported_at: float = -math.inf
     questions: deque[int] = field(default_factory=lambda: deque(maxlen=MOST_COPIES))
@@ -288,7 +288,7 @@ class Witness:
         self.stopped = max(self.stopped, when)
         self.hand = None
 
-    def note_stop(self, when: float, rule: ReleasedBy | None) -> None:
+    def note_stop(self, when: float, rule: m.ReleasedBy | None) -> None:
         """Note that an emergency has stopped it, or should have, until it is released.
 
         Args:
@@ -300,7 +300,7 @@ class Witness:
             self.released_by = rule
         self.latched = True
 
-    def reports_emergency(self, message: m.Message, now: float, rule: ReleasedBy | None) -> None:
+    def reports_emergency(self, message: m.Message, now: float, rule: m.ReleasedBy | None) -> None:
         """Note what it says of its emergency: a tick that is new means that it has obeyed one."""
         body = message.body
         if not isinstance(body, m.RobotEmergency):
@@ -329,7 +329,7 @@ class Witness:
         self.latched = False
         return content.released
 
-    def starts_anew(self) -> bool:
+    def starts_again(self) -> bool:
         """Take an order that could release it; False if it stays stopped."""
         if self.latched and self.released_by == DRIVE:
             self.latched = False
@@ -624,7 +624,7 @@ class SafetyAudit:
             if motion.mode != Mode.IDLE:  # else it repeats what it once said
                 yield "S3", "obeys an order from before the emergency"
             return
-        if witness.latched and (level == "missions" or not witness.starts_anew()):
+        if witness.latched and (level == "missions" or not witness.starts_again()):
             yield "S3", f"obeys {message.source} before anybody has released it"
         if witness.in_hand(now) and motion.mode != Mode.IDLE:
             yield "S2", f"obeys {message.source} while it is driven by hand"
@@ -682,7 +682,7 @@ class SafetyAudit:
         if done.what == "takes":
             motion, limits = self._motion_of(done.robot), self._motors[done.robot]
             found = [*_taken_by_hand(witness, motion, limits, now)]
-            if not witness.starts_anew():
+            if not witness.starts_again():
                 found.append(("S3", "is taken by hand before anybody has released it"))
             witness.hand = witness.owner = done.who
             witness.ordered = witness.heard = now

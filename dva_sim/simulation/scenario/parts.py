@@ -17,6 +17,7 @@ from dva_sim.core.permissions import LEVELS
 from dva_sim.kernel.assumed import OmitsUnset
 from dva_sim.kernel.config import AlsoCalled, Config, Key
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.protocol.messages import ReleasedBy
 from dva_sim.worlds.hazards import KINDS, make_hazard
 
 Positive = Annotated[float, Field(gt=0)]
@@ -466,7 +467,7 @@ class EmergencyConfig(Config):
             console and in `live` a person, where one who may is registered; else a new start.
     """
 
-    release: Literal["person", "drive"] | None = None
+    release: ReleasedBy | None = None
 
 
 class PatrolConfig(Config):

@@ -1,4 +1,4 @@
-"""All tables of a session are written, whenever each kind of participant leaves it."""
+"""The tables of a session are written whenever a participant of any kind leaves it."""
 
 import pytest
 from helpers.console.simulated_phone import PhonePage
@@ -11,7 +11,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.ros.gateway import RosGateway
 
 SHORT = 1.0  # before the end [s]
-LONG = 150.0  # by then the DVA and the console have forgotten whoever left [s]
+LONG = 150.0  # after that the DVA and the console have forgotten a participant that left [s]
 FOREIGN = "AA:BB:CC:00:00:01"
 
 
