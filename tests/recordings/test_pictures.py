@@ -121,7 +121,7 @@ def test_an_ffmpeg_that_fails_is_one_line_and_no_half_film(
 def test_without_any_ffmpeg_one_is_told_what_to_install_before_the_run(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(ConfigError, match=r"'dva-sim\[video\]', or .* ffmpeg"):
+    with pytest.raises(ConfigError, match=r"'\.\[video\]', or .* ffmpeg"):
         Wanted(video=tmp_path / "film.mp4")
 
 
