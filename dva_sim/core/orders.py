@@ -177,6 +177,14 @@ class Orders:
             if (device, event.number) in self._from_afar and self._is_near(event, device):
                 self._is_there(event, device, now)
 
+    def _was_near(self, event: Event, device: str) -> bool:
+        """Return True unless the finding is of an earlier order, carried out by another device.
+
+        A DVA that has lost an order in a crash may have given the same operator another robot.
+        """
+        there = "act_arrived" if device == event.actor else "arrived"
+        return there in event.times or self._is_near(event, device)
+
     def _is_near(self, event: Event, device: str) -> bool:
         within, entry = self.rules.arrived_within, self.registry.entries.get(device)
         at = None if entry is None else entry.position
@@ -197,9 +205,10 @@ class Orders:
         """Handle the finding or result of a device that was sent."""
         if not event.open:
             return []
-        if self.has_order(event, device):
+        goes = device if device == event.actor else event.responder
+        if self.has_order(event, device) and (goes is None or self._was_near(event, goes)):
             self.departed(event, device, now)
-            self._is_there(event, device if device == event.actor else event.responder, now)
+            self._is_there(event, goes, now)
         if finding == "contained" and event.state is State.CONFIRMED:
             self.events.move(event, State.CONTAINED, now)
             return self._stand_down(event, but=device)

@@ -170,3 +170,21 @@ def test_who_deals_with_it_has_to_be_there_too():
     for now in range(3, 34):
         office.tick(float(now))
     assert office.event().actor == OTHER_GUARD
+
+
+@pytest.mark.parametrize(("robot_at", "arrived"), [(10, 2.0), (90, None)])
+def test_a_finding_of_an_order_that_the_dva_has_forgotten_is_no_arrival_of_another(
+    robot_at, arrived
+):
+    """Back from a crash, it has given the operator another robot, which stands far away."""
+    office = Office(rules=replace(RULES, arrived_within=10.0))
+    office.busy(GUARD)
+    office.status(ROBOT, robot_at)
+    office.ok(office.fire(12))
+    office.finds(OPERATOR, "confirmed", 2.0)
+    assert (office.event().state, office.event().times.get("arrived")) == (
+        State.CONFIRMED,
+        arrived,
+    )
+    at = office.core.registry.entries[ROBOT].position
+    assert at == office.event().position if arrived else at != office.event().position

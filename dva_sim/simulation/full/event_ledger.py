@@ -96,6 +96,8 @@ class Word:
         freed: True if somebody reported the end of the work since then: the DVA may have sent the
             same device again at once, with the order still in its queue.
         found: Findings and actions of those at the place.
+        went: Pairs of all that were ever ordered there, with the device that travels.
+        reached: Devices that were near the place while they had the event.
     """
 
     ordered: dict[str, str] = field(default_factory=dict)
@@ -106,6 +108,8 @@ class Word:
     sent_again: bool = False
     freed: bool = False
     found: set[str] = field(default_factory=set)
+    went: set[tuple[str, str]] = field(default_factory=set)
+    reached: set[str] = field(default_factory=set)
 
 
 class EventLedger:
@@ -240,6 +244,7 @@ class EventLedger:
                 other.ended.add(to)
         is_another = to in word.loose or word.ordered.get(to, goes) != goes
         word.ordered[to], word.sent_again = goes, word.sent_again or is_another
+        word.went.add((to, goes))
         word.taken.discard(to)
         word.ended.discard(to)
         word.loose.discard(to)
@@ -253,12 +258,15 @@ class EventLedger:
             word.taken.add(device)
 
     def _finds(self, word: Word, source: str, number: int, finding: str) -> None:
-        """It counts if who was sent there says so; what is confirmed, was looked at there."""
-        goes, event = word.ordered.get(source), self._events.get(number)
-        if goes is None or event is None:
+        """It counts if who was sent there says so; what is confirmed, was looked at there.
+
+        Who has been sent again, with another robot, may still speak of the first.
+        """
+        event, went = self._events.get(number), [goes for who, goes in word.went if who == source]
+        if not went or event is None:
             return
         self._takes_up(number, source)
-        if finding != "confirmed" or self._is_near(goes, event):
+        if finding != "confirmed" or any(self._is_near(goes, event) for goes in went):
             word.found.add(finding)
 
     def _is_near(self, device: str, event: Event) -> bool:
@@ -360,6 +368,7 @@ class EventLedger:
         if event.kind == kind and apart(event.position, place) <= MOVED:
             new = self._word(event.number)
             new.ordered = word.ordered | new.ordered
+            new.went |= word.went
 
     def _fitting(self, report: m.EventReport) -> Iterator[int]:
         """Yield the numbers of the events, open or closed, that fit a report."""
@@ -379,6 +388,7 @@ class EventLedger:
             sent[event.actor] = event.actor
             self._promised[event.number] = None
             word.ordered.update((who, goes or who) for who, goes in sent.items() if who)
+            word.went.update(word.ordered.items())
             found = FOUND.intersection((*event.times, event.state.value))
             self._seen[event.number] = Seen(found, _in_hand(event), now, now)
 
@@ -444,10 +454,21 @@ class EventLedger:
         for finding in new.found - (old.found if old else frozenset()):
             if not self._is_found(event, finding, now):
                 yield "S6", f"event {event.number} is {finding}, and nobody there has said so"
+        if last > -math.inf:
+            yield from self._of_arrivals(event, old)
         for steps in (STEPS, ACT_STEPS):
             times = [time for time in map(event.times.get, steps) if time is not None]
             if times != sorted(times):
                 yield "S7", f"times of event {event.number} are out of order"
+
+    def _of_arrivals(self, event: Event, old: Seen | None) -> Iterator[Broken]:
+        """Yield a device that is noted as arrived, and has not been near the event."""
+        reached = self._word(event.number).reached
+        for step, who in ("arrived", event.responder), ("act_arrived", event.actor):
+            if who is None or event.times.get(step) == (old.times.get(step) if old else None):
+                continue
+            if who not in reached and not self._is_near(who, event):
+                yield "S7", f"event {event.number}: {self._name(who)} has arrived, and is not there"
 
     def _of_debt(self, event: Event, debt: Debt, now: float) -> Iterator[Broken]:
         """Yield somebody who has not set out, or does not move, and still has the order."""
@@ -474,6 +495,9 @@ class EventLedger:
         waits = now if taken or word.busy or confirmed else old.waits
         since = old.since if hands == old.hands and not word.sent_again else now
         debt = self._debt(event, hands, old.debt, now)
+        goes = hands[-1] if hands else None
+        if goes is not None and goes not in word.reached and self._is_near(goes, event):
+            word.reached.add(goes)
         word.busy = word.sent_again = word.freed = False
         return Seen(
             found, hands, since, waits, times=dict(event.times), debt=debt, is_over=not event.open

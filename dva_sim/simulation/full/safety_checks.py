@@ -73,8 +73,9 @@ CHECKED: Final = {
     "waits, or is in one pair of hands, beyond its limit; who takes one up sets out and moves in "
     "time; nothing is found but by who was sent; "
     f"slack: {PENDING_SLACK:g} s, and how far one sees an event",
-    "S7": "the times of every event are in order, and those at which they were noted; "
-    f"slack: {STEP_SLACK:g} s",
+    "S7": "the times of every event are in order, and those at which they were noted; nobody is "
+    f"noted as arrived who has not been there; slack: {STEP_SLACK:g} s, and how far one sees an "
+    "event",
 }
 """Checks of each rule, made at every message and twice a second."""
 CHECKED_IN_SHORT: Final = (

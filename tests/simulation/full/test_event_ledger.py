@@ -10,7 +10,7 @@ from dva_sim.simulation.full.observations import Page
 from dva_sim.simulation.full.stage import DVA
 
 OPERATOR, ROBOT, OTHER = "02:00:00:03:00:01", "02:00:00:01:00:01", "02:00:00:01:00:02"
-PLACE = m.Position(38.66, -9.2)
+PLACE, AFAR = m.Position(38.66, -9.2), m.Position(38.6603, -9.2)
 RULES = Rules(order_limit=90.0, depart_within=30.0, still_within=45.0)
 
 
@@ -18,7 +18,8 @@ class Hearer:
     """A ledger that hears of one event, and of what is said about it."""
 
     def __init__(self):
-        self.ledger = EventLedger(RULES, DVA, lambda _: PLACE, 5.0, str)
+        self.places = {}
+        self.ledger = EventLedger(RULES, DVA, lambda who: self.places.get(who, PLACE), 5.0, str)
         self.table, self._number = EventTable(), 0
         self.event = self.table.add("fire", PLACE, 0.5, 0.0)
 
@@ -94,3 +95,29 @@ def test_an_order_that_still_waits_for_its_device_was_not_accepted(is_sent, brea
     if is_sent:
         heard.orders(10.0)
     assert any("set out" in line for line in heard.broken(45.0)) is breaks
+
+
+def confirms(heard: Hearer, now: float, arrives: bool) -> list[str]:
+    """The first robot is there, a second has been ordered, and the operator speaks of the first."""
+    heard.places[OTHER] = AFAR
+    assert heard.broken(1.0) == []
+    heard.orders(1.0)
+    assert heard.broken(now - 1.0) == []
+    heard.orders(now - 1.0, OTHER)
+    report = m.EventReport(heard.event.number, "fire", PLACE, 0.5, 1.0, "confirmed")
+    heard.says(now, report)
+    if arrives:
+        heard.event.times |= {"departed": now, "arrived": now}
+    heard.table.move(heard.event, State.CONFIRMED, now)
+    return heard.broken(now + 2.0)
+
+
+@pytest.mark.invariant("S6")
+def test_a_finding_may_be_of_an_earlier_order_with_another_robot():
+    assert confirms(Hearer(), 10.0, arrives=False) == []
+
+
+@pytest.mark.invariant("S7")
+def test_nobody_is_booked_as_arrived_who_has_not_been_there():
+    (line,) = confirms(Hearer(), 10.0, arrives=True)
+    assert line == f"event 1: {OTHER} has arrived, and is not there"
