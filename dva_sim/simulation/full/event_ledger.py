@@ -465,7 +465,8 @@ class EventLedger:
         """Yield a device that is noted as arrived, and has not been near the event."""
         reached = self._word(event.number).reached
         for step, who in ("arrived", event.responder), ("act_arrived", event.actor):
-            if who is None or event.times.get(step) == (old.times.get(step) if old else None):
+            when = event.times.get(step)
+            if who is None or when is None or (old is not None and when == old.times.get(step)):
                 continue
             if who not in reached and not self._is_near(who, event):
                 yield "S7", f"event {event.number}: {self._name(who)} has arrived, and is not there"

@@ -121,3 +121,16 @@ def test_a_finding_may_be_of_an_earlier_order_with_another_robot():
 def test_nobody_is_booked_as_arrived_who_has_not_been_there():
     (line,) = confirms(Hearer(), 10.0, arrives=True)
     assert line == f"event 1: {OTHER} has arrived, and is not there"
+
+
+@pytest.mark.invariant("S7")
+def test_an_arrival_that_is_forgotten_when_another_is_sent_is_none_of_the_other():
+    heard = Hearer()
+    heard.places[OTHER] = AFAR
+    assert heard.broken(1.0) == []
+    heard.orders(1.0)
+    heard.event.times |= {"departed": 2.0, "arrived": 2.0}
+    assert heard.broken(2.0) == []
+    heard.orders(3.0, OTHER)
+    del heard.event.times["departed"], heard.event.times["arrived"]
+    assert heard.broken(4.0) == []
