@@ -19,6 +19,7 @@ from dva_sim.experiments.execution.dry_run import DryRun, contradictions_in, dry
 from dva_sim.experiments.execution.runner import RunRequest
 from dva_sim.experiments.execution.scheduling import Simulate, run_job
 from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.study.answerable import why_unanswered
 from dva_sim.experiments.study.factor_levels import cells_of_repeats, runs_of, size
 from dva_sim.experiments.study.file_kinds import open_study
 from dva_sim.experiments.study.plan import StudyPlan
@@ -139,7 +140,7 @@ def _checked(study: Study) -> StudyPlan:
         say("Checking every configuration before the first run ...")
         with _shown("checking", count, "configurations") as show:
             plan = rehearse_all(study, show)
-    warn([*study.lost, *contradictions_in(plan.cells)])
+    warn([*study.lost, *why_unanswered(study), *contradictions_in(plan.cells)])
     return plan
 
 

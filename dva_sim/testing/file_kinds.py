@@ -18,6 +18,7 @@ from dva_sim.agents.robot.profile import RobotProfile, read_robot
 from dva_sim.agents.tilt import PhoneProfile, try_phone
 from dva_sim.experiments.execution.dry_run import contradictions_in
 from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study.answerable import why_unanswered
 from dva_sim.experiments.study.file_kinds import EVIDENCE, FileKind
 from dva_sim.experiments.study.file_kinds import KINDS as KINDS_OF_RUNS
 from dva_sim.experiments.study.loading import load_study
@@ -77,9 +78,10 @@ def _mistakes(model: type[Config], document: Document) -> Iterator[ConfigError]:
 
 
 def doubts(kind: FileKind, document: Document) -> list[str]:
-    """List contradictory settings in a valid study or scenario."""
+    """List contradictory settings in a valid study or scenario, and why a study answers nothing."""
     if kind.model is Study:
-        return contradictions_in(cell_grid.cells(load_study(document.file)))
+        study = load_study(document.file)
+        return [*why_unanswered(study), *contradictions_in(cell_grid.cells(study))]
     if kind.model is RosMap:
         return [*doubts_of_map(document.file), *_without_a_place(document)]
     if kind.model is SiteFile:

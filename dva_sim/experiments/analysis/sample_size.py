@@ -184,48 +184,56 @@ def _families(
     return tests
 
 
-def _of_answer(view: StudyView | None, in_any_case: bool) -> list[_Test]:
-    """Return the test that would settle an open answer, at the level that needs most persons."""
+def _of_answer(view: StudyView | None, in_any_case: bool) -> Iterator[_Test]:
+    """Yield what settles an answer: the largest difference found, and the smallest that matters.
+
+    The smallest is asked where most persons are needed among the stops that are open.
+    """
     if view is None or view.contrast is None or view.line is None:
-        return []
-    differences = view.difference(view.panels[0], *view.contrast)
-    found = band(differences)
-    holds_zero = (found.low <= 0) & (found.high >= 0)
-    bounds = np.maximum(-found.low, found.high)
-    is_open = holds_zero & (bounds > (view.smallest_effect or 0.0)) & np.isfinite(found.critical)
-    if not is_open.any() and in_any_case:
-        is_open = np.isfinite(found.critical)
-    tests = [list(_to_settle(view, found, differences, int(i))) for i in np.flatnonzero(is_open)]
-    return max(filter(None, tests), key=lambda some: _plan(some[0]).counts[0].persons, default=[])
-
-
-def _to_settle(view: StudyView, found: Band, differences: Floats, stop: int) -> Iterator[_Test]:
-    """An effect that seems not to matter is to be shown small, any other not to be zero."""
-    mean, smallest = float(found.mean[stop]), view.smallest_effect
-    reach = mean - float(found.low[stop]), float(found.high[stop]) - mean
-    sides, unit = _sides_of(view, stop), unit_of(view.measure)
-    each = 1 - _ALPHA / int(np.isfinite(found.critical).sum())
-
-    def law(reach: float) -> IntervalLaw:
-        known = law_of(differences[:, stop], np.arange(len(differences)), reach, each)
-        assert known is not None  # there is a band
-        return known
-
-    if smallest is not None and abs(mean) < smallest:
-        assumed = f"{quantity(abs(mean), unit)}, as found"
-        what = f"{sides}: below {quantity(smallest, unit)}, the smallest that matters"
-        bounds = smallest - abs(mean), smallest + abs(mean)
-        yield _Test(ANSWER, what, assumed, law(max(reach)), *bounds)
         return
-    for effect, why in _assumed(abs(mean), smallest):
-        assumed = f"{quantity(effect, unit)}, {why}"
-        yield _Test(ANSWER, f"{sides}: not zero", assumed, law(reach[mean < 0]), effect)
+    differences = view.difference(view.panels[0], *view.contrast)
+    found, smallest = band(differences), view.smallest_effect
+    is_judged = np.isfinite(found.critical)
+    if not is_judged.any():
+        return
+    holds_zero, bounds = (found.low <= 0) & (found.high >= 0), np.maximum(-found.low, found.high)
+    is_open = is_judged & holds_zero & (bounds > (smallest or 0.0))
+    largest = int(np.where(is_judged, abs(found.mean), -1.0).argmax())
+    effect = abs(float(found.mean[largest]))
+    if (is_open[largest] or in_any_case) and effect > (smallest or 0.0):
+        yield _to_settle(view, found, differences, (largest, effect, "the largest found"))
+    if smallest is not None and (is_open.any() or in_any_case):
+        stops = np.flatnonzero(is_open) if is_open.any() else [largest]
+        wanted = [(int(stop), smallest, "the smallest that matters") for stop in stops]
+        tests = [_to_settle(view, found, differences, each) for each in wanted]
+        yield max(tests, key=lambda test: _plan(test).counts[0].persons)
+
+
+def _to_settle(
+    view: StudyView, found: Band, differences: Floats, asked: tuple[int, float, str]
+) -> _Test:
+    """Return the test that shows a difference at a stop not to be zero.
+
+    Args:
+        view: View of the study.
+        found: Its differences at all stops, with their band.
+        differences: Differences of persons `(persons, stops)`.
+        asked: The stop, the true difference that is assumed, and what that is in words.
+    """
+    stop, effect, why = asked
+    mean = float(found.mean[stop])
+    reach = float(found.high[stop]) - mean if mean < 0 else mean - float(found.low[stop])
+    each = 1 - _ALPHA / int(np.isfinite(found.critical).sum())
+    law = law_of(differences[:, stop], np.arange(len(differences)), reach, each)
+    assert law is not None  # there is a band
+    assumed = f"{quantity(effect, unit_of(view.measure))}, {why}"
+    return _Test(ANSWER, f"{_sides_of(view, stop)}: not zero", assumed, law, effect)
 
 
 def _assumed(found: float, smallest: float | None) -> Iterator[tuple[float, str]]:
     """True differences that one may count on: that found, if it matters, and the smallest."""
     if found > (smallest or 0.0):
-        yield found, "as found"
+        yield found, "the largest found"
     if smallest is not None:
         yield smallest, "the smallest that matters"
 
@@ -263,11 +271,16 @@ def _of_comparisons(
     study: Mapping[str, Any], runs: Table, named: Mapping[str, Contrast], family: Counter[str]
 ) -> Iterator[_Test]:
     for name, contrast in named.items():
-        at = places_of(study, contrast)[-1]
         alpha = _ALPHA / family[contrast.family]
-        if (pairs := pairs_of(study, runs, contrast, at)) is None:
+        places = [(at, pairs_of(study, runs, contrast, at)) for at in places_of(study, contrast)]
+        differences = [
+            (_interval(pairs, 1 - alpha), pairs, at) for at, pairs in places if pairs is not None
+        ]
+        known = [each for each in differences if math.isfinite(each[0].mean)]
+        if not known:
             continue
-        found, unit = _interval(pairs, 1 - alpha), unit_of(contrast.measure)
+        found, pairs, at = max(known, key=lambda each: abs(each[0].mean))
+        unit = unit_of(contrast.measure)
         reach = found.mean - found.low if found.mean > 0 else found.high - found.mean
         if (law := _law(pairs, reach, 1 - alpha)) is None:
             continue

@@ -23,6 +23,7 @@ from dva_sim.experiments.analysis.run_grid import (
     present,
 )
 from dva_sim.experiments.results.tables import DESIGN_COLUMNS
+from dva_sim.experiments.study.answerable import only_contrast
 from dva_sim.experiments.study.parts import POINT, TUNING, Level, multiplied
 from dva_sim.kernel.units import unit_of
 from dva_sim.simulation.labels import brief, measure_called
@@ -286,7 +287,7 @@ def keys_of(study: Mapping[str, Any]) -> list[Factor]:
 
 
 def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
-    """The view that the declared answer asks for, or a sensible one without it.
+    """The view that the declared answer asks for; without one, that of the only contrast possible.
 
     Returns None where there is no run to look at.
     """
@@ -297,6 +298,7 @@ def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
     part = RunGrid(table, name, factors) if name else None
     if part is None or not len(part):
         return None
+    declared = declared or _only_answer(part)
     known = {f.name: f for f in part.factors}
     over, line = known.get(declared.get("over", "")), known.get(declared.get("factor", ""))
     if over is None and not (line and "over" in declared):
@@ -312,10 +314,16 @@ def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
         contrast=_contrast(declared, line),
         within=within,
         averages_points=POINT in study.get("factors", {}),
-        covariates=tuple(covariates_of(study, part)[0]) if declared else (),
+        covariates=tuple(covariates_of(study, part)[0]) if study.get("answer") else (),
         smallest_effect=declared.get(f"smallest_effect_{measure.rpartition('_')[2]}")
         or declared.get("smallest_effect"),
     )
+
+
+def _only_answer(part: RunGrid) -> dict[str, Any]:
+    """Return the only contrast that a part without a declared one allows; empty if several do."""
+    found = only_contrast({factor.name: factor.levels for factor in part.factors})
+    return {} if found is None else {k: v for k, v in found._asdict().items() if v is not None}
 
 
 def finding_of(view: StudyView) -> Finding | None:

@@ -60,16 +60,16 @@ class ResultsReading:
         """Columns of a table; nothing where the study has no such table."""
         if name not in self._tables:
             table: Table = self.results.table(name) if self.results.has(name) else {}
-            if name == "runs" and self._is_of_events and self.results.has("events"):
+            if name == "runs" and self.results.has("events") and self._is_of_events(table):
                 table = with_endings(table, self.results.table("events"))
             names = {} if name in ("runs", REPEATS) else row_names(self.study, self.runs)
             self._tables[name] = with_rows(table, names) if table and names else table
         return self._tables[name]
 
-    @property
-    def _is_of_events(self) -> bool:
+    def _is_of_events(self, runs: Table) -> bool:
         """True if the answer is about events rather than drives."""
-        measure = (self.study.get("answer") or {}).get("measure")
+        view = view_of(self.study, runs) if runs else None
+        measure = None if view is None or view.contrast is None else view.measure
         ends_by_event = page_of(self.scenarios.values()).ends_by_event
         return measure in ("confirmation_mean_s", "response_mean_s") and ends_by_event
 

@@ -56,8 +56,14 @@ class Reading(ResultsReading):
         if self.map is not None:
             found = replace(found, lead=lead_of(self.map), notes=[found.lead, *found.notes])
         weighed = [few_that_weigh(self.finding, self.view)] if self.finding is not None else []
-        notes = [*found.notes, *filter(None, weighed)]
+        notes = [*found.notes, *self._undeclared, *filter(None, weighed)]
         return replace(found, depends=found.depends | depends(self), notes=notes)
+
+    @property
+    def _undeclared(self) -> Sequence[str]:
+        """A note on a contrast that was taken because no other is possible."""
+        is_taken = self.finding is not None and not self.study.get("answer")
+        return ["No answer was declared for these levels: this is their only contrast."] * is_taken
 
     def _verdicts(self, tested: Sequence[Tested]) -> str:
         """The registered hypotheses in at most two sentences, and what they depend on."""

@@ -202,24 +202,54 @@ def of_claims(study: Study) -> Iterator[Problem]:
 def kept_claims(study: Study) -> Study:
     """The study without what was declared about parts, factors or levels that are gone.
 
-    Predictions stay; each is reported as not run.
+    An answer without its levels takes the two that its factor has left, if it has two. Predictions
+    stay; each is reported as not run.
     """
     lost: dict[str, object] = {}
     lost["map"] = _kept_map(study)
-    if any(of_answer(study)):
-        lost["answer"] = None
-    if "answer" in lost or any(of_robustness(study)):
+    lost["answer"] = answer = _kept_answer(study)
+    if answer is None or any(of_robustness(study.model_copy(update={"answer": answer}))):
         lost["robustness"] = None
-    if "answer" in lost:
+    if answer is None:
         lost["covariates"] = ()
+    if answer != study.answer:
+        lost["predictions"] = tuple(_of_answer_as_declared(study))
     lost["comparisons"] = {
         name: comparison
         for name, comparison in study.comparisons.items()
         if not any(_faults_of_contrast(study, comparison, ()))
     }
     rest = study.model_copy(update=lost)
-    kept = {n: h for n, h in rest.hypotheses.items() if not any(_faults_of_hypothesis(rest, n))}
+    kept = {
+        name: claim
+        for name, claim in rest.hypotheses.items()
+        if not any(_faults_of_hypothesis(rest, name))
+        and (answer == study.answer or claim.comparison != ANSWER)
+    }
     return rest.model_copy(update={"hypotheses": kept})
+
+
+def _kept_answer(study: Study) -> Contrast | None:
+    """Return the answer; without its levels, that of the two levels that its factor still has."""
+    answer = study.answer
+    if answer is None or not any(of_answer(study)):
+        return answer
+    left = study.factors.get(answer.factor, ())
+    if len(left) != len(answer.contrast):
+        return None
+    changed = answer.model_copy(update={"contrast": left})
+    return None if any(of_answer(study.model_copy(update={"answer": changed}))) else changed
+
+
+def _of_answer_as_declared(study: Study) -> Iterator[Prediction]:
+    """Yield the predictions with the answer's declared contrast named in each that relies on it."""
+    for prediction in study.predictions:
+        relies = prediction.direction is not None and prediction.contrast is None
+        if study.answer is None or not relies:
+            yield prediction
+        else:
+            named = {"factor": study.answer.factor, "contrast": study.answer.contrast}
+            yield prediction.model_copy(update=named)
 
 
 def _kept_map(study: Study) -> MapRule | None:
@@ -235,7 +265,7 @@ def _kept_map(study: Study) -> MapRule | None:
 def lost_claims(study: Study) -> list[str]:
     """Claims that the changed factors or levels no longer allow, one sentence each."""
     kept = kept_claims(study)
-    lost = [f"the answer will not be computed: {problem}" for problem, _ in of_answer(study)][:1]
+    lost = [f"{_fate_of_answer(kept)}: {problem}" for problem, _ in of_answer(study)][:1]
     for what, declared, left in (
         ("comparison", study.comparisons, kept.comparisons),
         ("hypothesis", study.hypotheses, kept.hypotheses),
@@ -244,6 +274,13 @@ def lost_claims(study: Study) -> list[str]:
     if study.map is not None and kept.map is None:
         lost.append("the map will not be drawn")
     return lost
+
+
+def _fate_of_answer(kept: Study) -> str:
+    if kept.answer is None:
+        return "the answer will not be computed"
+    first, second = kept.answer.contrast
+    return f"the answer compares {kept.answer.factor} {first} with {second}, the only two left"
 
 
 def of_answer(study: Study) -> Iterator[Problem]:

@@ -235,14 +235,15 @@ def test_a_study_of_other_factors_and_without_an_answer_is_shown_all_the_same(tm
         | {"guard.count": guards, "dispatch.policy": policy, "response_s": 60 / guards + person}
         for person in range(3)
         for guards in (1, 2, 4)
-        for policy in ("nearest", "min_eta")
+        for policy in ("nearest", "min_eta", "random")
     ]
+    policies = ["nearest", "min_eta", "random"]
     facts = {
         "study": {
             "question": "How many guards?",
             "persons": 3,
             "replications": 1,
-            "factors": {"dispatch.policy": ["nearest", "min_eta"], "guard.count": [1, 2, 4]},
+            "factors": {"dispatch.policy": policies, "guard.count": [1, 2, 4]},
         }
     }
     text = words_of(synthetic_results.write(tmp_path / "r", {"runs": runs}, facts))
