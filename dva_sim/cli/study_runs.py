@@ -19,6 +19,7 @@ from dva_sim.experiments.execution.dry_run import DryRun, contradictions_in, dry
 from dva_sim.experiments.execution.runner import RunRequest
 from dva_sim.experiments.execution.scheduling import Simulate, run_job
 from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.study import coverage
 from dva_sim.experiments.study.answerable import why_unanswered
 from dva_sim.experiments.study.factor_levels import cells_of_repeats, runs_of, size
 from dva_sim.experiments.study.file_kinds import open_study
@@ -28,6 +29,7 @@ from dva_sim.experiments.study.screening import folder_of_screening, screened, s
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned, tuning_study
 from dva_sim.kernel.errors import ExitCode, error_line
+from dva_sim.kernel.wording import capital
 
 _FEW = 5  # failures that are told one by one
 _MANY = 500  # configurations, which take some seconds to check
@@ -152,6 +154,8 @@ def _planned(request: RunRequest, plan: StudyPlan, probe: Simulate | None = None
     if found.remark:
         say(f"[yellow]{escape(found.remark)}[/yellow]")
     say(escape(_plan(found, request.folder)))
+    for remark in coverage.remarks(plan.study):
+        say(escape(capital(remark)))
     return found
 
 

@@ -69,6 +69,7 @@ from dva_sim.statistics.incidence import CUT, Incidence, cumulative_incidence, f
 from dva_sim.statistics.paired_differences import (
     equivalence,
     holm,
+    holm_levels,
     mean_interval,
     one_sided_test,
     paired_difference,
@@ -100,6 +101,7 @@ __all__ = [
     "factorial_effects",
     "first_of",
     "holm",
+    "holm_levels",
     "incidence",
     "mean_interval",
     "off_zero",

@@ -166,3 +166,32 @@ def holm(p_values: ArrayLike, family: ArrayLike | None = None) -> Floats:
         stepped = np.arange(len(ours), 0, -1) * values[ours]
         adjusted[ours] = np.minimum(1.0, np.maximum.accumulate(stepped))
     return adjusted
+
+
+def holm_levels(
+    p_values: ArrayLike, family: ArrayLike | None = None, alpha: float = 1 - LEVEL
+) -> Floats:
+    """Level at which Holm's procedure decides on each test: a fraction of `alpha`.
+
+    A test is significant where its own p-value is not above this level, which is when its value
+    by `holm` is not above `alpha`. So an interval of this level agrees with the verdict.
+
+    Args:
+        p_values: See `holm` `(m,)`.
+        family: See `holm` `(m,)`.
+        alpha: Chance of any false alarm in a family.
+
+    Returns:
+        Levels `(m,)`; nan for tests that could not be made.
+    """
+    values = np.asarray(p_values, dtype=float)
+    families = np.zeros(len(values)) if family is None else np.asarray(family)
+    levels = np.full(len(values), np.nan)
+    for name in np.unique(families):
+        ours = np.flatnonzero((families == name) & ~np.isnan(values))
+        ours = ours[np.argsort(values[ours], kind="stable")]
+        left = np.arange(len(ours), 0, -1)
+        fails = np.flatnonzero(left * values[ours] > alpha)
+        left[fails[0] if len(fails) else len(left) :] = left[fails[0]] if len(fails) else 1
+        levels[ours] = alpha / left
+    return levels

@@ -17,7 +17,7 @@ from dva_sim.agents.operator.published import SplitFile, load_split
 from dva_sim.agents.robot.profile import RobotProfile, read_robot
 from dva_sim.agents.tilt import PhoneProfile, try_phone
 from dva_sim.experiments.execution.dry_run import contradictions_in
-from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study import cell_grid, coverage
 from dva_sim.experiments.study.answerable import why_unanswered
 from dva_sim.experiments.study.file_kinds import EVIDENCE, FileKind
 from dva_sim.experiments.study.file_kinds import KINDS as KINDS_OF_RUNS
@@ -90,6 +90,11 @@ def doubts(kind: FileKind, document: Document) -> list[str]:
         return []
     model = model_of(document)
     return model.contradictions(model.build(document, {}))
+
+
+def notes(kind: FileKind, document: Document) -> str:
+    """Describe what a valid study promises less of than it prints, in a line."""
+    return "; ".join(coverage.remarks(load_study(document.file))) if kind.model is Study else ""
 
 
 def _without_a_place(document: Document) -> Iterator[str]:

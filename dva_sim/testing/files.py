@@ -176,7 +176,7 @@ def _check_yaml(path: Path) -> FileVerdict:
     """A message needs none of what reads configurations: it is imported here."""
     from dva_sim.experiments.study.file_kinds import recognise  # late: start-up
     from dva_sim.testing.file_kinds import KINDS as FILES  # late: start-up
-    from dva_sim.testing.file_kinds import check_config, doubts  # late: start-up
+    from dva_sim.testing.file_kinds import check_config, doubts, notes  # late: start-up
 
     problems = _flawed(path, YAML_BYTES)
     document, problem = (None, problems[0]) if problems else _parse(path)
@@ -186,7 +186,9 @@ def _check_yaml(path: Path) -> FileVerdict:
     if kind is None:
         return FileVerdict("unknown", [Problem(1, 1, _UNKNOWN)])
     problems = check_config(kind, document)
-    return FileVerdict(kind.name, problems, () if problems else doubts(kind, document))
+    if problems:
+        return FileVerdict(kind.name, problems)
+    return FileVerdict(kind.name, [], doubts(kind, document), notes(kind, document))
 
 
 def _parse(path: Path) -> tuple[Document | None, Problem | None]:

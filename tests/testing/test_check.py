@@ -87,7 +87,10 @@ def test_the_kind_is_told_by_the_keys_wherever_the_file_lies(check):
         a__yaml=(ROOT / "agents/people/operators.yaml").read_text(),
         b__yaml=(ROOT / "agents/robots/servrobot.yaml").read_text(),
         c__yaml="horizon_s: 5\n",
-        d__yaml="question: what?\nparts: {drive: {scenario: c.yaml}}\n",
+        d__yaml=(
+            "question: what?\nparts: {drive: {scenario: c.yaml}}\n"
+            "factors: {pattern: [req-rep, pub-sub]}\n"
+        ),
         e__txt=GOOD.read_text(),
     )
     assert code == 0, [line for line in lines if not line.endswith(": valid")]

@@ -93,6 +93,7 @@ def test_what_a_study_may_say_follows_the_schema_and_is_taken_by_the_program(tmp
         ("scale: log", "scale: square"),
         ("direction: above", "direction: up"),
         ("batch_persons: 2", "batch: 2"),
+        ("batch_persons: 2", "batch_persons: double"),
         ("record: worst", "record: best"),
         ("budget_s: 60", "budget_s: 0"),
         ("measure: contacts, ", ""),

@@ -24,6 +24,7 @@ from dva_sim.statistics import (
     effect_size,
     equivalence,
     holm,
+    holm_levels,
     one_sided_test,
     pair_correlation,
     paired_difference,
@@ -75,7 +76,9 @@ class Tested:
         name: Name of the hypothesis.
         contrast: Contrast that the hypothesis is about.
         at: Place of the contrast.
-        difference: Measured difference with its 95 % interval; None if not run.
+        difference: Measured difference with the interval that decides; None if not run.
+        level: Level of that interval: it lies where the hypothesis, or its opposite, claims if and
+            only if the verdict is that this holds.
         p: p-value of the hypothesis: one-sided, or of equivalence within the margin.
         adjusted: `p` after Holm's correction within the family.
         p_against: p-value of the opposite: the other direction, or beyond the margin.
@@ -87,6 +90,7 @@ class Tested:
     contrast: Contrast
     at: Setting
     difference: Interval | None = None
+    level: float = LEVEL
     p: float = math.nan
     adjusted: float = math.nan
     p_against: float = math.nan
@@ -110,14 +114,41 @@ def judged(study: Mapping[str, Any], runs: Table) -> Judgement:
     compared, tested = _compare_all(study, runs), _test_all(study, runs)
     claimed = [t.contrast.family for t in tested]
     families = [*(c.contrast.family for c in compared), *claimed]
-    adjusted = holm([*(c.p for c in compared), *(t.p for t in tested)], families)
-    against = holm([t.p_against for t in tested], claimed)
+    values = [*(c.p for c in compared), *(t.p for t in tested)]
+    opposite = [t.p_against for t in tested]
+    adjusted, against = holm(values, families), holm(opposite, claimed)
+    alphas = holm_levels(values, families)[len(compared) :], holm_levels(opposite, claimed)
     of_claims = zip(tested, adjusted[len(compared) :], against, strict=True)
     verdicts = [replace(t, adjusted=float(p), against=float(q)) for t, p, q in of_claims]
     return Judgement(
         [replace(c, adjusted=float(p)) for c, p in zip(compared, adjusted, strict=False)],
-        [replace(t, verdict=verdict_of(t)) for t in verdicts],
+        [
+            _with_interval(study, runs, replace(t, verdict=verdict_of(t)), alpha)
+            for t, *alpha in zip(verdicts, *alphas, strict=True)
+        ],
     )
+
+
+def _with_interval(
+    study: Mapping[str, Any], runs: Table, tested: Tested, alphas: Sequence[float]
+) -> Tested:
+    """Give a verdict the interval that decides it.
+
+    Args:
+        study: Study as the manifest has it.
+        runs: The table of runs.
+        tested: The verdict.
+        alphas: Levels of the one-sided tests of the hypothesis and of its opposite.
+    """
+    pairs = pairs_of(study, runs, tested.contrast, tested.at)
+    if tested.difference is None or pairs is None or not np.isfinite(alphas).all():
+        return tested
+    own, opposite = alphas
+    if tested.hypothesis.direction == "same":
+        opposite = opposite / 2  # the opposite lies beyond either end of the margin
+    by_verdict = {"held": own, "did not hold": opposite}
+    level = 1 - 2 * by_verdict.get(tested.verdict, min(own, opposite))
+    return replace(tested, difference=paired_difference(*pairs, level), level=level)
 
 
 def _compare_all(study: Mapping[str, Any], runs: Table) -> list[Compared]:

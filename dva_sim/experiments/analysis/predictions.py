@@ -150,5 +150,5 @@ def _measured(
 ) -> Interval | None:
     """The paired difference at one place."""
     first, second = (view.part.where(view.values, where | {factor: level}) for level in contrast)
-    found = interval_of(first - second)
+    found = interval_of(first - second, view.level)
     return found if found is not None and found.n_persons > 1 else None

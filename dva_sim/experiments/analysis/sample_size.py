@@ -192,7 +192,7 @@ def _of_answer(view: StudyView | None, in_any_case: bool) -> Iterator[_Test]:
     if view is None or view.contrast is None or view.line is None:
         return
     differences = view.difference(view.panels[0], *view.contrast)
-    found, smallest = band(differences), view.smallest_effect
+    found, smallest = band(differences, view.level), view.smallest_effect
     is_judged = np.isfinite(found.critical)
     if not is_judged.any():
         return
@@ -223,7 +223,7 @@ def _to_settle(
     stop, effect, why = asked
     mean = float(found.mean[stop])
     reach = float(found.high[stop]) - mean if mean < 0 else mean - float(found.low[stop])
-    each = 1 - _ALPHA / int(np.isfinite(found.critical).sum())
+    each = 1 - (1 - view.level) / int(np.isfinite(found.critical).sum())
     law = law_of(differences[:, stop], np.arange(len(differences)), reach, each)
     assert law is not None  # there is a band
     assumed = f"{quantity(effect, unit_of(view.measure))}, {why}"

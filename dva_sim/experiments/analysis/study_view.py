@@ -24,10 +24,10 @@ from dva_sim.experiments.analysis.run_grid import (
 )
 from dva_sim.experiments.results.tables import DESIGN_COLUMNS
 from dva_sim.experiments.study.answerable import only_contrast
-from dva_sim.experiments.study.parts import POINT, TUNING, Level, multiplied
+from dva_sim.experiments.study.parts import ANSWER, POINT, TUNING, Level, StopRule, multiplied
 from dva_sim.kernel.units import unit_of
 from dva_sim.simulation.labels import brief, measure_called
-from dva_sim.statistics import Interval, adjusted, band, off_zero
+from dva_sim.statistics import LEVEL, Band, Interval, adjusted, band, off_zero
 
 MOST_PANELS = 4
 _MOST_OFF = 5.0  # standard errors between the mean of a covariate and zero
@@ -51,6 +51,7 @@ class StudyView:
         possible: The least and the greatest value that the measure can take at all.
         averages_points: True if the trials are points in ranges, over which means are taken.
         covariates: Covariates that differences are adjusted for, each a product of columns.
+        level: Level of intervals of the contrast: 95 %, or more where looks share the 5 %.
     """
 
     part: RunGrid
@@ -64,6 +65,7 @@ class StudyView:
     possible: tuple[float, float] = (-math.inf, math.inf)
     averages_points: bool = False
     covariates: tuple[str, ...] = ()
+    level: float = LEVEL
 
     @property
     def lines(self) -> tuple[Level, ...]:
@@ -150,6 +152,10 @@ class StudyView:
             sides = [self.curve(product, panel, line) for line in (first, second)]
             beside.append(person_means(np.where(np.isfinite(found), sum(sides) / 2, np.nan)))
         return adjusted(person_means(found), beside)
+
+    def band_of(self, panel: Setting, first: Level, second: Level) -> Band:
+        """Differences at all stops with their band; see `difference`."""
+        return band(self.difference(panel, first, second), self.level)
 
 
 def product_of(part: RunGrid, covariate: str) -> Floats:
@@ -315,9 +321,18 @@ def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
         within=within,
         averages_points=POINT in study.get("factors", {}),
         covariates=tuple(covariates_of(study, part)[0]) if study.get("answer") else (),
+        level=_level_of(study),
         smallest_effect=declared.get(f"smallest_effect_{measure.rpartition('_')[2]}")
         or declared.get("smallest_effect"),
     )
+
+
+def _level_of(study: Mapping[str, Any]) -> float:
+    """Return the level of the answer's intervals, by the study's stopping rule."""
+    stop = study.get("stop") or {}
+    if stop.get("comparison") != ANSWER:
+        return LEVEL
+    return StopRule.model_validate(stop).level(int(study["persons"]))
 
 
 def _only_answer(part: RunGrid) -> dict[str, Any]:
@@ -331,7 +346,7 @@ def finding_of(view: StudyView) -> Finding | None:
     if view.contrast is None or view.line is None:
         return None
     panel = view.panels[0]
-    found = band(view.difference(panel, *view.contrast))
+    found = view.band_of(panel, *view.contrast)
     return Finding(
         measure=view.measure,
         in_excess=view.part.has_reference(view.measure),
@@ -371,12 +386,12 @@ def possible_values(measure: str, scenario: Mapping[str, Any]) -> tuple[float, f
     return low, min(high, float(scenario.get("horizon_s", math.inf))) if column.awaits else high
 
 
-def interval_of(values: Floats) -> Interval | None:
-    """Mean of `(persons, trials)` over persons, with a 95 % bootstrap interval over persons.
+def interval_of(values: Floats, level: float = LEVEL) -> Interval | None:
+    """Mean of `(persons, trials)` over persons, with its bootstrap interval over persons.
 
     The interval of persons who are all alike is that one value. None where nobody has a value.
     """
-    found = band(person_means(values[np.newaxis]))
+    found = band(person_means(values[np.newaxis]), level)
     mean, low, high = (float(x[0]) for x in (found.mean, found.low, found.high))
     if not np.isfinite(mean):
         return None

@@ -32,7 +32,6 @@ from dva_sim.experiments.study.screening import MAIN, kept_effects
 from dva_sim.kernel.wording import capital, listing, number, percent, quantity
 from dva_sim.simulation.labels import brief, level_name, setting
 from dva_sim.simulation.scenario.assumptions import all_assumptions
-from dva_sim.statistics import band
 
 _WAITING = "move_and_wait_share"
 
@@ -164,7 +163,7 @@ def _difference(
     view: StudyView, finding: Finding, panel: Setting, stop: int
 ) -> tuple[float, float, float]:
     """Mean and band under other settings, within what is possible."""
-    found = band(view.difference(panel, finding.first, finding.second))
+    found = view.band_of(panel, finding.first, finding.second)
     low, high = (
         float(np.clip(x[stop], -view.widest, view.widest)) for x in (found.low, found.high)
     )

@@ -14,7 +14,6 @@ from dva_sim.experiments.analysis.study_view import StudyView, keys_of
 from dva_sim.experiments.report.results_reading import ResultsReading
 from dva_sim.experiments.study.parts import STRATEGY
 from dva_sim.simulation.labels import level_name
-from dva_sim.statistics import band
 
 
 def in_context(reading: ResultsReading) -> Finding | None:
@@ -49,7 +48,7 @@ def _models(found: RepeatedAnswer | None, finding: Finding, at: int) -> OtherRun
 
 def _elsewhere(view: StudyView, finding: Finding, at: int) -> OtherRuns | None:
     """The difference in the other settings that were run."""
-    bands = [band(view.difference(p, finding.first, finding.second)) for p in view.panels[1:]]
+    bands = [view.band_of(p, finding.first, finding.second) for p in view.panels[1:]]
     found = [(float(b.mean[at]), float(b.low[at]), float(b.high[at])) for b in bands]
     return _together(finding.mean[at], [each for each in found if np.isfinite(each[0])])
 

@@ -28,13 +28,13 @@ _LEAST_P = 0.001
 
 def hypothesis_table(tested: Sequence[Tested], cluster: str = "person") -> CellTable:
     """Each hypothesis: the claim, what was found, the adjusted test, the verdict."""
-    heads = ["hypothesis", "claim", "found (95 % interval)"]
+    heads = ["hypothesis", "claim", "found (interval at the level of the verdict)"]
     heads += ["p by Holm", "p of the opposite", "verdict"]
     rows = [
         [
             ": ".join(filter(None, (t.name, t.hypothesis.text))),
             _claim(t),
-            _interval(t.difference, t.contrast.measure),
+            _found(t),
             _p(t.adjusted),
             _p(t.against),
             ": ".join(filter(None, (_VERDICTS[t.verdict], _few(t, cluster)))),
@@ -123,14 +123,14 @@ def _inside(text: str) -> str:
 
 
 def _with_facts(tested: Tested, cluster: str) -> str:
-    """`Waiting costs (4.0 s, 95 % interval 3.0 to 5.0 s, claimed above 2.0 s)`."""
+    """`Waiting costs (4.0 s, 90 % interval 3.0 to 5.0 s, claimed above 2.0 s)`."""
     text = _OPENINGS[tested.verdict] + _inside(tested.hypothesis.text or _claim(tested))
     if tested.difference is None:
         return text
     found, unit = tested.difference, unit_of(tested.contrast.measure)
     facts = [
         f"{signed(found.mean, unit)}",
-        f"95 % interval {number(found.low)} to {quantity(found.high, unit)}",
+        f"{_level(tested)} interval {number(found.low)} to {quantity(found.high, unit)}",
         f"claimed {bound_of(tested)}",
         _few(tested, cluster),
     ]
@@ -198,10 +198,21 @@ def verdict_of_name(tested: Tested) -> str:
 
 
 def verdict_with_interval(tested: Tested) -> str:
-    """`✓ held: 4.0 s (3.0 to 5.0 s)`."""
+    """`✓ held: 4.0 s (3.0 to 5.0 s, 90 %)`."""
     if tested.difference is None:
         return _VERDICTS[tested.verdict]
-    return f"{_VERDICTS[tested.verdict]}: {_interval(tested.difference, tested.contrast.measure)}"
+    return f"{_VERDICTS[tested.verdict]}: {_found(tested)}"
+
+
+def _found(tested: Tested) -> str:
+    """`4.0 s (3.0 to 5.0 s, 90 %)`: the difference with the interval that decides."""
+    text = _interval(tested.difference, tested.contrast.measure)
+    return text if tested.difference is None else f"{text[:-1]}, {_level(tested)})"
+
+
+def _level(tested: Tested) -> str:
+    """`90 %`, `99.4 %`: level of the interval that decides."""
+    return f"{100 * tested.level:.3g} %"
 
 
 def _interval(found: Interval | None, measure: str) -> str:

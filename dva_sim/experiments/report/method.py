@@ -9,8 +9,9 @@ import numpy as np
 
 from dva_sim.experiments.report.prose import paragraphs
 from dva_sim.experiments.report.summary import Reading
+from dva_sim.experiments.study import coverage
 from dva_sim.experiments.study.parts import POINT, multiplied
-from dva_sim.kernel.wording import listing, number
+from dva_sim.kernel.wording import capital, listing, number
 from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT
 from dva_sim.simulation.labels import measure_called, measure_name
 from dva_sim.statistics import VarianceReduction, band, variance_reduction
@@ -37,7 +38,9 @@ def _size(reading: Reading) -> str:
     trials = "blocks of trials" if _is_task(reading) else "trials"
     name = _SAMPLES.get(cluster, "Simulated persons")
     each = "" if cluster in _SAMPLES else f"; {trials} of each: {_trials(reading)}"
-    return f"{name}: {reading.persons}{_why_so_many(reading)}{each}."
+    few = coverage.of_few_persons(reading.persons)
+    told = f" {capital(few)}." if few else ""
+    return f"{name}: {reading.persons}{_why_so_many(reading)}{each}.{told}"
 
 
 def _trials(reading: Reading) -> str:
@@ -56,11 +59,17 @@ def _why_so_many(reading: Reading) -> str:
     if reading.study.get("stop") is None and reading.study.get("budget_s") is None:
         return ""
     batches = f"after {stopped.get('rounds')} of {stopped.get('of')} batches"
-    why = stopped.get("why")
+    why, stop = stopped.get("why"), reading.study.get("stop") or {}
+    if why == "enough" and stop.get("batch_persons") == "double":
+        level = "" if reading.view is None else f" at {100 * reading.view.level:.3g} %"
+        return (
+            f" (stopped {batches}: every interval asked for was narrow enough; each look has "
+            f"intervals{level}, so that 95 % hold whichever look ends the study)"
+        )
     if why == "enough":
         return (
-            f" (stopped {batches}: every interval asked for was narrow enough; intervals at which "
-            "one stops hold their 95 % in the long run, and a little less with few persons)"
+            f" (stopped {batches}: every interval asked for was narrow enough; a 95 % interval "
+            f"that ends a study by its width holds {coverage.in_words(coverage.OF_STOPPING)})"
         )
     if why == "budget":
         return f" (stopped {batches}: the time limit was reached, so it cannot be reproduced)"

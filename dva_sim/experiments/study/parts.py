@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from dva_sim.kernel.config import Config, Scalar
+from dva_sim.statistics import LEVEL
 
 SET_BY_DESIGN = {"operator.person": "persons", "operator.population_seed": "seed"}
 
@@ -173,23 +175,30 @@ class StopRule(Config):
         measure: Column of the table `runs`, in excess of the reference run where there is one.
         part: Part it is measured in.
         comparison: Comparison in place of a measure: `answer`, or the name of a comparison.
-        batch_persons: Number of persons in each further batch.
+        batch_persons: Number of persons in each further batch. `double`, for `answer` only: each
+            batch doubles the persons so far, and the looks share the 5 % by which intervals may
+            err. Otherwise an interval that ends a study by its width covers less than 95 %.
         most_persons: After so many it ends in any case.
 
     References:
         Chow & Robbins, Annals of Mathematical Statistics 36 (1965), 457-462: why a fixed width
-        can be waited for, and that the interval holds in the limit only.
+        can be waited for, and that the interval holds in the limit only. Jennison & Turnbull,
+        Group Sequential Methods (2000), chapter 9 (repeated confidence intervals).
     """
 
     model_config = ConfigDict(
-        json_schema_extra={"oneOf": [says("comparison"), says("measure", "part")]}
+        json_schema_extra={
+            "oneOf": [says("comparison"), says("measure", "part")],
+            "if": {"properties": {"batch_persons": {"const": "double"}}},
+            "then": {"properties": {"comparison": {"const": ANSWER}}},
+        }
     )
 
     half_width: Annotated[float, Field(gt=0)]
     measure: str | None = None
     part: str | None = None
     comparison: str | None = None
-    batch_persons: Count
+    batch_persons: Count | Literal["double"]
     most_persons: Count
 
     @model_validator(mode="after")
@@ -197,7 +206,31 @@ class StopRule(Config):
         asked = (self.measure is not None, self.part is not None)
         if asked != (self.comparison is None,) * 2:
             raise ValueError("should name a comparison, or a measure and its part")
+        if self.is_scheduled and self.comparison != ANSWER:
+            raise ValueError("batch_persons: double is for the comparison 'answer'")
         return self
+
+    @property
+    def is_scheduled(self) -> bool:
+        """True if the looks are few and share the chance to err."""
+        return self.batch_persons == "double"
+
+    def looks(self, persons: int) -> list[int]:
+        """Numbers of persons after which the intervals are looked at, ascending.
+
+        Args:
+            persons: The first batch.
+        """
+        most = max(persons, self.most_persons)
+        if isinstance(self.batch_persons, int):
+            return [*range(persons, most, self.batch_persons), most]
+        doubled = (persons * 2**n for n in range(most.bit_length()))
+        return [*itertools.takewhile(lambda count: count < most, doubled), most]
+
+    def level(self, persons: int) -> float:
+        """Confidence level of the interval of one look; see `looks`."""
+        shared_by = len(self.looks(persons)) if self.is_scheduled else 1
+        return 1 - (1 - LEVEL) / shared_by
 
 
 class Prediction(Config):

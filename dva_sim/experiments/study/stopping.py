@@ -47,17 +47,17 @@ def is_enough(study: Study, rows: Sequence[Row]) -> bool:
 
 
 def half_widths(study: Study, stop: StopRule, rows: Sequence[Row]) -> Floats:
-    """Half of each 95 % interval that the rule looks at; nan where there is none yet."""
+    """Half of each interval that the rule looks at; nan where there is none yet."""
     if stop.comparison is not None:
-        return _of_contrast(study, study.contrasts[stop.comparison], rows)
+        level = stop.level(study.persons)
+        return _of_contrast(study, study.contrasts[stop.comparison], rows, level)
     return _of_measure(str(stop.measure), [row for row in rows if row["part"] == stop.part])
 
 
 def _edges(study: Study) -> list[int]:
     """Number of persons after each batch."""
     if study.stop is not None:
-        most, step = study.most_persons, study.stop.batch_persons
-        return [*range(study.persons, most, step), most]
+        return study.stop.looks(study.persons)
     if study.budget_s is not None:
         return [*range(_BATCH_IN_BUDGET, study.persons, _BATCH_IN_BUDGET), study.persons]
     return [study.persons]
@@ -78,7 +78,7 @@ def _of_measure(measure: str, rows: Iterable[Row]) -> Floats:
     return np.array(widths)
 
 
-def _of_contrast(study: Study, asked: Contrast, rows: Iterable[Row]) -> Floats:
+def _of_contrast(study: Study, asked: Contrast, rows: Iterable[Row], level: float) -> Floats:
     """Half-widths of the paired difference at each level of `over`; references cancel.
 
     The answer's is adjusted for the covariates.
@@ -90,10 +90,10 @@ def _of_contrast(study: Study, asked: Contrast, rows: Iterable[Row]) -> Floats:
     keys = [name for name in (*study.factors, *ranges) if name != asked.factor]
     for row in rows:
         is_there = row["part"] == asked.part and not row["is_reference"]
-        if not is_there or any(row.get(factor) != level for factor, level in fixed.items()):
+        if not is_there or any(row.get(factor) != there for factor, there in fixed.items()):
             continue
-        for side, level in zip(sides, asked.contrast, strict=True):
-            if row[asked.factor] == level:
+        for side, compared in zip(sides, asked.contrast, strict=True):
+            if row[asked.factor] == compared:
                 place = tuple(row.get(key) for key in keys)
                 side[place, row["person"], row["trial"]] = row
     at = keys.index(asked.over) if asked.over is not None else None
@@ -106,7 +106,7 @@ def _of_contrast(study: Study, asked: Contrast, rows: Iterable[Row]) -> Floats:
         for c in wanted
     ]
     means = _means(found, at)
-    seen = band(adjusted(means, beside) if beside else means)
+    seen = band(adjusted(means, beside) if beside else means, level)
     return np.asarray((seen.high - seen.low) / 2)
 
 

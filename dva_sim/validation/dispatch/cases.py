@@ -216,7 +216,7 @@ class CaseFile(Config):
     """A file of cases."""
 
     description: str = ""
-    cases: dict[str, CaseConfig]
+    cases: Annotated[dict[str, CaseConfig], Field(min_length=1)]
 
 
 class Case(Config):

@@ -210,8 +210,8 @@ class NetworkComparison:
 
     @property
     def passes(self) -> bool:
-        """True if all bands hold and every oversimplified control fails."""
-        bands = all(self.passes_bands(kind) for kind in KINDS)
+        """True if something is judged, all bands hold and every oversimplified control fails."""
+        bands = bool(self.judged) and all(self.passes_bands(kind) for kind in KINDS)
         return bands and (self.pooled.passes or not self.pooled.scored) and not self.fooled
 
     @property

@@ -91,7 +91,9 @@ def read_runs(name: str, source: SourceConfig) -> list[SocketRun]:
             rows = list(csv.DictReader(file))
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"cannot be read: {error}", str(path)) from None
-    missing = [c for c in ("group", "seed", *NUMBERS) if rows and c not in rows[0]]
+    if not rows:
+        raise ConfigError("holds no runs, so there is nothing to compare with", str(path))
+    missing = [c for c in ("group", "seed", *NUMBERS) if c not in rows[0]]
     if missing:
         raise ConfigError(f"has no column {', '.join(missing)}", str(path))
     return [_run(name, source, row, str(path), line) for line, row in enumerate(rows, start=2)]

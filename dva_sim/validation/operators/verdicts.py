@@ -60,8 +60,10 @@ class Tally:
 
     @property
     def passes(self) -> bool:
-        """True if both shares are reached."""
-        return _reaches(self.exact, self.rule.exact) and _reaches(self.held_out, self.rule.held_out)
+        """True if something is counted and both shares are reached."""
+        is_counted = self.exact[1] + self.held_out[1] > 0
+        exact = _reaches(self.exact, self.rule.exact)
+        return is_counted and exact and _reaches(self.held_out, self.rule.held_out)
 
 
 def judge(lines: Sequence[TargetLine], found: Mapping[str, Found]) -> list[LineVerdict]:

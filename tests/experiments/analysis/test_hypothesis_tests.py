@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 from helpers.studies import synthetic_results
 from helpers.wording import unnamed
@@ -132,3 +133,47 @@ def test_what_speaks_against_hypotheses_is_adjusted_too(runs):
     alone = judged(study(hypotheses={"h0": claims["h0"]}), runs).tested[0]
     assert 0.0 < alone.p_against < 1.0
     assert [t.against for t in found] == pytest.approx([min(1.0, 4 * alone.p_against)] * 4)
+
+
+def lies_where_claimed(tested):
+    """Whether the printed interval lies within what is claimed, and within the opposite of it."""
+    margin, found = tested.hypothesis.margin, tested.difference
+    return {
+        "above": (found.low > margin, found.high < margin),
+        "below": (found.high < -margin, found.low > -margin),
+        "same": (
+            -margin < found.low and found.high < margin,
+            found.low > margin or found.high < -margin,
+        ),
+    }[tested.hypothesis.direction]
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("family", [1, 5])
+def test_a_verdict_and_its_interval_have_one_level(seed, family):
+    """Studies of known truth: the mean difference is 2 s; claims stand around it."""
+    rng = np.random.default_rng(seed)
+    times = 50 + rng.gamma(2.0, 1.0, 12)
+    rows = [
+        {"part": "drive", "cell": cell, "person": person, "trial": 0, "seed": person}
+        | {"pattern": pattern, "is_reference": False, "drive_time_s": times[person] * (cell == 0)}
+        for person in range(12)
+        for cell, pattern in enumerate(["req-rep", "latest-wins"])
+    ]
+    for row in rows:
+        row["drive_time_s"] = row["drive_time_s"] or 50.0
+    margins = np.linspace(0.5, 3.5, 13)
+    seen = set()
+    for direction in ("above", "below", "same"):
+        for margin in margins:
+            claims = {f"h{n}": {"direction": direction, "margin": margin} for n in range(family)}
+            contrast = PLAIN | {"contrast": ["req-rep", "latest-wins"]}
+            declared = {"factors": {"pattern": ["req-rep", "latest-wins"]}, "answer": contrast}
+            for tested in judged(
+                declared | {"hypotheses": claims}, synthetic_results.columns(rows)
+            ).tested:
+                within, beyond = lies_where_claimed(tested)
+                expected = "held" if within else "did not hold" if beyond else "open"
+                assert tested.verdict == expected, (direction, margin, tested)
+                seen.add(tested.verdict)
+    assert seen == {"held", "did not hold", "open"}

@@ -57,7 +57,7 @@ def test_each_hypothesis_has_its_margin_and_what_came_out(runs):
     bound, found = rows_of(runs)["hypothesis costs"]
     assert bound == "above 2.0 s"
     assert found.startswith("✓ held: ")
-    assert found.endswith(" s)")
+    assert found.endswith(" s, 90 %)")
 
 
 def test_a_study_run_otherwise_is_held_against_what_was_registered(runs):

@@ -163,3 +163,25 @@ def test_a_rule_that_makes_no_sense_is_refused_where_it_stands(tmp_path, stop, p
 def test_the_most_persons_are_not_fewer_than_the_first_batch(tmp_path):
     problem = complaint(tmp_path, STUDY + ON_ANSWER.replace("most_persons: 8", "most_persons: 2"))
     assert unnamed(problem, "study.yaml:22:63: most_persons", "persons: 3") == []
+
+
+def test_a_stop_on_a_schedule_doubles_and_shares_the_chance_to_err(tmp_path):
+    scheduled = ON_ANSWER.replace("batch_persons: 2", "batch_persons: double")
+    study = study_in(tmp_path, text=STUDY + scheduled)
+    assert persons_of(stopping.rounds(study, cell_grid.jobs(study))) == [
+        [0, 1, 2],
+        [3, 4, 5],
+        [6, 7],
+    ]
+    assert study.stop.level(study.persons) == pytest.approx(1 - 0.05 / 3)
+    plain = study_in(tmp_path, text=STUDY + ON_ANSWER)
+    assert plain.stop.level(plain.persons) == 0.95
+    rows = rows_of(study, noisy, 8)
+    wide, narrow = (stopping.half_widths(s, s.stop, rows) for s in (study, plain))
+    assert (wide > 1.05 * narrow).all()
+
+
+def test_a_stop_on_a_schedule_is_for_the_answer(tmp_path):
+    text = STUDY + STOP.replace("batch_persons: 4", "batch_persons: double")
+    line = complaint(tmp_path, text)
+    assert unnamed(line, "double", "'answer'") == []

@@ -87,6 +87,13 @@ def test_a_mistake_is_told_with_the_case_and_its_line(tmp_path, changes, problem
     assert str(error.value).startswith(f"{tmp_path / 'mine.yaml'}:3:3: case 'queue'")
 
 
+def test_a_file_without_cases_is_refused(tmp_path):
+    path = tmp_path / "none.yaml"
+    path.write_text("cases: {}\n")
+    with pytest.raises(ConfigError, match="at least 1"):
+        load_cases(str(path))
+
+
 def test_an_unknown_file_is_refused():
     with pytest.raises(ConfigError, match=r"'dispach' .*'dispatch'"):
         load_cases("dispach")

@@ -79,3 +79,12 @@ def test_a_value_that_is_no_number_is_told_with_its_line(tmp_path):
     assert "age_p50" in NUMBERS
     with pytest.raises(ConfigError, match=r"some\.csv:3"):
         read_runs("own", SourceConfig(file=str(path), made_with={}))
+
+
+def test_a_table_without_runs_is_refused(tmp_path):
+    path = tmp_path / "empty.csv"
+    path.write_text(f"group,seed,{','.join(NUMBERS)}\n")
+    for text in (path.read_text(), ""):
+        path.write_text(text)
+        with pytest.raises(ConfigError, match="holds no runs"):
+            read_runs("own", SourceConfig(file=str(path), made_with={}))

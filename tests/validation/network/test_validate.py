@@ -106,3 +106,7 @@ def test_a_mechanism_that_is_left_out_has_its_line(runs, monkeypatch):
     found = compare(grouped(one), NetworkSetting(quick=True, ablate=True))
     left_out = {name for name, *_ in result_page.ablation(found)}
     assert {"nothing", "datagrams", "tail-loss probe", "RACK"} <= left_out
+
+
+def test_what_judges_nothing_does_not_pass():
+    assert not compare([], QUICK).passes

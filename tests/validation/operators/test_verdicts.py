@@ -99,6 +99,10 @@ def test_four_of_five_held_out_lines_are_enough(misses, passes):
     assert outcome.passes == passes
 
 
+def test_what_judges_nothing_does_not_pass():
+    assert not outcome_of([], RULE).passes
+
+
 def test_a_single_exact_line_that_misses_fails_it_all():
     exact = [line for line in LINES.values() if line.kind == "exact"]
     values = {line.id: certain(line.high if line.low is None else line.low) for line in exact}

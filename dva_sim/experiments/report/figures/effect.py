@@ -99,7 +99,7 @@ def _curves(
         ends: Ends = {}
         for level, shift in _side_by_side(view, lines):
             matrix = view.difference(panel, level, baseline)
-            bands = _possible(band(matrix), -view.widest, view.widest)
+            bands = _possible(band(matrix, view.level), -view.widest, view.widest)
             seen.append(matrix.ravel())
             ends[level] = draw(ax, bands, look[level], shift)
             at = _places(bands, shift)

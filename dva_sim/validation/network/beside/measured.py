@@ -170,9 +170,10 @@ class Beside:
 
     @property
     def passes(self) -> bool:
-        """True if enough rows lie inside."""
+        """True if enough rows lie inside; False if something was measured and nothing judged."""
         inside, judged = self.share
-        return inside >= MIN_INSIDE * judged
+        is_empty = not judged and bool(self.with_word("not judged"))
+        return inside >= MIN_INSIDE * judged and not is_empty
 
 
 def beside_of(

@@ -124,6 +124,9 @@ def test_disturbed_runs_are_not_judged(results):
     assert {row.word for row in far} == {"not judged"}
     assert unnamed(far[0].why, "0 of at least 3", "3 more were disturbed") == []
     assert found.passes
+    none = beside_of(asked_by(load_study("study.yaml")), {}, 2, 1)
+    assert none.share == (0, 0)
+    assert not none.passes
 
 
 def test_of_a_study_without_results_predictions_alone_are_made(results, tmp_path):
