@@ -12,6 +12,7 @@ from dva_sim.cli.names import everything
 from dva_sim.experiments.report.kept_answers import (
     HISTORY,
     KeptAnswer,
+    Table,
     all_kept,
     read_manifest,
 )
@@ -23,6 +24,7 @@ from generators.markdown import ROOT, code, prose, shell, table
 from generators.markdown import page as page_of
 
 KEPT = ROOT / "experiments/answers"
+REMARKS = KEPT / "remarks.yaml"
 PICTURES = ROOT / "experiments/pictures"
 _FIXED = (
     *("site.name", "robot.profile", "phone.profile", "operator.strategy", "operator.population"),
@@ -144,10 +146,7 @@ def _answered(answer: KeptAnswer, folder: Path) -> Iterator[str]:
     yield _picture(answer.study)
     yield from _map(answer)
     yield _band(answer)
-    if judged := [*answer.hypotheses, *answer.predictions]:
-        yield "## Predictions"
-        yield "Written down before the study was run."
-        yield table(["prediction", "outcome"], ([prose(text), out] for text, out in judged))
+    yield from _predictions(answer, manifest)
     yield "## Conditions"
     yield "The answer holds for these models and settings."
     yield table(["", ""], _conditions(manifest))
@@ -161,6 +160,30 @@ def _answered(answer: KeptAnswer, folder: Path) -> Iterator[str]:
     yield shell(_calls(answer.study))
 
 
+@cache
+def remarks() -> dict[str, dict[str, Any]]:
+    """Return what was added beside kept answers, by study: see the file."""
+    return dict(load_yaml(REMARKS).data)
+
+
+def _predictions(answer: KeptAnswer, manifest: dict[str, Any]) -> Iterator[str]:
+    """Yield the table of hypotheses and predictions, and what was measured where that is noted."""
+    measured = remarks().get(answer.study, {}).get("measured", {})
+    claims = manifest["study"].get("hypotheses") or {}
+    rows = [
+        [f"{code(name)}: {prose(claims[name]['text'])}", out, prose(measured.get(name, ""))]
+        for name, out in answer.hypotheses
+    ]
+    rows += [[prose(text), out, ""] for text, out in answer.predictions]
+    if not rows:
+        return
+    yield "## Predictions"
+    yield "Written down before the study was run."
+    heads = ["prediction", "outcome", "measured"]
+    last = len(heads) if measured else len(heads) - 1
+    yield table(heads[:last], (row[:last] for row in rows))
+
+
 def _map(answer: KeptAnswer) -> Iterator[str]:
     """Yield the table of a choice map, and what runs are like in each of its cells."""
     for title, words, found in (
@@ -168,10 +191,23 @@ def _map(answer: KeptAnswer) -> Iterator[str]:
         ("What drives are like", "From the least to the greatest over the models.", answer.beside),
     ):
         if found:
-            heads, *rows = ([prose(cell) for cell in row] for row in found)
+            heads, *rows = ([prose(cell) for cell in row] for row in _remarked(answer, found))
             yield f"## {title}"
             yield words
             yield table(heads, rows)
+
+
+def _remarked(answer: KeptAnswer, found: Table) -> Table:
+    """Return a table with the remarks on its cells in them."""
+    cells = remarks().get(answer.study, {}).get("cells", {})
+    heads = found[0]
+    return tuple(
+        tuple(
+            f"{cell} ({noted})" if (noted := cells.get(row[0], {}).get(head)) else cell
+            for head, cell in zip(heads, row, strict=True)
+        )
+        for row in found
+    )
 
 
 def _duration(seconds: float) -> str:

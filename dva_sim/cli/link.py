@@ -48,8 +48,9 @@ def link(
     """Run any two programs over a link you choose.
 
     Each command runs in the shell, in its own network namespace. An emulated link is the only
-    connection between the two: no internet, no name server and no access to this computer,
-    except for published ports at the near end. Both commands find the addresses of the two ends in
+    network of the two: no internet, no name server and no port of this computer, except for
+    published ports at the near end. Only the network is apart: the commands run as you, and
+    can read and write your files. Both commands find the addresses of the two ends in
     DVA_LINK_NEAR and DVA_LINK_FAR. Their output is passed through.
 
     The link has the keys of a scenario's link: delay_s, jitter_s, loss, bursts, rate_bps,

@@ -1,4 +1,4 @@
-"""The fit of the operators: to the published experiment that the split calls `fit`, no other.
+"""The fit of the operators: to one of the published experiments that the split calls `fit`.
 
     python experiments/validation/fit_operators.py --jobs 2
 
@@ -21,7 +21,8 @@ only. Two fits were made before this rule, each by the smallest loss in the sear
 2. margin 0.454, motor_noise 0.0963, hand_lag_s 0.191, after three mechanisms were mended. The
    second comparison followed: 9 of 10.
 
-The result of each comparison is in operators-history.csv; README.md says what was mended and why.
+The result of each comparison is in operators-history.csv; docs/explanation/validation.md tells what
+had been seen before each.
 """
 
 from __future__ import annotations

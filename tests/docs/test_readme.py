@@ -12,6 +12,7 @@ from helpers.paths import ROOT
 from PIL import Image
 
 import dva_sim
+from dva_sim.kernel.yaml_files import load_yaml
 
 pytestmark = pytest.mark.system
 
@@ -61,19 +62,83 @@ def test_the_text_of_the_picture_has_the_times_of_the_run():
     assert float(confirmed[0]) > patterns["latest-wins"]
 
 
-def test_numbers_of_the_map_are_those_of_the_kept_answer():
-    kept = json.loads((ROOT / "experiments/answers/which-messaging.json").read_text())
-    found = re.findall(r"([^:;,]*?):? ([\d.]+)\ss\b", kept["answer"])
-    costs = {name.rpartition("that of ")[2].strip(): cost for name, cost in found}
-    section = PAGE.partition("## One result")[2].partition("## Next steps")[0]
-    (worst,) = re.findall(r"REQ/REP costs up to (\d+) s", section)
-    assert int(worst) == round(float(costs["REQ/REP"]))
-    assert f"REQ/REP {costs['REQ/REP']} s, very far (1 s)" in kept["answer"].replace("\xa0", " ")
-    (paced,) = re.findall(r"at most\s+(\d+) s", section)
-    assert int(paced) == round(float(costs["paced requests"]))
-    for publishing in ("plain PUB/SUB", "latest-wins PUB/SUB", "acknowledged"):
-        assert f"{publishing} never done" in kept["answer"]
-    assert "extrapolated" in section
+KEPT = json.loads((ROOT / "experiments/answers/which-messaging.json").read_text())
+SECTION = " ".join(PAGE.partition("## One result")[2].partition("## Next steps")[0].split())
+LINKS = KEPT["map"][1:]
+
+
+def cells_of(pattern):
+    """Cells of a pattern's column of the kept map, by link."""
+    column = KEPT["map"][0].index(pattern)
+    return {row[0]: row[column] for row in LINKS}
+
+
+def test_where_nothing_is_shown_to_differ_is_counted_first():
+    (few, every) = re.search(r"On (\d+) of (\d+) links", SECTION).groups()
+    assert SECTION.strip().startswith(f"On {few} of {every} links")
+    nothing = [row for row in LINKS if row[1].startswith("nothing")]
+    assert (int(few), int(every)) == (len(nothing), len(LINKS))
+    sure = [set(row[1].replace(" and ", ", ").split(", ")) for row in LINKS if row not in nothing]
+    assert set.intersection(*sure) == set()
+
+
+def test_means_of_the_map_are_those_of_the_kept_answer_and_called_means():
+    assert f"REQ/REP costs {cells_of('REQ/REP')['very far (1 s)']} s on average" in SECTION
+    greatest = max(
+        float(cell.split()[-1]) for cell in cells_of("paced").values() if cell[-1].isdigit()
+    )
+    assert f"cost {greatest:.0f} s on average" in SECTION
+    assert f"means of {KEPT['persons']} simulated persons" in SECTION
+    assert "extrapolated" in SECTION
+
+
+def test_the_limit_of_paced_requests_is_the_end_of_a_band():
+    assert KEPT["contrast"] == ["paced", "latest-wins"]
+    worst = max(row["high"] for row in KEPT["rows"])
+    assert f"at most {worst:.0f} s more than latest-wins" in SECTION
+    manifest = json.loads((ROOT / "experiments/answers/which-messaging.manifest.json").read_text())
+    assert manifest["study"]["answer"]["within"] == {"steering": "throughout"}
+
+
+def test_most_drives_by_publishing_never_arrive_on_the_narrow_links():
+    """The median over persons is the horizon under every way of steering."""
+    names = {"plain PUB/SUB", "latest-wins", "acknowledged"}
+    medians = [row[2] for row in KEPT["beside"] if row[0].startswith("narrow") and row[1] in names]
+    assert medians == ["600"] * 6
+
+
+def test_speed_and_rate_of_the_table_are_those_of_its_scenario():
+    manifest = json.loads((ROOT / "experiments/answers/which-messaging.manifest.json").read_text())
+    assert manifest["scenarios"]["drive"]["command"]["rate_hz"] == 10
+    robot = load_yaml(ROOT / "agents/robots/servrobot.yaml").data["max_speed_mps"]
+    assert f"Robot: {robot} m/s, 10 commands a second" in SECTION
+
+
+@pytest.mark.soak
+def test_another_speed_or_rate_lets_as_many_arrive_as_is_said(tmp_path):
+    profile = (ROOT / "agents/robots/servrobot.yaml").read_text()
+    (tmp_path / "fast.yaml").write_text(profile.replace("max_speed_mps: 0.5", "max_speed_mps: 1.0"))
+    narrow = {
+        "persons": 5,
+        "factors.link": ["narrow (60 ms, 40 kbit/s)"],
+        "factors.messaging": ["pub-sub", "latest-wins", "acknowledged"],
+    }
+    arrived = {}
+    for name, change in (
+        ("slow", {"command.rate_hz": 5}),
+        ("fast", {"robot.profile": str(tmp_path / "fast.yaml")}),
+    ):
+        runs = dva_sim.run(
+            "which-messaging", tmp_path / name, set=narrow | change, report=False
+        ).runs
+        own = ~np.asarray(runs["is_reference"], dtype=bool)
+        confirmed = np.asarray(runs["confirmed"], dtype=float)
+        steady = own & (np.asarray(runs["steering"]) == "throughout")
+        arrived[name] = [(int(confirmed[k].sum()), int(k.sum())) for k in (own, steady)]
+    assert arrived["slow"][0] == (60, 60)
+    assert "all 60 tried do" in SECTION
+    (some, every), (steady, steered) = arrived["fast"]
+    assert f"{some} of {every}, and {steady} of the {steered} steered continuously" in SECTION
 
 
 def test_python_of_the_page_runs_on_a_small_study(tmp_path, monkeypatch, capsys):

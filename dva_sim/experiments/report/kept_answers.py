@@ -164,16 +164,24 @@ def _table(reading: Reading, of_map: Callable[[ChoiceMap, str], CellTable]) -> T
 def changed_since(manifest: Mapping[str, Any], study: Study) -> str:
     """Name what has changed in a study since it was run; empty if nothing has.
 
+    The question may be worded otherwise: no run depends on it.
+
     Args:
         manifest: Manifest of the run.
         study: The study as its file is now.
     """
     now = json.loads(json.dumps(manifest_of(StudyPlan.of(study))))
     for key, what in _ASKED.items():
-        if manifest.get(key) != now[key]:
+        if _without_question(manifest.get(key)) != _without_question(now[key]):
             return what
     before, files = manifest.get("inputs", {}), now["inputs"]
     return next((f for f in sorted(before.keys() & files) if before[f] != files[f]), "")
+
+
+def _without_question(kept: Any) -> Any:
+    if not isinstance(kept, Mapping):
+        return kept
+    return {key: value for key, value in kept.items() if key != "question"}
 
 
 def refuse_other_runs(folder: Path, sampled: SampledRuns) -> None:

@@ -32,8 +32,8 @@ def remarks(study: Study) -> Iterator[str]:
     stop = study.stop
     if stop is not None and not stop.is_scheduled:
         yield (
-            f"a 95 % interval that ends a study by its width holds {in_words(OF_STOPPING)}; with 48 "
-            "persons or more, fixed beforehand, or batch_persons: double, it holds in 95 %"
+            f"a 95 % interval that ends a study by its width holds {in_words(OF_STOPPING)}; "
+            "with 48 persons or more, fixed beforehand, or batch_persons: double, in 95 %"
         )
     few = of_few_persons(study.most_persons)
     if few and study.most_persons > 1:

@@ -97,6 +97,7 @@ def test_what_a_study_asks_for_otherwise_is_named_before_any_run(kept, tmp_path)
 
     before = kept_answers.read_manifest(answer.study, folder)
     assert changed(before) == ""
+    assert changed(before, "question=In other words?") == ""
     assert changed(before, "persons=2") == "the study's file"
     assert changed(before, "robot.processing_s=0.3") == "a scenario"
     assert changed(json.loads(json.dumps(traced)), with_trace) == ""
