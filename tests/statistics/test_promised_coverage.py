@@ -1,12 +1,14 @@
-"""Coverage of 95 % intervals where few persons or a stopping rule decide, as users are told it.
+"""Coverage of 95 % intervals where few persons or a stopping rule decide, as reported to users.
 
 Differences are drawn of known mean: of skewness 2 (exponential) and of about 6 (log-normal).
 """
 
 import math
+import re
 
 import numpy as np
 import pytest
+from helpers.paths import ROOT
 
 from dva_sim.experiments.study.coverage import OF_BANDS, OF_STOPPING
 from dva_sim.statistics import LEVEL, band
@@ -21,7 +23,7 @@ def exponential(size, rng):
 
 
 def log_normal(size, rng):
-    """Of skewness 6.2, mean 0 and variance 1."""
+    """Draw values of skewness 6.2, mean 0 and variance 1."""
     spread = math.sqrt((math.e - 1) * math.e)
     return (rng.lognormal(0, 1, size) - math.exp(0.5)) / spread
 
@@ -73,3 +75,12 @@ def test_a_band_of_few_persons_covers_what_is_told(persons, which):
         found = band(LAWS[which]((persons, LEVELS), rng))
         held += bool(((found.low <= 0) & (found.high >= 0)).all())
     assert held / STUDIES == pytest.approx(OF_BANDS[persons][which], abs=0.015)
+
+
+def test_the_page_and_the_program_say_the_same():
+    page = (ROOT / "docs/explanation/statistics.md").read_text(encoding="utf-8")
+    for persons, shares in OF_BANDS.items():
+        cells = " | ".join(f"{100 * share:.0f}" for share in shares)
+        assert re.search(rf"\b{persons} persons \| {re.escape(cells)} \|", page)
+    cells = " | ".join(f"{100 * share:.0f}" for share in OF_STOPPING)
+    assert f"`batch_persons: {FIRST}` | {cells} |" in page

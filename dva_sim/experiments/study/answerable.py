@@ -41,7 +41,9 @@ def compared_factors(study: Study) -> dict[str, Sequence[Level]]:
     design = study.design
     zipped = tuple(design.zip or ()) if design is not None else ()
     aside = {POINT, *zipped[1:]}
-    kept = {name: levels for name, levels in study.factors.items() if name not in aside}
+    kept: dict[str, Sequence[Level]] = {
+        name: levels for name, levels in study.factors.items() if name not in aside
+    }
     rows, grid = len(study.listed_rows), math.prod(map(len, kept.values()))
     return {"row": range(rows)} if 2 * rows < grid and rows else kept
 

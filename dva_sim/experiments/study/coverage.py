@@ -21,9 +21,9 @@ OF_BANDS: Final[dict[int, Coverage]] = {
     24: (0.932, 0.859),
     48: (0.949, 0.889),
 }
-"""Of a band over six levels that do not depend on each other, by number of persons."""
+"""Coverage of a band over six independent levels, by number of persons."""
 OF_STOPPING: Final[Coverage] = (0.932, 0.893)
-"""Of an interval that ends a study by its width, looked at after every 12 of up to 240 persons."""
+"""Coverage of an interval that ends a study by its width, with looks every 12 persons to 240."""
 ENOUGH: Final = 24  # persons, from which on the loss of a band is not mentioned
 
 

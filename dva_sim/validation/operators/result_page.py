@@ -23,7 +23,7 @@ HEADS = ("line", "what", "published (band)", "simulated (95 % interval)", "verdi
 OTHER = "standards"  # the exact lines that have nothing to do with operators and phones
 GROUPS: tuple[tuple[str, LineKind, bool], ...] = (
     ("Operators and phones: theory, the dissertation's app (exact)", "exact", False),
-    ("Operators: published experiments that no fit used (held out, though not all unseen)", "held-out", False),
+    ("Operators: published experiments that no fit used (held out, not unseen)", "held-out", False),
     ("Operators: beside these, shown, never counted", "beside", False),
     ("Operators: fitted to, shown, never counted", "fitted", False),
     ("Operators: from memory, shown, never counted", "remembered", False),

@@ -136,7 +136,7 @@ def test_what_speaks_against_hypotheses_is_adjusted_too(runs):
 
 
 def lies_where_claimed(tested):
-    """Whether the printed interval lies within what is claimed, and within the opposite of it."""
+    """Return True for the claim that the printed interval lies within, and for its opposite."""
     margin, found = tested.hypothesis.margin, tested.difference
     return {
         "above": (found.low > margin, found.high < margin),

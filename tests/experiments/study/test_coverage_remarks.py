@@ -1,4 +1,4 @@
-"""What few persons and a stop by width promise less of stands where users choose them."""
+"""Coverage below 95 %, by few persons or a stop by width, is reported where users choose them."""
 
 import pytest
 from helpers.processes.command_line import call
