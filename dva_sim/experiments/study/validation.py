@@ -327,7 +327,10 @@ def of_stop(study: Study) -> Iterator[Problem]:
     stop = study.stop
     if stop is None:
         return
-    if stop.comparison is not None:
+    if stop.comparison == ANSWER and study.answer is None and study.lost:
+        why = "; leave out what 'stop' waits for: --set stop=null"
+        yield f"{study.lost[0]}{why}", ("stop", "comparison")
+    elif stop.comparison is not None:
         yield from _fault_of_comparison(study, ("stop", "comparison"), stop.comparison)
     if stop.part is not None:
         yield from _fault_of_part(study, ("stop", "part"), stop.part)

@@ -94,6 +94,14 @@ def test_settings_that_leave_two_levels_compare_these(tmp_path):
     assert list(why_unanswered(alone)) == []  # said once
 
 
+def test_a_stop_that_waits_for_a_lost_answer_says_why_it_is_lost():
+    with pytest.raises(ConfigError) as error:
+        load_study("how-late-at-250-ms", ["factors.pattern=req-rep"])
+    assert unnamed(str(error.value), "will not be computed", "'latest-wins'", "stop=null") == []
+    left = load_study("how-late-at-250-ms", ["factors.pattern=req-rep", "stop=null"])
+    assert left.answer is None
+
+
 def test_a_small_version_has_the_contrast_of_the_study_or_is_refused(tmp_path):
     small = "quick: {factors.pattern: [req-rep, pub-sub]}\n"
     three = "pattern: [req-rep, pub-sub, latest-wins]"
