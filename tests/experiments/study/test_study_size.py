@@ -53,5 +53,5 @@ def test_what_takes_a_while_is_told(tmp_path, monkeypatch, capsys):
     study_runs.plan(RunRequest(path, tmp_path / "out"))
     lines = capsys.readouterr().out.splitlines()
     assert lines[1].startswith("Checking every configuration")
-    assert lines[-4].startswith("9/9 configurations")
-    assert "up to 42 runs" in lines[-3]
+    assert lines[-5].startswith("9/9 configurations")
+    assert "up to 42 runs" in lines[-4]
