@@ -24,7 +24,7 @@ from generators.markdown import ROOT, code, prose, shell, table
 from generators.markdown import page as page_of
 
 KEPT = ROOT / "experiments/answers"
-REMARKS = KEPT / "remarks.yaml"
+REMARKS = ROOT / "docs/generators/remarks.yaml"
 PICTURES = ROOT / "experiments/pictures"
 _FIXED = (
     *("site.name", "robot.profile", "phone.profile", "operator.strategy", "operator.population"),
