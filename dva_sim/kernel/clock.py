@@ -21,13 +21,14 @@ class Clock:
     Times are seconds [s] since the run's start; they are kept to the microsecond.
 
     Attributes:
-        env: SimPy's environment in microseconds; its time is that of the last event.
+        env: SimPy's environment, in microseconds.
         now: Seconds since the start [s].
     """
 
     def __init__(self) -> None:
         self.env = simpy.Environment(initial_time=0)
         self.now, self._now_us = 0.0, 0
+        self._event_us = 0  # SimPy's own time, that of the last event, without asking it
 
     def call_at(self, time: float, action: Callable[..., object], *args: Any) -> None:
         """Run `action(*args)` at `time` [s]; a time already past means as soon as possible."""
@@ -44,23 +45,27 @@ class Clock:
         self, period: float, action: Callable[[], object], start: float | None = None
     ) -> None:
         """Run `action()` each `period` [s] until it returns `False`; first at `start` [s]."""
-        env, step = self.env, max(1, round(period * US))
+        timeout, step = self.env.timeout, max(1, round(period * US))
+        at = self._now_us if start is None else max(self._now_us, round(start * US))
 
         def tick(_: simpy.Event) -> None:
-            self._set(int(env.now))
+            nonlocal at
+            self._event_us = self._now_us = at
+            self.now = at / US
             if action() is not False:
-                env.timeout(step).callbacks.append(tick)
+                at += step
+                timeout(step).callbacks.append(tick)
 
-        first = self._now_us if start is None else max(self._now_us, round(start * US))
-        env.timeout(first - env.now).callbacks.append(tick)
+        timeout(at - self._event_us).callbacks.append(tick)
 
     def run(self, until: float) -> None:
         """Let time pass up to `until` [s]; what is due then happens when time goes on."""
-        end, env = round(until * US), self.env
+        end = round(until * US)
         if until > self.now:
-            while env.peek() < end:
-                env.step()
-            self._set(end)
+            peek, step = self.env.peek, self.env.step
+            while peek() < end:
+                step()
+            self._now_us, self.now = end, end / US
 
     def step(self) -> None:
         """Let the next event happen."""
@@ -68,14 +73,12 @@ class Clock:
 
     def _put(self, at: int, action: Callable[..., object], args: tuple[Any, ...]) -> None:
         """It is due at a time [us], after all that was put there before."""
-        env, now = self.env, self._now_us
+        if at < self._now_us:
+            at = self._now_us
 
         def call(_: simpy.Event) -> None:
-            self._set(int(env.now))
+            self._event_us = self._now_us = at
+            self.now = at / US
             action(*args)
 
-        env.timeout((at if at > now else now) - env.now).callbacks.append(call)
-
-    def _set(self, now: int) -> None:
-        """It is that time [us], and nothing before it is due."""
-        self._now_us, self.now = now, now / US
+        self.env.timeout(at - self._event_us).callbacks.append(call)
