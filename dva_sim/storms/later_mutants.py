@@ -150,6 +150,26 @@ def _miscounts_given_up(original: Original, bug: Bug) -> Original:
     return wrong
 
 
+def _keeps_first_severity(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, event: Any, severity: float) -> None:
+        if severity > event.severity:
+            bug.act(f"event {event.number} stays at {event.severity:g}, not {severity:g}")
+        original(self, event, min(severity, event.severity))
+
+    return wrong
+
+
+def _waits_longer(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, dva: Any, now: float) -> Any:
+        found = original(self, dva, now)
+        for event in dva.events.open.values():
+            bug.act(f"event {event.number} waits 120 s more until it is escalated")
+            event.waiting_since += 120.0
+        return found
+
+    return wrong
+
+
 def _confirmed_on_arrival(original: Original, bug: Bug) -> Original:
     """The time of a confirmation is that of the arrival: in order, and not true."""
 
@@ -308,6 +328,18 @@ LATER_MUTANTS: Final[dict[str, Mutant]] = {
         "an escalated event counts as expired",
         "dva_sim.core.events:EventTable.move",
         _miscounts_given_up,
+    ),
+    "severity-stays": Mutant(
+        "S6",
+        "a later report cannot raise the severity of an event",
+        "dva_sim.core.events:EventTable.merge",
+        _keeps_first_severity,
+    ),
+    "restart-prolongs-waits": Mutant(
+        "S6",
+        "a restart gives every event 120 s more until it is escalated",
+        "dva_sim.core.store:Store._recall",
+        _waits_longer,
     ),
     "confirmed-on-arrival": Mutant(
         "S7",

@@ -149,7 +149,7 @@ class EventLedger:
         self._felt: dict[str, float] = {}
         self._seen: dict[int, Seen] = {}
         self._open: dict[int, tuple[str, m.Position]] = {}
-        self._promised: dict[int, None] = {}
+        self._promised: dict[int, float] = {}  # with the highest severity that was reported
         self._lost: dict[int, tuple[str, m.Position, Word]] = {}
         self._now, self._was_down, self._not_kept = 0.0, False, 0.0
 
@@ -308,10 +308,7 @@ class EventLedger:
             self._adopt(now)
             last = -math.inf
         for report in self._taken:
-            expected = [*self._fitting(report)]
-            self._promised |= dict.fromkeys(expected)
-            if not expected:
-                yield "S6", f"a {report.kind} was reported, but the DVA does not list it"
+            yield from self._listed(report)
         self._taken.clear()
         if sum(events.counts.values()) != events.total:
             yield "S6", f"{events.total} events, but {sum(events.counts.values())} in some state"
@@ -332,7 +329,7 @@ class EventLedger:
             yield "S6", f"event {number} is open and closed"
         for number in self._open.keys() - events.open.keys() - events.closed.keys():
             yield "S6", f"event {number} was open, but the DVA does not list it"
-        self._promised = {n: None for n in self._promised if n in events.open}
+        self._promised = {n: at for n, at in self._promised.items() if n in events.open}
         for number in self._lost.keys() & events.open.keys():
             self._find_again(events.open[number])
         known, self._open = self._open, {n: (e.kind, e.position) for n, e in events.open.items()}
@@ -370,12 +367,24 @@ class EventLedger:
             new.ordered = word.ordered | new.ordered
             new.went |= word.went
 
-    def _fitting(self, report: m.EventReport) -> Iterator[int]:
-        """Yield the numbers of the events, open or closed, that fit a report."""
+    def _listed(self, report: m.EventReport) -> Iterator[Broken]:
+        """Yield what the DVA has not noted of a report that it has taken."""
+        fitting = [*self._fitting(report)]
+        if not fitting:
+            yield "S6", f"a {report.kind} was reported, but the DVA does not list it"
+        elif max(event.severity for event in fitting) < report.severity:
+            what = f"severity {report.severity:g} was reported of event {fitting[0].number}"
+            yield "S6", f"{what}, which is listed with {fitting[0].severity:g}"
+        severity = report.severity if len(fitting) == 1 else 0.0
+        for event in fitting:
+            self._promised[event.number] = max(severity, self._promised.get(event.number, 0.0))
+
+    def _fitting(self, report: m.EventReport) -> Iterator[Event]:
+        """Yield the events, open or closed, that fit a report."""
         near, kind = max(self._rules.merge_distance, SAME_SPOT), report.kind
         known = (*self._events.open.values(), *self._events.closed.values())
         same = (e for e in known if e.kind == kind)
-        return (e.number for e in same if apart(e.position, report.position) < near)
+        return (e for e in same if apart(e.position, report.position) < near)
 
     def _adopt(self, now: float) -> None:
         """Accept the first page as it is: its events are of an earlier life of the DVA.
@@ -386,7 +395,7 @@ class EventLedger:
             word = self._word(event.number)
             sent = {event.operator: event.responder, event.responder: event.responder}
             sent[event.actor] = event.actor
-            self._promised[event.number] = None
+            self._promised[event.number] = 0.0
             word.ordered.update((who, goes or who) for who, goes in sent.items() if who)
             word.went.update(word.ordered.items())
             found = FOUND.intersection((*event.times, event.state.value))
@@ -447,6 +456,12 @@ class EventLedger:
         self._seen[event.number] = new
         if event.waits_for is not None and now - new.waits > rules.escalate_after + PENDING_SLACK:
             yield "S6", f"event {event.number} is {event.state} after {now - new.waits:.0f} s"
+        if event.open and event.waiting_since > new.waits + PENDING_SLACK:
+            later = event.waiting_since - new.waits
+            yield "S6", f"event {event.number} is given {later:.0f} s more to wait"
+        if event.severity < self._promised.get(event.number, 0.0):
+            reported = self._promised[event.number]
+            yield "S6", f"event {event.number} has lost its severity of {reported:g}"
         if new.hands and now - new.since > rules.order_limit + PENDING_SLACK:
             held = now - new.since
             yield "S6", f"event {event.number} is in one pair of hands for {held:.0f} s"

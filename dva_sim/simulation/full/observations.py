@@ -7,6 +7,7 @@ sent a message, and its body shows whether it has stopped.
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -507,6 +508,8 @@ class _EventTableDiff:
 class EventTableCopy:
     """A copy of the DVA's book, rebuilt from its changes.
 
+    Facts lack how severe an event is, and since when it waits: nothing compares with these.
+
     Args:
         merge_distance: Reports of one kind nearer than this are one event [m].
     """
@@ -535,9 +538,10 @@ class EventTableCopy:
             number,
             facts["kind"],
             Position(facts["latitude_deg"], facts["longitude_deg"]),
-            0.0,
+            math.nan,
             facts["contain"],
             State(facts["state"]),
+            waiting_since=math.nan,
             times=dict(facts["times_s"]),
             **{who: facts[who] for who in _SENT},
         )

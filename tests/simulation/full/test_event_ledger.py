@@ -3,7 +3,7 @@
 import pytest
 
 from dva_sim.core.assignments import Rules
-from dva_sim.core.events import EventTable, State
+from dva_sim.core.events import Event, EventTable, State
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.event_ledger import EventLedger
 from dva_sim.simulation.full.observations import Page
@@ -44,13 +44,18 @@ class Hearer:
         message = m.Message(DVA, self._number, OPERATOR, "12:00:00", 0, body)
         self.ledger.hears(OPERATOR, message, now)
 
-    def broken(self, until: float) -> list[str]:
+    def is_answered(self, code: int) -> None:
+        """The DVA answers what the operator said last."""
+        reply = m.Reply(self._number, code, "")
+        self.ledger.says(m.Message(OPERATOR, 1, DVA, "12:00:00", 0, reply))
+
+    def broken(self, until: float, works: bool = True) -> list[str]:
         """Everything that is wrong until then, looked at twice a second."""
         first = int(2 * self.ledger._now) + 1
         return [
             what
             for tick in range(first, int(2 * until) + 1)
-            for _, what in self.ledger.check(tick / 2, Page(self.table, (), True))
+            for _, what in self.ledger.check(tick / 2, Page(self.table, (), works))
         ]
 
 
@@ -79,6 +84,70 @@ def test_work_that_is_over_and_given_again_at_once_has_its_own_time(is_given_aga
         heard.assigns(40.0)
         del heard.event.times["departed"]
     assert any("pair of hands" in line for line in heard.broken(95.0)) is breaks
+
+
+def raises(table: EventTable, event: Event, severity: float) -> None:
+    table.merge(event, severity)
+
+
+def keeps(table: EventTable, event: Event, severity: float) -> None:
+    table.merge(event, 0.0)
+
+
+def forgets(table: EventTable, event: Event, severity: float) -> None:
+    raises(table, event, severity)
+    event.severity = 0.5
+
+
+@pytest.mark.invariant("S6")
+@pytest.mark.parametrize(
+    ("merge", "severity", "breaks"),
+    [(raises, 0.9, False), (keeps, 0.9, True), (forgets, 0.9, True), (keeps, 0.4, False)],
+)
+def test_an_event_is_as_severe_as_the_worst_report_that_the_dva_has_taken(merge, severity, breaks):
+    heard = Hearer()
+    assert heard.broken(1.0) == []
+    heard.says(1.0, m.EventReport(None, "fire", PLACE, severity, 0.9, "detected"))
+    merge(heard.table, heard.event, severity)
+    heard.is_answered(m.OK)
+    assert any("severity" in line for line in heard.broken(2.0)) is breaks
+
+
+@pytest.mark.invariant("S6")
+def test_a_severity_that_is_lost_later_is_noticed():
+    heard = Hearer()
+    heard.says(0.0, m.EventReport(None, "fire", PLACE, 0.9, 0.9, "detected"))
+    raises(heard.table, heard.event, 0.9)
+    heard.is_answered(m.OK)
+    assert heard.broken(2.0) == []
+    heard.event.severity = 0.5
+    assert any("severity" in line for line in heard.broken(3.0))
+
+
+@pytest.mark.invariant("S6")
+def test_of_a_report_that_was_refused_nothing_need_be_noted():
+    heard = Hearer()
+    heard.says(0.0, m.EventReport(None, "fire", PLACE, 0.9, 0.9, "detected"))
+    heard.is_answered(m.BUSY)
+    assert heard.broken(2.0) == []
+
+
+@pytest.mark.invariant("S6")
+@pytest.mark.parametrize(
+    ("since", "breaks"),
+    [
+        (0.0, False),
+        (40.0, False),  # time for which the DVA was down does not count
+        (50.0, True),  # the wait begins again with the restart
+        (120.0, True),
+    ],
+)
+def test_a_restart_gives_an_event_no_more_time_to_wait(since, breaks):
+    heard = Hearer()
+    assert heard.broken(10.0) == []
+    assert heard.broken(50.0, works=False) == []
+    heard.event.waiting_since = since
+    assert any("more to wait" in line for line in heard.broken(51.0)) is breaks
 
 
 @pytest.mark.invariant("S6")
