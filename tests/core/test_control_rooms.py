@@ -17,7 +17,8 @@ from helpers.wording import unnamed
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.audit import Fact
-from dva_sim.core.events import State
+from dva_sim.core.events import Event, State
+from dva_sim.core.questions import Questions
 from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
@@ -391,6 +392,15 @@ def test_a_question_does_not_wait_longer_because_another_is_proposed():
     office.silence(ROBOT, 30.0)
     office.beat(*(d for d in office.core.registry.entries if d != ROBOT), now=60.9)
     assert office.tick(61.0, alive=False) == [Send(GUARD, order(1))]
+
+
+def test_a_question_is_news_when_its_proposal_changes_or_when_it_is_gone():
+    event, questions = Event(1, "fire", east(12), 0.5), Questions(60.0)
+    rounds = [(ROBOT, True), (ROBOT, False), (GUARD, True), (None, True), (None, False)]
+    for now, (device, is_news) in enumerate(rounds):
+        if device is not None:
+            assert questions.ask(event, "confirm", device, 10.0, float(now))
+        assert questions.settle() == [event] * is_news, now
 
 
 def test_where_nobody_is_there_who_may_decide_nobody_is_asked():

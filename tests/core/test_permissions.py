@@ -152,6 +152,31 @@ def test_a_robot_that_could_not_be_told_is_told_again(office):
     assert office.core.tick(3.0) == []
 
 
+FLOOR = (2_000 << 32) + 2**32 - 1
+
+
+def test_a_grant_that_was_too_low_is_given_again_above_what_the_robot_knows(office):
+    (grant,) = office.say(OPERATOR, ASK)[1]
+    refused = m.Reply(1, m.BAD_SESSION, "too low", m.SessionFloor(FLOOR))
+    over, again = office.core.refused_grant(grant, refused, 1.0)
+    assert over == Send(OPERATOR, m.PermissionRevocation(ROBOT, OPERATOR, grant.session))
+    assert (again.to, again.body.holder, again.session) == (ROBOT, OPERATOR, again.body.session)
+    assert again.session > FLOOR
+    assert office.say(OPERATOR, ASK)[0].content.session == again.session
+
+
+@pytest.mark.parametrize(
+    ("code", "content"),
+    [(m.BAD_SESSION, None), (m.BUSY, m.SessionFloor(FLOOR)), (m.BUSY, None)],
+)
+def test_a_grant_that_is_refused_otherwise_is_over(office, code, content):
+    (grant,) = office.say(OPERATOR, ASK)[1]
+    sends = office.core.refused_grant(grant, m.Reply(1, code, "no", content), 1.0)
+    over = m.PermissionRevocation(ROBOT, OPERATOR, grant.session)
+    assert sends == [Send(ROBOT, over), Send(OPERATOR, over)]
+    assert office.core.sessions.permissions.grants == {}
+
+
 def test_all_sessions_end_with_the_core(office):
     over = m.PermissionRevocation(ROBOT, OPERATOR, granted(office).session)
     assert office.core.close() == [Send(ROBOT, over), Send(OPERATOR, over)]
@@ -176,6 +201,40 @@ def test_a_robot_that_somebody_holds_is_sent_nowhere_by_another(office):
     office.register(OTHER_OPERATOR, "TeleOp")
     granted(office)
     assert [send.to for send in office.fire(12)] == [GUARD]
+
+
+def test_an_order_belongs_to_no_session(office):
+    assert [send.session for send in office.fire(80)] == [0]
+
+
+# --- what a robot is told that asks --------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("about", "holder"),
+    [
+        (m.GetGrant(), OPERATOR),
+        (m.GetGrant(OPERATOR), OPERATOR),
+        (m.GetGrant(DETECTOR), None),
+        (m.GetGrant(OTHER_OPERATOR), None),
+        (m.GetGrant(DETECTOR, "sensors"), DETECTOR),
+        (m.GetGrant(OPERATOR, "sensors"), OPERATOR),  # who drives is its holder all the same
+        (m.GetGrant(OTHER_OPERATOR, "sensors"), None),
+    ],
+)
+def test_a_robot_that_asks_is_told_of_the_holder_and_of_nobody_else(office, about, holder):
+    office.register(OTHER_OPERATOR, "TeleOp")
+    granted(office)
+    granted(office, DETECTOR, "sensors")
+    reply, sends = office.say(ROBOT, about)
+    told = reply.content.device if isinstance(reply.content, m.Permission) else None
+    assert (told, reply.code) == (holder, m.OK if holder else m.NOT_PERMITTED)
+    assert sends == []
+
+
+@pytest.mark.parametrize("about", [m.GetGrant(), m.GetGrant(OPERATOR), m.GetGrant(None, "sensors")])
+def test_a_robot_that_nobody_holds_is_told_so(office, about):
+    assert office.say(ROBOT, about)[0].code == m.NOT_PERMITTED
 
 
 # --- sensors -------------------------------------------------------------------------------

@@ -33,6 +33,21 @@ def listed(office: Office) -> list[str]:
     return [device.id_tag for device in content.devices]
 
 
+def test_who_is_dismissed_is_forgotten_and_what_it_held_is_free(office):
+    over = m.PermissionRevocation(ROBOT, OPERATOR, granted(office))
+    assert office.core.dismiss(STRANGER, 1.0) == []
+    assert office.core.dismiss(OPERATOR, 1.0) == [Send(ROBOT, over), Send(OPERATOR, over)]
+    assert OPERATOR not in office.core.registry.entries
+    assert not office.core.sessions.is_held(ROBOT)
+
+
+@pytest.mark.parametrize(("now", "code"), [(9.99, m.BUSY), (10.0, m.OK)])
+def test_an_address_is_another_devices_until_nothing_was_heard_there_for_ten_seconds(
+    office, now, code
+):
+    assert office.say(GUARD, m.Registration("guard", "Guard", "10.0.0.2"), now)[0].code == code
+
+
 @pytest.mark.invariant("S11")
 def test_who_is_not_registered_is_refused_and_counted(office):
     reply, sends = office.say(STRANGER, m.GetDeviceList())

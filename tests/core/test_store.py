@@ -6,6 +6,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -243,12 +244,43 @@ def test_a_copy_of_the_file_taken_at_any_moment_knows_what_was_kept_until_then(t
     day.memory.close()
 
 
+class PowerCut(BaseException):
+    """Nothing of what was to come happens."""
+
+
+def moments_of_a_write(file: Path, until: int | None = None) -> list[int]:
+    """Rows written at each moment at which a kill may come; the last one is `until`."""
+    office, memory, written = Office(), Store(file), list[int]()
+    office.fire(12.0)
+
+    def moment() -> None:
+        written.append(memory._file.total_changes)
+        if until is not None and len(written) > until:
+            raise PowerCut
+
+    memory.between_writes = moment
+    with suppress(PowerCut):
+        keep(office, memory)
+    memory.close()
+    return written
+
+
+def test_a_kill_at_any_moment_of_a_write_leaves_all_of_it_or_nothing(tmp_path):
+    written = moments_of_a_write(tmp_path / "whole.sqlite")
+    last = len(written) - 1
+    assert written[last - 1] == written[last]  # all is written, and does not count yet
+    for until in range(len(written)):
+        moments_of_a_write(file := tmp_path / f"{until}.sqlite", until)
+        core = next_life(Office(), file, 0.0)
+        assert (core.events.total, len(core.registry.entries)) == ((1, 4) if until == last else (0, 0))
+
+
 SAYS_WHAT_IT_KEPT = """
 import sys
 sys.path.insert(0, sys.argv[2])
 from helpers.dva.dispatch_office import Office
-from dva_sim.core.store import Memory
-office, memory = Office(), Memory(sys.argv[1])
+from dva_sim.core.store import Store
+office, memory = Office(), Store(sys.argv[1])
 while True:
     office.fire(20.0 * (office.core.events.total + 1), source=sys.argv[3])
     memory.keep(office.core, office.core.events.changes(), 0.0)
@@ -269,6 +301,7 @@ def test_a_process_that_is_killed_forgets_nothing_that_it_has_said(file):
                 reported = int(line)
                 if reported == enough:
                     process.send_signal(signal.SIGKILL)
+        assert reported >= enough
         memory, core = Store(file), Office().new_core()
         memory.recall(core, 0.0)
         memory.close()
