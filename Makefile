@@ -12,7 +12,7 @@ DEMO := results/demo
 SITE := build/docs
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-extras extras test-long test-soak storms tools check docs release-check same-bytes bench goals clean
+.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-extras extras test-long test-soak storms mutants tools check docs release-check same-bytes bench goals clean
 
 # Compiled files are kept whatever a shell says: without them each program that a test starts
 # compiles all modules again.
@@ -68,6 +68,9 @@ test-soak: $(DEV)  ## the same and all searches with 20 times as many cases, new
 
 storms: $(RUNTIME)  ## a hundred hours of a team in which much goes wrong; goes on where it stopped
 	@$(BIN)/dva-sim storm --hours $(or $(HOURS),100) -o results/storms
+
+mutants: $(DEV)  ## whether tests notice planted faults: make mutants ROOM=core DRAW=2
+	@$(BIN)/python tests/mutants.py --room "$(ROOM)" --draw "$(or $(DRAW),1)"
 
 tools: $(DEV)  ## what some tests need besides Python: Chromium, node, TypeScript, Spin
 	@tests/install_tools.sh $(VENV)

@@ -272,7 +272,9 @@ def test_a_kill_at_any_moment_of_a_write_leaves_all_of_it_or_nothing(tmp_path):
     for until in range(len(written)):
         moments_of_a_write(file := tmp_path / f"{until}.sqlite", until)
         core = next_life(Office(), file, 0.0)
-        assert (core.events.total, len(core.registry.entries)) == ((1, 4) if until == last else (0, 0))
+        assert (core.events.total, len(core.registry.entries)) == (
+            (1, 4) if until == last else (0, 0)
+        )
 
 
 SAYS_WHAT_IT_KEPT = """

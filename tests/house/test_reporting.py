@@ -3,8 +3,10 @@
 import os
 import sys
 
-import mutants
 import pytest
+from helpers.mutation import scores
+from helpers.mutation.faults import Sites, shares
+from helpers.mutation.scores import Verdicts, score
 from helpers.paths import PYTHON_PATH
 from helpers.processes.patience import run
 from helpers.reporting.left_out import MOST_SKIPPED
@@ -33,14 +35,21 @@ SOURCE = b'''
 def f(x: int = 2) -> bool:
     """1 < 2."""
     log(x)
+    x.n = x.n
+    x += x
+    if log:
+        raise E
     return not x < 10 and True, f"{x + 1}"
 '''
 
 
 def test_faults_fit_where_a_program_could_be_wrong_and_nowhere_else():
-    found = mutants.Sites("dva_sim/room/f.py", SOURCE).found
+    found = Sites("dva_sim/room/f.py", SOURCE).found
     assert [(one.old, one.new) for one in found][1:] == [
         ("log(x)", "pass"),
+        ("x.n = x.n", "pass"),
+        ("x += x", "pass"),
+        ("raise E", "pass"),
         ('return not x < 10 and True, f"{x + 1}"', "return None"),
         ("and", "or"),
         ("not ", ""),
@@ -53,8 +62,26 @@ def test_faults_fit_where_a_program_could_be_wrong_and_nowhere_else():
 
 
 def test_every_room_gives_a_fault_and_large_ones_more():
-    assert mutants.shares({"small": 1, "middle": 30, "large": 69}, 13) == {
+    assert shares({"small": 1, "middle": 30, "large": 69}, 13) == {
         "small": 1,
         "middle": 4,
         "large": 8,
     }
+
+
+def test_a_score_is_the_share_of_noticed_faults_among_those_that_change_something(
+    tmp_path, monkeypatch
+):
+    faults = Sites("dva_sim/room/f.py", SOURCE).found[:4]
+    first, second, third, _ = faults
+    monkeypatch.setattr(scores, "equivalents", lambda: {third.name: "no more than a note"})
+    Verdicts(tmp_path / "v.csv").note(first, "")
+    verdicts = Verdicts(tmp_path / "v.csv")  # the search is resumed
+    for fault, test in [(first, "test_f"), (second, ""), (third, "")]:
+        verdicts.note(fault, test)
+    found = score("room", "1", faults[:3], Verdicts(tmp_path / "v.csv"))
+    assert (found.mutants, found.noticed, found.equivalent, found.share) == (3, 1, 1, 0.5)
+
+
+def test_every_fault_that_changes_nothing_is_listed_with_a_reason():
+    assert all(len(reason) > 10 for reason in scores.equivalents().values())
