@@ -68,6 +68,7 @@ class Seen(NamedTuple):
         hands: Devices in charge, by task; empty: nobody.
         since: From when on those do.
         waits: Since when it has waited for somebody who takes it up.
+        began: The same, as the book has it.
         times: Time of each step, as the book has it.
         debt: Next step owed by the device in charge.
         is_over: True if it is closed, and nothing happens to it any more.
@@ -77,6 +78,7 @@ class Seen(NamedTuple):
     hands: tuple[str | None, ...]
     since: float
     waits: float
+    began: float
     times: Mapping[str, float] = MappingProxyType({})
     debt: Debt = Debt(None, False, 0.0)
     is_over: bool = False
@@ -399,12 +401,14 @@ class EventLedger:
             word.ordered.update((who, goes or who) for who, goes in sent.items() if who)
             word.went.update(word.ordered.items())
             found = FOUND.intersection((*event.times, event.state.value))
-            self._seen[event.number] = Seen(found, _in_hand(event), now, now)
+            self._seen[event.number] = Seen(found, _in_hand(event), now, now, now)
 
     def _let_no_time_pass(self, passed: float) -> None:
         """Shift all deadlines: a DVA that was silenced decides nothing meanwhile."""
         for number, seen in self._seen.items():
-            self._seen[number] = seen._replace(since=seen.since + passed, waits=seen.waits + passed)
+            self._seen[number] = seen._replace(
+                since=seen.since + passed, waits=seen.waits + passed, began=seen.began + passed
+            )
 
     def _unheard(self, rights: Sequence[Right], now: float, works: bool) -> Iterator[Broken]:
         """Yield permissions whose holders have been silent for longer than the DVA may wait."""
@@ -456,9 +460,10 @@ class EventLedger:
         self._seen[event.number] = new
         if event.waits_for is not None and now - new.waits > rules.escalate_after + PENDING_SLACK:
             yield "S6", f"event {event.number} is {event.state} after {now - new.waits:.0f} s"
-        if event.open and event.waiting_since > new.waits + PENDING_SLACK:
-            later = event.waiting_since - new.waits
-            yield "S6", f"event {event.number} is given {later:.0f} s more to wait"
+        if last == -math.inf and old is not None and new.since == old.since:
+            later = event.waiting_since - max(new.waits, old.began)
+            if later > PENDING_SLACK:
+                yield "S6", f"a restart gives event {event.number} {later:.0f} s more to wait"
         if event.severity < self._promised.get(event.number, 0.0):
             reported = self._promised[event.number]
             yield "S6", f"event {event.number} has lost its severity of {reported:g}"
@@ -499,7 +504,7 @@ class EventLedger:
     def _look(self, event: Event, old: Seen | None, now: float) -> Seen:
         """Track waiting: it ends when somebody accepts the event, and restarts on confirmation."""
         found = FOUND.intersection((*event.times, event.state.value))
-        old = old or Seen(found - FOUND, (), now, now)
+        old = old or Seen(found - FOUND, (), now, now, now)
         word, hands = self._word(event.number), _in_hand(event)
         given = "act_assigned" if hands[:1] == ("act",) else "assigned"
         if word.freed and hands == old.hands and event.times.get(given) != old.times.get(given):
@@ -516,7 +521,14 @@ class EventLedger:
             word.reached.add(goes)
         word.busy = word.sent_again = word.freed = False
         return Seen(
-            found, hands, since, waits, times=dict(event.times), debt=debt, is_over=not event.open
+            found,
+            hands,
+            since,
+            waits,
+            event.waiting_since,
+            times=dict(event.times),
+            debt=debt,
+            is_over=not event.open,
         )
 
     def _debt(self, event: Event, hands: tuple[str | None, ...], old: Debt, now: float) -> Debt:

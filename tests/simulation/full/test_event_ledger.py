@@ -134,18 +134,19 @@ def test_of_a_report_that_was_refused_nothing_need_be_noted():
 
 @pytest.mark.invariant("S6")
 @pytest.mark.parametrize(
-    ("since", "breaks"),
+    ("is_restarted", "since", "breaks"),
     [
-        (0.0, False),
-        (40.0, False),  # time for which the DVA was down does not count
-        (50.0, True),  # the wait begins again with the restart
-        (120.0, True),
+        (True, 0.0, False),
+        (True, 40.0, False),  # time for which the DVA was down does not count
+        (True, 50.0, True),  # the wait begins again with the restart
+        (True, 120.0, True),
+        (False, 50.0, False),  # an order came to nothing
     ],
 )
-def test_a_restart_gives_an_event_no_more_time_to_wait(since, breaks):
+def test_a_restart_gives_an_event_no_more_time_to_wait(is_restarted, since, breaks):
     heard = Hearer()
     assert heard.broken(10.0) == []
-    assert heard.broken(50.0, works=False) == []
+    assert heard.broken(50.0, works=not is_restarted) == []
     heard.event.waiting_since = since
     assert any("more to wait" in line for line in heard.broken(51.0)) is breaks
 
