@@ -98,6 +98,15 @@ def test_who_sends_much_waits_for_itself_and_not_the_others():
     assert bench.done[:3] == [b"<SetTeleOp>flood 0", b"<SetTeleOp>flood 1", b"<SetTeleOp>holder"]
 
 
+def test_what_the_holder_asks_for_comes_before_its_commands_that_wait():
+    bench = Bench()
+    for number in range(5):
+        bench.ask(b"<SetTeleOp>%d" % number, peer="h")
+    bench.ask(b"stop", peer="h")
+    bench.clock.run(0.11)
+    assert bench.done == [b"<SetTeleOp>0", b"stop"]
+
+
 def test_a_queue_that_one_peer_has_filled_takes_what_another_sends():
     bench = Bench()
     for number in range(LIMIT + 50):

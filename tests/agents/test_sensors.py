@@ -48,6 +48,25 @@ def test_without_noise_it_shows_what_is_there_at_its_resolution_and_within_its_r
     assert made.read(1e4) == (1000.0, -40.0)
 
 
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [
+        ("lidar", 0.0, 99.999),
+        ("temperature", -40.0, 1000.0),
+        ("smoke", 0.0, 20.0),
+        ("gas", 0.0, 1.0),
+        ("heat_flux", 0.0, 200.0),
+        ("water", 0.0, 10.0),
+        ("battery", 0.0, 1.0),
+    ],
+)
+def test_each_kind_shows_no_more_than_its_range(name, low, high):
+    config = SensorConfig(name=name)
+    for shown, there in ((low, -1e6), (high, 1e6)):
+        made = RobotSensor(config, lambda now, there=there: (there,), Streams(1).fresh)
+        assert made.read(0.0) == (shown,)
+
+
 @pytest.mark.parametrize("resolution", [1.0, 0.5, 0.1, 0.001, 0.0025])
 def test_values_are_spelt_with_no_more_digits_than_the_resolution_has(resolution):
     made = sensor(lambda now: (20.0 + now / 7,), resolution=resolution)

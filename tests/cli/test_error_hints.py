@@ -19,7 +19,6 @@ from dva_sim.experiments.study.loading import load_study, write_study
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.live import open_files
-from dva_sim.network.addresses import problem_of
 
 
 @pytest.fixture
@@ -133,30 +132,6 @@ def test_a_mistake_in_yaml_is_told_at_the_line_that_is_wrong(tmp_path, text, lin
     assert error.value.line == line
     assert unnamed(error.value.problem, *names) == []
     assert not any(word in error.value.problem for word in ("<", "token", "stream", "scalar"))
-
-
-@pytest.mark.parametrize(
-    ("text", "names"),
-    [
-        ("[::1]:5733", ["IPv6"]),
-        ("::1:5600", ["IPv6"]),
-        ("127.0.0.1:0", ["port 0", "1 to 65534"]),
-        ("127.0.0.1:99999", ["port 99999", "65534"]),
-        ("127.0.0.1:65535", ["port 65535", "65534"]),
-        ("localhost", ["no port"]),
-        (":5600", ["no host"]),
-        ("bad host:5600", ["no host"]),
-        ("host:1:2", ["two colons"]),
-        ("host:five", ["no number"]),
-    ],
-)
-def test_an_address_is_told_which_part_of_it_is_wrong(text, names):
-    assert unnamed(problem_of(text), *names) == []
-
-
-@pytest.mark.parametrize("text", ["127.0.0.1:5600", "localhost:1", "robot.lan:65534"])
-def test_an_address_of_a_host_and_a_port_is_one(text):
-    assert problem_of(text) == ""
 
 
 @pytest.mark.parametrize(

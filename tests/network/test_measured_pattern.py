@@ -113,6 +113,14 @@ def test_a_table_may_be_compressed(table):
     assert len(plain) > 30
 
 
+def test_a_command_may_take_no_time_but_not_less(table):
+    table.write_text(HEAD + "direct,far,0.5,0.5\n")
+    assert measured_runs(table, {}) == [((0.5, 0.5),)]
+    table.write_text(HEAD + "direct,far,0.5,0.4999\n")
+    with pytest.raises(ConfigError, match="arrived earlier"):
+        measured_runs(table, {})
+
+
 @pytest.mark.parametrize("name", ["commands.csv", "commands.csv.gz"])
 @pytest.mark.parametrize("damage", [lambda data: data[:-6], lambda data: b"\xff" * 9 + data[9:]])
 def test_a_damaged_table_is_refused_in_a_line(tmp_path, name, damage):
