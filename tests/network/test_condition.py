@@ -24,6 +24,7 @@ def test_what_is_not_set_is_empty_or_named_as_the_tables_do():
     row = PUBLISHING.to_row()
     assert row["timeout_ms"] == row["attempts"] == row["burst_pkts"] == ""
     assert (row["rcvbuf"], row["rate_kbit"], row["reorder"]) == ("auto", "inf", "0")
+    assert (row["warm_s"], row["dur_s"]) == ("1", "40")
 
 
 def test_the_way_a_number_is_written_does_not_change_the_condition():

@@ -82,6 +82,15 @@ def test_a_normal_law_with_a_correlation_time_forgets_exponentially():
         assert correlation == pytest.approx(step**lag, abs=4 * (spread / n) ** 0.5)
 
 
+def test_slow_changes_do_not_repeat_themselves():
+    n = 4096
+    found = delays(NORMAL | {"correlation_s": 0.05}, every=0.064, count=n)
+    found = found - found.mean()
+    spectrum = np.abs(np.fft.rfft(found, 2 * n)) ** 2
+    correlations = np.fft.irfft(spectrum)[8 : n // 4] / (found @ found)  # 0.5 s to a minute
+    assert np.abs(correlations).max() < 6 / n**0.5
+
+
 @pytest.mark.system
 def test_correlation_leaves_the_law_of_each_delay_as_it_is():
     found = delays(GAMMA | {"correlation_s": 0.5}, every=5.0, count=1500)  # ten of them apart

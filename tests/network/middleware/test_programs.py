@@ -100,6 +100,17 @@ def test_what_is_not_taken_is_offered_again_as_a_newer_command(tmp_path):
     ]
 
 
+@pytest.mark.parametrize("hz", [50.0, 0.0])
+def test_the_robot_sends_pictures_of_the_planned_size_if_there_are_to_be_any(tmp_path, hz):
+    transport, path = Scripted(), tmp_path / "notes"
+    ends = plan(tmp_path, until=time.monotonic() - 59.7, picture_hz=hz, picture_bytes=1_000)
+    RobotProgram(transport, ends, ProgramNotes(path)).run()
+    assert {len(picture) for picture in transport.sent} == ({1_000} if hz else set())
+    assert kinds(path) == [
+        (ProgramNoteKind.PICTURE_TAKEN, number) for number in range(1, len(transport.sent) + 1)
+    ]
+
+
 def test_notes_of_a_killed_program_are_read_as_far_as_they_are_whole(tmp_path):
     notes = ProgramNotes(tmp_path / "notes")
     for number in range(3):
