@@ -107,6 +107,21 @@ def test_a_refuge_is_beside_the_way_with_room_for_who_passes():
     assert corridor(half=0.75).refuge(HERE, way, [robot(1, 5.0, 0.0)]) is None
 
 
+WAY = np.stack([np.arange(-4.0, 8.0, 0.2), np.zeros(60)], 1)
+
+
+def test_who_stands_at_a_wall_already_still_finds_a_refuge():
+    beside = (2.0, HALF - 0.30 - 0.005)
+    assert corridor().refuge(beside, WAY, [robot(1, 5.0, 0.0, -0.5)]) is not None
+
+
+def test_no_refuge_is_behind_a_wall():
+    def walls(points: np.ndarray) -> np.ndarray:
+        return np.minimum(points[:, 1] + 0.45, np.abs(points[:, 1] - 0.45))
+
+    assert Avoidance("robot-5", 0.30, walls).refuge(HERE, WAY, [robot(1, 5.0, 0.0)]) is None
+
+
 @pytest.mark.parametrize(
     ("gap", "speed"),
     [(SOCIAL, 0.5), (2.0, 0.5), (PERSONAL, CREEP), (0.1, CREEP), (0.825, (0.5 + CREEP) / 2)],

@@ -3,6 +3,7 @@
 import itertools
 from typing import Any, NamedTuple
 
+import numpy as np
 import pytest
 
 from dva_sim.agents.robot.command_queue import EACH, LIMIT, OTHERS, CommandQueue, Letter, Standing
@@ -107,6 +108,17 @@ def test_what_the_holder_asks_for_comes_before_its_commands_that_wait():
     assert bench.done == [b"<SetTeleOp>0", b"stop"]
 
 
+@pytest.mark.parametrize(("latest_wins", "done"), [(True, [0, 4]), (False, [0, 1, 2, 3, 4])])
+def test_of_published_commands_the_newest_or_all_wait(latest_wins, done):
+    bench = Bench()
+    bench.inbox.latest_wins = latest_wins
+    for number in range(5):
+        bench.inbox.published(b"%d" % number)
+    bench.clock.run(1.0)
+    assert bench.done == [b"%d" % number for number in done]
+    assert bench.inbox.superseded == 5 - len(done)
+
+
 def test_a_queue_that_one_peer_has_filled_takes_what_another_sends():
     bench = Bench()
     for number in range(LIMIT + 50):
@@ -129,7 +141,7 @@ def test_what_is_refused_when_it_arrives_takes_no_time_and_no_place():
     assert (bench.inbox.longest, bench.inbox.overflowed) == (1, 0)
 
 
-SERVICE = 0.05
+SERVICE, REST, AFTER_HOLDER = 0.05, 4, 1.0  # [s], in times of the service, [s]
 
 
 @pytest.mark.parametrize("others", [1, 20])
@@ -193,6 +205,8 @@ def test_who_holds_a_robot_and_says_nothing_does_not_silence_strangers():
         bench.ask(b"%d" % number, peer=f"s {number}")
     bench.clock.run(4 * 1.26)
     assert len(bench.done) == 4
+    pauses = np.diff(list(bench.times.values()))
+    assert pauses == pytest.approx(SERVICE + REST * SERVICE + AFTER_HOLDER)
 
 
 def test_strangers_have_their_turns_however_much_the_holder_sends():

@@ -5,8 +5,10 @@ import math
 import pytest
 from helpers.wording import unnamed
 
+from dva_sim.agents.robot.battery import BatteryProfile
 from dva_sim.agents.robot.command_queue import ServiceLaw
 from dva_sim.agents.robot.profile import RobotProfile, load_robot
+from dva_sim.agents.robot.sensors import SensorConfig
 from dva_sim.kernel.config import validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.drives import DriveSpec
@@ -15,6 +17,11 @@ from dva_sim.worlds.drives import DriveSpec
 def test_the_service_robot_is_what_the_physics_has_by_itself():
     assert load_robot("servrobot").drive_spec() == DriveSpec()
     assert load_robot("servrobot").processing_s == 0.05
+
+
+@pytest.mark.parametrize("profile", [RobotProfile(), BatteryProfile(), SensorConfig(name="lidar")])
+def test_what_is_given_by_default_is_what_a_file_could_say(profile):
+    assert type(profile).model_validate(profile.model_dump()) == profile
 
 
 def test_the_model_car_is_slow_to_answer_and_cannot_turn_on_the_spot():

@@ -87,6 +87,13 @@ def test_while_somebody_drives_a_stranger_costs_time_only_if_it_may_be_the_next_
     assert answers.codes[-1] == m.NOT_PERMITTED
 
 
+def test_the_motors_of_a_driven_robot_follow_the_set_point_of_its_driver():
+    dva, _ = driving("req-rep")
+    robot = dva.field.robots[ROBOT]
+    assert robot.set_point.speed > 0.1
+    assert robot.body.asked[:2] == pytest.approx(robot.set_point[:2])
+
+
 def test_what_is_refused_is_counted_with_its_reason(dva, robot):
     answers = Answers(robot)
     answers.ask(m.PermissionRevocation(ROBOT, OPERATOR, 1))
