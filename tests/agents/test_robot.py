@@ -21,9 +21,8 @@ class Answers(list[m.Reply]):
     def __init__(self, robot: RobotAgent) -> None:
         self._robot, self._number = robot, 0
 
-    def ask(self, body: m.Body, source: str = STRANGER) -> None:
+    def ask(self, body: m.Body, source: str = STRANGER, session: int = 0) -> None:
         self._number += 1
-        session = None if isinstance(body, m.Heartbeat) else 0
         self.give(encode(m.Message(ROBOT, self._number, source, "12:00:00", session, body)))
 
     def give(self, data: bytes) -> None:
@@ -85,6 +84,19 @@ def test_while_somebody_drives_a_stranger_costs_time_only_if_it_may_be_the_next_
     assert (answers.codes == [m.NOT_PERMITTED]) is at_once
     dva.run_for(10.0)
     assert answers.codes[-1] == m.NOT_PERMITTED
+
+
+@pytest.mark.invariant("S5")
+@pytest.mark.parametrize(("holder", "code"), [(OPERATOR, m.OK), (STRANGER, m.NOT_PERMITTED)])
+def test_who_starts_before_the_robot_knows_of_the_permission_waits_for_the_dvas_word(
+    dva, robot, holder, code
+):
+    dva.sessions[ROBOT] = m.PermissionGrant(holder, "teleoperation", 1)
+    answers, before = Answers(robot), robot.device.recorder.counters[ASKED]
+    answers.ask(m.StartTeleOp(), OPERATOR, session=1)
+    dva.run_for(2.0)
+    assert answers.codes == [code]
+    assert robot.device.recorder.counters[ASKED] == before + 1
 
 
 def test_the_motors_of_a_driven_robot_follow_the_set_point_of_its_driver():

@@ -63,6 +63,24 @@ def test_publications_are_seen_by_the_tap_of_who_hears_them_if_it_wants_them(wor
     assert found == ([(b"n", True, ROBOT)] if wanted else [])
 
 
+@pytest.mark.parametrize("window", [1, 4])
+def test_a_watcher_sees_both_ends_of_each_request_and_of_its_answer(sockets, window):
+    seen = list[tuple[str, bytes, bool]]()
+    sockets.network.watcher = lambda *what: seen.append(what)
+    sockets.serve(ROBOT, echo)
+    assert asked(sockets, b"a", b"b", window=window) == [b"re: a", b"re: b"]
+    for question in (b"a", b"b"):
+        answer = b"re: " + question
+        assert [(node, sent) for node, data, sent in seen if data == question] == [
+            (PHONE, True),
+            (ROBOT, False),
+        ]
+        assert [(node, sent) for node, data, sent in seen if data == answer] == [
+            (ROBOT, True),
+            (PHONE, False),
+        ]
+
+
 def test_without_its_tap_a_node_is_as_before(world):
     seen = tapped(world, ROBOT)
     del world.network.taps[ROBOT]

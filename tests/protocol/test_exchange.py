@@ -2,7 +2,17 @@
 
 import pytest
 
-from dva_sim.protocol.exchange import Hearing, Nuisances, ReplyCache, key_of
+from dva_sim.protocol.exchange import (
+    A_DAY,
+    LOW_BITS,
+    Hearing,
+    Nuisances,
+    Outbox,
+    ReplyCache,
+    is_absurd,
+    key_of,
+)
+from dva_sim.protocol.messages import Heartbeat
 
 KEYS = [key_of(None, b"request %d" % number) for number in range(100)]
 
@@ -71,11 +81,22 @@ def test_who_stops_is_read_again_ten_seconds_later_and_answered_soon_after():
 
 def test_a_good_message_halves_what_is_held_against_a_peer():
     heard = Nuisances()
-    for _ in range(40):
+    for _ in range(80):
+        heard.bad("mixed", 0.0)
+    heard.good("mixed", 0.0)
+    assert heard.hearing("mixed", 1.9) is Hearing.READ  # of forty, ten a second are forgiven
+    heard.good("mixed", 1.9)
+    assert heard.hearing("mixed", 1.9) is Hearing.ANSWERED
+
+
+def test_what_is_left_against_a_peer_after_a_good_message_still_counts():
+    heard = Nuisances()
+    for _ in range(3):
+        heard.bad("mixed", 0.0)
+    heard.good("mixed", 0.0)  # one and a half are left
+    for _ in range(19):
         heard.bad("mixed", 0.0)
     assert heard.hearing("mixed", 0.0) is Hearing.READ
-    heard.good("mixed", 0.0)
-    assert heard.hearing("mixed", 0.0) is Hearing.ANSWERED
 
 
 def test_no_more_peers_are_remembered_than_stated():
@@ -83,3 +104,31 @@ def test_no_more_peers_are_remembered_than_stated():
     for peer in range(5000):
         heard.bad(peer, 0.0)
     assert len(heard._counts) == Nuisances.PEERS
+
+
+# --- sessions ------------------------------------------------------------------------------
+
+HIGHEST = 2**32 - 1  # count of sessions
+
+
+@pytest.mark.parametrize(
+    ("count", "known", "absurd"),
+    [
+        (1, 0, False),
+        (HIGHEST - A_DAY, 0, False),
+        (HIGHEST - A_DAY + 1, 0, True),  # a forged one must not leave the DVA without room
+        (1_000 + A_DAY, 1_000, False),
+        (1_001 + A_DAY, 1_000, True),
+        (1, 1_000, False),
+    ],
+)
+def test_a_session_is_absurd_that_no_dva_can_have_reached_within_a_day(count, known, absurd):
+    for low in (0, HIGHEST):
+        newest = known << LOW_BITS | low if known else 0
+        assert is_absurd(count << LOW_BITS | low, newest) is absurd
+
+
+def test_in_virtual_time_a_run_begins_at_noon():
+    outbox = Outbox("02:00:00:01:00:01")
+    stamps = [outbox.message("", Heartbeat(), now).timestamp for now in (0.0, 59.99, 43_200.0)]
+    assert stamps == ["12:00:00", "12:00:59", "00:00:00"]

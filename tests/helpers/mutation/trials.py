@@ -61,8 +61,8 @@ def notice(mutant: Mutant, root: Path, only_quick: bool) -> str:
 
     The tests of its module come first; whole programs are started only if no other test notices.
     """
-    near, others = tests_of(mutant, root)
-    rounds = [(near, QUICK), (others, QUICK), ([] if only_quick else near + others, PROGRAMS)]
+    every = tests_of(mutant, root)
+    rounds = [(tests, marks) for marks in (QUICK, PROGRAMS)[: 2 - only_quick] for tests in every]
     names = (_notice(mutant, root, tests, marks) for tests, marks in rounds if tests)
     return next(filter(None, names), "")
 
