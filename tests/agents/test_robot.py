@@ -1,4 +1,4 @@
-"""A robot's program: what it admits, refuses and counts, whoever sends it."""
+"""Requests at a robot: which it admits, refuses and counts."""
 
 import pytest
 from helpers.dva.scripted_dva import OPERATOR, ROBOT, PretendedDva, driving

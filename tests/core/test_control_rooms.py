@@ -17,7 +17,9 @@ from helpers.wording import unnamed
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.audit import Fact
+from dva_sim.core.event_status import status_of
 from dva_sim.core.events import Event, State
+from dva_sim.core.handling import Choice, Handling
 from dva_sim.core.questions import Questions
 from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
@@ -475,6 +477,15 @@ def test_who_only_asks_consumes_no_random_numbers():
 
 
 # --- lists ---------------------------------------------------------------------------------------
+
+
+def test_whatever_people_are_called_and_write_the_status_of_an_event_is_a_message():
+    event = Event(1, "fire", east(12), 0.5)
+    choice = Choice(ROOM, "n" * 300, "assign", 1.0, "r" * 900)
+    event.handling = Handling(last=choice, acknowledged=choice, note="n" * 900)
+    content = m.EventList((status_of(event, None, 2.0),))
+    message = m.Message(ROOM, 1, DVA, "12:00:00", 0, m.Reply(1, m.OK, "", content))
+    assert decode(encode(message)) == message
 
 
 def test_the_list_is_told_in_parts_and_none_is_missing():

@@ -3,7 +3,15 @@
 from dataclasses import replace
 
 import pytest
-from helpers.dva.dispatch_office import GUARD, OPERATOR, OTHER_GUARD, OTHER_ROBOT, ROBOT, Office
+from helpers.dva.dispatch_office import (
+    GUARD,
+    OPERATOR,
+    OTHER_GUARD,
+    OTHER_ROBOT,
+    ROBOT,
+    Office,
+    east,
+)
 from helpers.wording import counted
 
 from dva_sim.core.assignments import Rules
@@ -155,6 +163,8 @@ def test_who_is_nearly_there_when_it_says_so_has_arrived_with_its_next_position(
     assert office.event().state is State.ASSIGNED
     office.report_place(GUARD, 2.5, 12.0)
     assert (office.event().state, office.event().times["arrived"]) == (State.ON_SCENE, 12.0)
+    office.report_place(GUARD, 4.0, 12.5)  # from then on it is where it says
+    assert office.core.registry.entries[GUARD].position == east(4.0)
     for now in range(13, 200):
         assert office.tick(float(now)) == []
 

@@ -316,6 +316,43 @@ def test_a_process_that_is_killed_forgets_nothing_that_it_has_said(file):
 # --- files that do not work ----------------------------------------------------------------
 
 
+DRIVE, BOTH = (m.PermissionRequest(ROBOT, level) for level in ("teleoperation", "both"))
+HEAT, GAS = (m.PermissionRequest(ROBOT, "sensors", (sensor,)) for sensor in ("heat_flux", "gas"))
+
+
+@pytest.mark.parametrize(
+    ("kept", "wish"),
+    [
+        ([DRIVE], BOTH),  # each ends the one that it takes the place of
+        ([HEAT], GAS),
+        ([DRIVE, HEAT], GAS),
+        ([DRIVE, HEAT], BOTH),
+        ([HEAT], DRIVE),
+        ([], DRIVE),
+    ],
+)
+def test_what_cannot_be_kept_is_withdrawn_and_what_it_replaced_holds_again(file, kept, wish):
+    office, memory = Office(), Store(file)
+    permissions = office.core.sessions.permissions
+    permissions.draw = iter(range(100)).__next__
+    for request in kept:
+        office.say(OPERATOR, request)
+    assert keep(office, memory) is None
+    before = set(permissions.all())
+
+    def fail() -> None:
+        raise sqlite3.OperationalError("database or disk is full")
+
+    memory.between_writes = fail
+    assert office.say(OPERATOR, wish)[0].code == m.OK
+    assert set(permissions.all()) != before
+    problem = keep(office, memory)
+    assert problem is not None
+    assert problem.endswith("disk is full")
+    assert set(permissions.all()) == before
+    memory.close()
+
+
 def test_a_full_disk_is_one_line_and_work_goes_on_and_is_caught_up_with(file):
     office, memory = Office(), Store(file)
     keep(office, memory)
