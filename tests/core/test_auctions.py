@@ -58,6 +58,12 @@ def test_arrival_counts_from_when_the_bid_came(office):
     assert office.tick(2.0) == [Send(OTHER_GUARD, AWARD)]
 
 
+def test_a_policy_sees_how_far_off_each_arrival_is_now(office):
+    office.bids(GUARD, 30.0, 0.5)
+    offers = office.core.dispatcher.auctions.bids([office.event()], [OTHER_GUARD, GUARD], 1.5)
+    assert np.array_equal(offers, [[np.nan, 29.0]], equal_nan=True)
+
+
 def test_a_bid_that_comes_too_late_is_refused(office):
     assert office.bids(GUARD, 5.0, 2.1)[0].code == m.UNKNOWN_EVENT
 
