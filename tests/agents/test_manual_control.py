@@ -14,7 +14,16 @@ from dva_sim.agents.robot.controller import (
     Mode,
     RobotController,
 )
-from dva_sim.agents.robot.decision_log import ASKS, LET_GO, TAKEN_BY_HAND, DecisionLog, replay
+from dva_sim.agents.robot.decision_log import (
+    ASKS,
+    LET_GO,
+    PRESSED,
+    RELEASES_UNKNOWN,
+    TAKEN_BY_HAND,
+    DecisionLog,
+    replay,
+)
+from dva_sim.agents.robot.emergency_latch import EmergencyLatch
 from dva_sim.protocol import messages as m
 
 DVA, ROBOT, ANA = (f"02:00:00:00:00:0{i}" for i in range(1, 4))
@@ -157,3 +166,30 @@ def test_a_trace_of_a_robot_that_was_in_a_hand_is_replayed_to_the_same_decisions
     assert [then.code for _, then, _ in asked][-2:] == [m.BUSY, m.OK]
     assert len(asked) == 5 + 3
     assert all(then == now for _, then, now in asked)
+
+
+def test_a_trace_of_a_robot_whose_dva_knows_no_releases_is_replayed_to_the_same_decisions(
+    robot, tmp_path
+):
+    robot.latch = EmergencyLatch(None)
+    log = DecisionLog(tmp_path / "robot.trace.jsonl", robot)
+
+    def receive(source: str, body: m.Body, now: float) -> int:
+        message = m.Message(ROBOT, int(now), source, "12:00:00", 7, body)
+        decision = robot.handle(message, now, now, False)
+        log.decided(message, now, now, False, decision)
+        return decision.code
+
+    receive(DVA, m.PermissionGrant(ANA, "both", 7), 1.0)
+    log.happened(ASKS, 1.0)
+    robot.inquiry.next(1.0)
+    receive(DVA, confirmation(m.PermissionGrant(ANA, "both", 7)), 2.0)
+    robot.stop(3.0)
+    log.happened(PRESSED, 3.0)
+    assert receive(ANA, m.StartTeleOp(), 4.0) == m.BUSY
+    robot.latch.take_refusal()
+    log.happened(RELEASES_UNKNOWN, 5.0)
+    assert receive(ANA, m.StartTeleOp(), 6.0) == m.OK
+    log.close()
+    codes = [(then.code, now.code) for _, then, now in replay(tmp_path / "robot.trace.jsonl")]
+    assert codes == [(code, code) for code in (m.OK, m.OK, m.BUSY, m.OK)]

@@ -3,6 +3,7 @@
 import pytest
 from helpers.dva.scripted_dva import OPERATOR, ROBOT, PretendedDva, driving
 
+from dva_sim.agents.device import STATUS
 from dva_sim.agents.robot.command_queue import EACH
 from dva_sim.agents.robot.inquiry import BURST, RATE
 from dva_sim.agents.robot.robot import RobotAgent
@@ -104,6 +105,25 @@ def test_the_motors_of_a_driven_robot_follow_the_set_point_of_its_driver():
     robot = dva.field.robots[ROBOT]
     assert robot.set_point.speed > 0.1
     assert robot.body.asked[:2] == pytest.approx(robot.set_point[:2])
+
+
+def test_a_robot_that_cannot_be_driven_publishes_nothing_until_it_can_and_says_why(dva, robot):
+    heard = list[bytes]()
+    dva.network.subscribe(dva.device.id_tag, ROBOT, STATUS, heard.append)
+    robot.withdraw("its drive does not answer")
+    dva.run_for(1.0)
+    heard.clear()  # that it is idle
+    answers = Answers(robot)
+    dva.sessions[ROBOT] = m.PermissionGrant(OPERATOR, "teleoperation", 1)
+    answers.ask(m.StartTeleOp(), OPERATOR, session=1)
+    dva.run_for(5.0)
+    assert [(reply.code, reply.text) for reply in answers] == [
+        (m.BUSY, "its drive does not answer")
+    ]
+    assert heard == []
+    robot.return_to_service()
+    dva.run_for(3.0)
+    assert heard
 
 
 def test_what_is_refused_is_counted_with_its_reason(dva, robot):
