@@ -606,5 +606,10 @@ def test_who_may_read_is_asked_when_it_subscribes(bench):
     assert bench.say(RUI, m.DevSub("smoke", 1.0), session=9).code == m.OK
     newer = bench.say(RUI, m.DevSub("smoke", 1.0), session=10)
     assert (newer.code, newer.waits) == (m.BAD_SESSION, True)  # the DVA may have given a new one
+    assert bench.robot.inquiry.next(10.0) == m.GetGrant(RUI, "sensors")
+    hear(bench.robot, confirmation(None))
+    assert bench.say(RUI, m.DevSub("smoke", 1.0), session=9).code == m.NOT_PERMITTED
+    assert bench.robot.inquiry.next(20.0) == m.GetGrant(RUI, "sensors")
+    hear(bench.robot, confirmation(grant))
     bench.say(DVA, m.PermissionRevocation(ROBOT, RUI, 9))
     assert bench.say(RUI, m.DevSub("smoke", 1.0), session=9).code == m.NOT_PERMITTED

@@ -86,6 +86,6 @@ def test_a_score_is_the_share_of_noticed_faults_among_those_that_change_somethin
 def test_every_fault_that_changes_nothing_is_one_and_has_a_reason():
     listed = scores.equivalents()
     files = {name.partition("::")[0] for name in listed}
-    found = {fault.name for file in files for fault in Sites(file, (ROOT / file).read_bytes()).found}
-    assert listed.keys() - found == set()
+    sites = [Sites(file, (ROOT / file).read_bytes()) for file in files]
+    assert listed.keys() <= {fault.name for site in sites for fault in site.found}
     assert all(len(reason) > 10 for reason in listed.values())

@@ -249,3 +249,9 @@ def test_a_schema_in_the_working_folder_does_not_replace_the_programs(tmp_path, 
     (tmp_path / "protocol" / "dva.xsd").write_text("<anything/>")
     monkeypatch.chdir(tmp_path)
     assert tmp_path not in schema_file().parents
+
+
+@pytest.mark.parametrize("kind", [m.DeviceList, m.EventList, m.SensorList])
+def test_a_list_of_nothing_is_a_list(kind):
+    said = message(m.Reply(1, m.OK, "", kind(())))
+    assert decode(encode(said)) == said

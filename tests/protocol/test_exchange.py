@@ -132,3 +132,6 @@ def test_in_virtual_time_a_run_begins_at_noon():
     outbox = Outbox("02:00:00:01:00:01")
     stamps = [outbox.message("", Heartbeat(), now).timestamp for now in (0.0, 59.99, 43_200.0)]
     assert stamps == ["12:00:00", "12:00:59", "00:00:00"]
+    outbox.set_clock(-90.0)  # by somebody who finds it fast
+    outbox.set_clock(-30.0)
+    assert outbox.message("", Heartbeat(), 0.0).timestamp == "11:58:00"

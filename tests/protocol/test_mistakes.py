@@ -65,6 +65,7 @@ def test_invalid_samples_are_refused_with_a_place_and_what_would_be_right():
         (changed(b"<msg>", b"so <msg>"), (2, 1), "no element begins here"),
         (b"\xef\xbb\xbf" + GOOD, (1, 1), "byte order mark; should be UTF-8 without one"),
         (GOOD.decode().encode("utf-16"), (1, 1), "byte order mark; should be UTF-8 without one"),
+        (changed(b"0.5<", b"so<").ljust(8192), (11, 9), "should be a number from -100 to 100"),
         (b"", (1, 1), "is empty"),
         (b" \n ", (1, 1), "is empty"),
         (b" " * 8192 + GOOD, (1, 8193), "at most 8192 bytes"),
