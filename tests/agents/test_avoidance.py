@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from dva_sim.agents.robot.avoidance import CREEP, SOCIAL, Avoidance, Blocked, Lane, pace_among
+from dva_sim.agents.robot.avoidance import (
+    CREEP,
+    REFUGE,
+    SOCIAL,
+    SPARE,
+    Avoidance,
+    Blocked,
+    Lane,
+    pace_among,
+)
 from dva_sim.agents.robot.collision_guard import KEEP_ROBOT, PERSONAL, Nearby
 from dva_sim.agents.route_following import Route
 
@@ -113,6 +122,14 @@ WAY = np.stack([np.arange(-4.0, 8.0, 0.2), np.zeros(60)], 1)
 def test_who_stands_at_a_wall_already_still_finds_a_refuge():
     beside = (2.0, HALF - 0.30 - 0.005)
     assert corridor().refuge(beside, WAY, [robot(1, 5.0, 0.0, -0.5)]) is not None
+
+
+@pytest.mark.parametrize(("wide", "finds"), [(REFUGE - 0.3, True), (REFUGE + 0.3, False)])
+def test_no_refuge_is_sought_far_away(wide, finds):
+    """A way so wide that a refuge beside it is this far off."""
+    wide -= 0.30 + SPARE
+    others = [robot(1, 5.0, 0.0)._replace(radius=wide)]
+    assert (corridor(half=9.0).refuge((2.0, 0.0), WAY, others) is not None) is finds
 
 
 def test_no_refuge_is_behind_a_wall():

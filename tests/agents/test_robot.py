@@ -6,6 +6,7 @@ from helpers.dva.scripted_dva import OPERATOR, ROBOT, PretendedDva, driving
 from dva_sim.agents.device import STATUS
 from dva_sim.agents.robot.command_queue import EACH
 from dva_sim.agents.robot.inquiry import BURST, RATE
+from dva_sim.agents.robot.manual_control import ManualControl
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.network.messaging import Request
 from dva_sim.network.patterns import load_pattern
@@ -124,6 +125,11 @@ def test_a_robot_that_cannot_be_driven_publishes_nothing_until_it_can_and_says_w
     robot.return_to_service()
     dva.run_for(3.0)
     assert heard
+
+
+def test_a_hand_takes_a_robot_once_and_another_is_told_whose_it_is(dva, robot):
+    codes = [ManualControl(robot).take(who).code for who in ("ana", "ana", "rui")]
+    assert codes == [m.OK, m.OK, m.BUSY]
 
 
 def test_what_is_refused_is_counted_with_its_reason(dva, robot):

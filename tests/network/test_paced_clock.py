@@ -26,6 +26,12 @@ def test_time_goes_by_as_on_the_wall():
     assert passed(clock, clock.now + 0.3) >= 0.29
 
 
+def test_a_clock_that_begins_is_not_late():
+    clock = PacedClock()
+    clock.go()
+    assert clock.worst_lag() == 0.0
+
+
 def test_twenty_times_as_fast_as_on_the_wall():
     clock = PacedClock(20.0)
     happened = []
