@@ -4,6 +4,9 @@ import asyncio
 import gc
 import time
 
+import pytest
+
+from dva_sim.network.middleware.ends import TransportError
 from dva_sim.network.middleware.event_loop import LoopEnd
 
 
@@ -43,4 +46,17 @@ def test_the_failure_of_what_has_begun_ends_nothing_else():
         end.begin(work(number))
         end.serve(time.monotonic())
     assert done == [0, 1, 2]
+    end.close()
+
+
+def test_who_is_not_there_is_tried_until_the_time_is_up():
+    end, tries = End(), list[int]()
+
+    async def connect() -> None:
+        tries.append(1)
+        raise ConnectionRefusedError
+
+    with pytest.raises(TransportError, match="does not answer"):
+        end.reach(connect, time.monotonic() + 0.25)
+    assert len(tries) > 1
     end.close()
