@@ -16,6 +16,7 @@ NUMBER: Final = 2
 LABEL: Final = f"control-room-{NUMBER}"
 ROLE: Final = "dispatch"
 THINKS_S: Final = 1.0, 20.0  # from the first news of an emergency to its release
+LOOKS_AGAIN_S: Final = 15.0  # whether a robot goes on that the DVA has let go
 
 
 class Releaser:
@@ -62,11 +63,17 @@ class Releaser:
             )
 
     def _decide(self, robot: str, tick: int) -> None:
-        """Release a robot; what was lost is decided on again with its next news."""
+        """Release a robot; it is decided on again if that was lost, with or without a word."""
 
-        def forget(reply: m.Reply | None = None) -> None:
-            if (reply is None or reply.code != m.OK) and self._decided.get(robot) == tick:
+        def forget() -> None:
+            if self._decided.get(robot) == tick:
                 del self._decided[robot]
 
+        def answered(reply: m.Reply) -> None:
+            if reply.code != m.OK:
+                forget()
+            else:  # a DVA that is killed before it can write forgets it
+                self.room.device.clock.call_after(LOOKS_AGAIN_S, forget)
+
         if self._decided.get(robot) == tick:
-            self.release(robot, forget, forget)
+            self.release(robot, answered, forget)

@@ -458,9 +458,10 @@ class EventLedger:
             if not known and not last - STEP_SLACK <= when <= now + STEP_SLACK:
                 yield "S7", f"event {event.number}: {step} is noted {now - when:.1f} s too late"
         self._seen[event.number] = new
-        if event.waits_for is not None and now - new.waits > rules.escalate_after + PENDING_SLACK:
+        waits = event.waits_for is not None
+        if waits and now - new.waits > rules.escalate_after + PENDING_SLACK:
             yield "S6", f"event {event.number} is {event.state} after {now - new.waits:.0f} s"
-        if last == -math.inf and old is not None and new.since == old.since:
+        if waits and last == -math.inf and old is not None and new.since == old.since:
             later = event.waiting_since - max(new.waits, old.began)
             if later > PENDING_SLACK:
                 yield "S6", f"a restart gives event {event.number} {later:.0f} s more to wait"
