@@ -341,6 +341,12 @@ LATER_MUTANTS: Final[dict[str, Mutant]] = {
         "dva_sim.core.store:Store._recall",
         _waits_longer,
     ),
+    "arrives-from-afar": Mutant(
+        "S7",
+        "whoever has the order has arrived when somebody else finds something",
+        "dva_sim.core.orders:Orders._was_near",
+        afterwards(lambda self, near, event, device: None if near else True),
+    ),
     "confirmed-on-arrival": Mutant(
         "S7",
         "the time of a confirmation is that of the arrival",
