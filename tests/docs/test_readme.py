@@ -92,12 +92,12 @@ def test_means_of_the_map_are_those_of_the_kept_answer_and_called_means():
     assert "extrapolated" in SECTION
 
 
-def test_the_limit_of_paced_requests_is_the_end_of_a_band():
-    assert KEPT["contrast"] == ["paced", "latest-wins"]
-    worst = max(row["high"] for row in KEPT["rows"])
-    assert f"at most {worst:.0f} s more than latest-wins" in SECTION
-    manifest = json.loads((ROOT / "experiments/answers/which-messaging.manifest.json").read_text())
-    assert manifest["study"]["answer"]["within"] == {"steering": "throughout"}
+def test_limits_are_ends_of_bands_over_all_ways_of_steering():
+    at = KEPT["beside"][0].index("behind at most [s]")
+    for pattern, text in (("paced", "cost at most {} s"), ("REQ/REP", "REQ/REP: {} s")):
+        ends = {row[0]: float(row[at]) for row in KEPT["beside"] if row[1] == pattern}
+        assert max(ends, key=ends.__getitem__) == "very far (1 s)"
+        assert text.format(round(max(ends.values()))) in SECTION
 
 
 def test_most_drives_by_publishing_never_arrive_on_the_narrow_links():

@@ -47,6 +47,7 @@ class ChoiceMap:
             `smallest`, `(g, c, m)`. The band, paired by person and trial, is simultaneous for all
             differences in a situation, so it stays valid for the best choice found.
         is_same: True where that band excludes a regret above `smallest`, `(g, c, m)`.
+        high: Upper end of that band, `(g, c, m)`; 0 for the best choice.
         smallest: Smallest difference that matters; 0 where none was declared.
         most: Value of runs that never ended; infinite if the measure is unbounded.
         outside: True for cells beyond the delays at which people were watched, `(g, c, m)`.
@@ -65,6 +66,7 @@ class ChoiceMap:
     regret: Floats
     is_clear: NDArray[np.bool_]
     is_same: NDArray[np.bool_]
+    high: Floats
     smallest: float
     most: float
     outside: NDArray[np.bool_]
@@ -158,7 +160,7 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
     if not np.isfinite(loss).all():
         return None
     smallest = view.smallest_effect or 0.0
-    is_clear, is_same = _judged(losses, loss.argmin(axis=1), smallest)
+    is_clear, is_same, high = _judged(losses, loss.argmin(axis=1), smallest)
     return ChoiceMap(
         measure=view.measure,
         choice=view.line,
@@ -168,6 +170,7 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
         regret=loss - loss.min(axis=1, keepdims=True),
         is_clear=is_clear,
         is_same=is_same,
+        high=high,
         smallest=smallest,
         most=view.possible[1] if is_loss else np.inf,
         outside=_outside(view, axes),
@@ -190,16 +193,18 @@ def _cells(part: RunGrid, grid: NDArray[Any], axes: tuple[Factor, ...]) -> NDArr
 
 def _judged(
     losses: Floats, best: NDArray[np.intp], smallest: float
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return where a choice is clearly worse than the best, and where it is as good."""
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
+    """Return where a choice is clearly worse than the best, where as good, and how far at most."""
     clear, same = np.zeros((2, *losses.shape[:3]), dtype=bool)
+    ends = np.zeros(losses.shape[:3])
     for g in range(len(losses)):
         mean, low, high = _differences(losses[g])
         for c, m in np.ndindex(clear.shape[1:]):
             to_best = c, best[g, m], m
             clear[g, c, m] = low[to_best] > 0.0 and mean[to_best] > smallest
             same[g, c, m] = c == best[g, m] or high[to_best] <= smallest
-    return clear, same
+            ends[g, c, m] = 0.0 if c == best[g, m] else high[to_best]
+    return clear, same, ends
 
 
 def _differences(losses: Floats) -> tuple[Floats, Floats, Floats]:

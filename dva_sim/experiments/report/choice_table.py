@@ -75,6 +75,7 @@ def beside_table(found: ChoiceMap, part: str) -> CellTable:
         factor_name(found.given.name),
         factor_name(found.choice.name),
         f"median [{found.unit}]" if found.unit else "median",
+        f"behind at most [{found.unit}]" if found.unit else "behind at most",
         "contacts",
         "in safe stop [%]",
         *(["move and wait [%]"] if found.waiting is not None else []),
@@ -82,10 +83,11 @@ def beside_table(found: ChoiceMap, part: str) -> CellTable:
     rows = []
     for g, c in np.ndindex(found.is_worse.shape):
         stops = 100.0 * found.beside["stop_share"][g, c]
-        cells = [found.median[g, c], found.beside["contacts"][g, c], stops]
+        cells = [found.beside["contacts"][g, c], stops]
         waits = [] if found.waiting is None else [regret_number(100.0 * float(found.waiting[g, c]))]
         choice = level_name(found.choice.name, found.choice.levels[c], short=True)
-        rows.append([situation_name(found, g), choice, *map(_range, cells), *waits])
+        medians, behind = _range(found.median[g, c]), _behind(found, g, c)
+        rows.append([situation_name(found, g), choice, medians, behind, *map(_range, cells), *waits])
     return CellTable(part, heads, 2, rows, note=note("beside", **facts_of(found)))
 
 
@@ -101,6 +103,12 @@ def facts_of(found: ChoiceMap) -> dict[str, Any]:
         "has_waiting": found.waiting is not None,
         "cut_off": quantity(found.most, found.unit) if found.never.any() else "",
     }
+
+
+def _behind(found: ChoiceMap, g: int, c: int) -> str:
+    """Greatest upper end of the bands of the regret."""
+    is_lost = found.never[g, c].any() and not found.is_lost[g]
+    return NEVER if is_lost else regret_number(max(0.0, float(found.high[g, c].max())))
 
 
 def _range(values: Floats) -> str:

@@ -255,7 +255,11 @@ def test_beside_the_regret_stand_the_loss_itself_and_what_drives_are_like():
     assert found.waiting[far] == pytest.approx([1.0, 1.0, 1.0])
     assert found.waiting[found.given.levels.index("near")] == pytest.approx([1 / 6] * 3)
     rows = {tuple(row[:2]): row[2:] for row in beside_table(found, "drive").rows}
-    assert rows["far", "tell"][1:] == ["2.5", "0.0 to 25", "100"]
+    assert rows["far", "tell"][2:] == ["2.5", "0.0 to 25", "100"]
+    ask = found.choice.levels.index("ask")
+    assert (found.high[far, ask] >= found.regret[far, ask]).all()
+    assert float(rows["far", "ask"][1]) == pytest.approx(found.high[far, ask].max(), abs=1.0)
+    assert (rows["far", "tell"][1], rows["narrow", "tell"][1]) == ("0.0", "never done")
     assert len(rows) == len(LINKS) * len(CHOICES)
 
 
