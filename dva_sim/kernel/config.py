@@ -117,13 +117,19 @@ def keys_meant(path: KeyPath, value: Any, *models: Any) -> list[str]:
 
 def fields_at(model: Any, path: KeyPath) -> Mapping[str, Any]:
     """The fields of the model that stands at `path` inside `model`, by name."""
-    for step in path:
+    for number, step in enumerate(path, 1):
         if isinstance(step, int):
             continue
         info = _fields(model).get(step)
         if info is not None:  # else a key that the user chose, inside a mapping to models
-            model = model_in(info.annotation)
+            is_item = isinstance(next(iter(path[number:]), None), int)
+            model = (None if is_item else _keyed(info)) or model_in(info.annotation)
     return _fields(model)
+
+
+def _keyed(info: Any) -> Any:
+    """Return the model of a list that may be given as a mapping instead; None: it may not."""
+    return next((m.keyed for m in info.metadata if hasattr(m, "keyed")), None)
 
 
 def model_in(annotation: Any) -> Any:

@@ -219,6 +219,11 @@ class _Timed(Model[TimedScenario]):
         "responders": of_timed.RESPONDER_COLUMNS,
     }
     build = staticmethod(timed.build)
+
+    def contradictions(self, scenario: TimedScenario) -> list[str]:
+        left_out = scenario.events_left_out
+        return [f"events: {left_out}"] if left_out else []
+
     rehearse = staticmethod(timed.rehearse_timed)
     simulate = staticmethod(timed.simulate_timed)
 

@@ -93,8 +93,12 @@ def doubts(kind: FileKind, document: Document) -> list[str]:
 
 
 def notes(kind: FileKind, document: Document) -> str:
-    """Describe what a valid study promises less of than it prints, in a line."""
-    return "; ".join(coverage.remarks(load_study(document.file))) if kind.model is Study else ""
+    """Describe what a valid file holds, or promises less of than it prints, in a line."""
+    if kind.model is Study:
+        return "; ".join(coverage.remarks(load_study(document.file)))
+    if kind.model in (Scenario, TimedScenario):
+        return str(model_of(document).build(document, {}).events_summary)
+    return ""
 
 
 def _without_a_place(document: Document) -> Iterator[str]:

@@ -131,10 +131,12 @@ def _hearsay(
 
 
 def _place(event: EventConfig, site: Site, rng: np.random.Generator) -> tuple[float, float]:
-    """A free place in the event's room; without one, in some room that is watched for its kind.
+    """Its position; else a free place in its room, or in some room that is watched for its kind.
 
     Where bases are everywhere it is the place that was found to be farthest from them.
     """
+    if event.position is not None:
+        return event.position
     kind = find_hazard(event.kind)
     rooms: list[str | None] = [event.room] if event.room else _watched_rooms(kind, site)
     bases = [*site.robot_bases, *site.guard_posts]

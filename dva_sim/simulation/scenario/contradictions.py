@@ -189,8 +189,10 @@ def _of_team(scenario: Scenario) -> Iterator[str]:
 
 
 def _of_time(scenario: Scenario) -> Iterator[str]:
-    """Yield what would happen after the end."""
+    """Yield what would happen after the end, or before the beginning."""
     end = scenario.horizon_s
+    if scenario.events_left_out:
+        yield f"events: {scenario.events_left_out}"
     for number, event in enumerate(scenario.events):
         if event.at_s >= end:
             yield (

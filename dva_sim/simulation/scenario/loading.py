@@ -14,6 +14,7 @@ from dva_sim.kernel.config import Fail
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml
+from dva_sim.simulation.scenario.alarms import table_of, why_not, with_events
 from dva_sim.simulation.scenario.parts import EventConfig
 from dva_sim.simulation.scenario.scenario import (
     Scenario,
@@ -46,6 +47,10 @@ _IN_FILES = (
 def locate_files(data: dict[str, Any], folders: Sequence[Path]) -> None:
     """Let a class in a file beside the one that names it be found from anywhere."""
     events = data.get("events")
+    if isinstance(events, str):
+        data["events"] = events = {"table": events}
+    if isinstance(events, dict):
+        _locate_table(events, folders)
     holders = [(data if part is None else data.get(part), key) for part, key in _IN_FILES]
     holders += [(event, "kind") for event in events] if isinstance(events, list | tuple) else []
     for holder, key in holders:
@@ -54,6 +59,14 @@ def locate_files(data: dict[str, Any], folders: Sequence[Path]) -> None:
         beside = [folder / file for folder in folders if colon and resources.is_file(folder / file)]
         if beside and isinstance(holder, dict):
             holder[key] = f"{beside[0]}:{wanted}"
+
+
+def _locate_table(events: dict[str, Any], folders: Sequence[Path]) -> None:
+    """A table lies beside the scenario that names it, or in the working folder."""
+    table = events.get("table")
+    if isinstance(table, str):
+        beside = (folder / table for folder in folders)
+        events["table"] = str(next(filter(resources.is_file, beside), table))
 
 
 def check_names(scenario: Scenario, error: Fail) -> None:
@@ -84,8 +97,21 @@ def check_names(scenario: Scenario, error: Fail) -> None:
     check_strategy(scenario.operator.strategy, scenario.operator.options, error)
     check_policy(scenario.dispatch.policy, scenario.dispatch.options, error)
     for number, event in enumerate(scenario.events):
+        _check_position(scenario, event, ("events", number, "position"), error)
         if event.kind not in KINDS:
             _check_hazard(event, ("events", number), error)
+
+
+def _check_position(scenario: Scenario, event: EventConfig, path: KeyPath, error: Fail) -> None:
+    """Refuse a place where no event can be, or that is in another room."""
+    if event.position is None:
+        return
+    (x, y), site = event.position, site_of(scenario, seed=0)
+    if why := why_not(site, x, y):
+        raise error(f"position ({x:g}, {y:g}) {why}", path)
+    if event.room is not None and (around := site.room_at(x, y)) != event.room:
+        where = f"in {around!r}" if around else "in no room"
+        raise error(f"position ({x:g}, {y:g}) is {where}, not in {event.room!r}", path)
 
 
 def _check_hazard(event: EventConfig, path: KeyPath, error: Fail) -> None:
@@ -175,6 +201,8 @@ def build(
 
 def _complete(scenario: Scenario, error: Fail) -> Scenario:
     """With what follows from the profiles; refuses what does not go together."""
+    if (table := table_of(scenario)) is not None:
+        scenario = with_events(scenario, table, error)
     check_names(scenario, error)
     _check_options(scenario, error)
     check_phone(phone_profile(scenario, error), error)

@@ -5,7 +5,14 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 from dva_sim.agents.control_room.profile import DispatcherProfile, RoleName
 from dva_sim.agents.habits import BystanderHabits, GuardHabits, OperatorHabits
@@ -322,6 +329,7 @@ class EventConfig(Config):
         kind: `fire`, `gas_leak`, `flood`, a class in a file as `mine.py:Mine`, or what an
             installed package offers.
         room: Name of the room; by default the run's seed chooses one.
+        position: Its place x, y [m]; by default the run's seed chooses one in the room.
         at_s: Start time.
         latest_s: Latest start time: if given, the seed draws the start between `at_s` and this.
         reported: True if somebody reports it at once; otherwise detectors must notice it.
@@ -334,12 +342,21 @@ class EventConfig(Config):
 
     kind: str
     room: str | None = None
+    position: tuple[float, float] | None = None
     at_s: NonNegative = 0.0
     latest_s: NonNegative | None = None
     reported: bool = False
     false_alarm: bool = False
     hazard: dict[str, str | AnyNumber] = Field(default_factory=dict)
     reports: Annotated[int, Field(ge=1, le=20)] = 1
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, usual: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Dump a position only where there is one, so that hashes stay the same."""
+        written: dict[str, Any] = usual(self)
+        if self.position is None:
+            written.pop("position", None)
+        return written
 
     @model_validator(mode="after")
     def _in_order(self) -> EventConfig:

@@ -20,6 +20,7 @@ from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml
 from dva_sim.network.connections import Depth, TransportKind, ZeromqConfig
 from dva_sim.network.link import LinkConfig
 from dva_sim.network.patterns import Pattern, load_pattern
+from dva_sim.simulation.scenario.event_table import OrTable, WithTable
 from dva_sim.simulation.scenario.parts import (
     AccessConfig,
     BystanderConfig,
@@ -54,7 +55,7 @@ NEWER = (
 """Keys that came after results were published: a part, or some keys of one."""
 
 
-class Scenario(Config):
+class Scenario(WithTable):
     """Everything one run needs but its seed.
 
     Attributes:
@@ -66,6 +67,7 @@ class Scenario(Config):
         pattern_options: Options of the pattern, such as `{every: 5}` of one that requests now and
             then.
         transport: Transport of the messages: ZeroMQ over TCP, or datagrams.
+        events: List of events, or a table of dated alarms.
         network_depth: Depth of the model of ZeroMQ over TCP: whole messages, exact where nothing is
             lost or queued; TCP segments; or as each link requires.
     """
@@ -93,7 +95,9 @@ class Scenario(Config):
     link: LinkConfig = LinkConfig()
     camera: CameraConfig = CameraConfig()
     disturbance: DisturbanceConfig = DisturbanceConfig()
-    events: Annotated[tuple[EventConfig, ...], Field(min_length=1)] = (EventConfig(kind="fire"),)
+    events: Annotated[tuple[EventConfig, ...], Field(min_length=1), OrTable()] = (
+        EventConfig(kind="fire"),
+    )
     dispatch: DispatchConfig = DispatchConfig()
     access: tuple[AccessConfig, ...] = ()
     dva: DvaConfig = DvaConfig()

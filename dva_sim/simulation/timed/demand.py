@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections import Counter
 from collections.abc import Callable
 from itertools import accumulate, count
 
@@ -13,7 +14,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.timed.distributions import ZERO
 from dva_sim.simulation.timed.draws import Always, Draws, shares, times
 from dva_sim.simulation.timed.incidents import Incident
-from dva_sim.simulation.timed.scenario import EventStream, Severity, TimedScenario
+from dva_sim.simulation.timed.scenario import EventStream, ListedEvent, Severity, TimedScenario
 from dva_sim.simulation.timed.travel import Place, Rooms, Terrain
 
 CALLERS = 32  # devices that report a stream's events in turn, where reports are taken back
@@ -49,21 +50,41 @@ class EventDraws:
 
     def place(self, index: int) -> Place:
         """Return where event number `index` happens."""
-        zone = -1
-        if self._zones:
+        zone, listed = -1, self._listed(index)
+        if listed is not None and listed.position is not None:
+            return self._terrain.exact_place(*listed.position, listed.zone)
+        if listed is not None and listed.zone is not None:
+            zone = self._terrain.zones.index(listed.zone)
+        elif self._zones:
             zone = self._zones[bisect_right(self._bounds, self._zone[index])]
         return self._terrain.event_place(zone, self._x[index], self._y[index])
 
     def true(self, index: int) -> bool:
         """Return True if the event is real."""
+        listed = self._listed(index)
+        if listed is not None and listed.false_alarm:
+            return False
         return self._truth[index] >= self._stream.false_share
 
     def severity(self, index: int) -> float:
         """0 to 1."""
+        listed = self._listed(index)
+        if listed is not None and listed.severity is not None:
+            return listed.severity
         severity = self._stream.severity
         if isinstance(severity, Severity):
             return severity.low + (severity.high - severity.low) * self._severity[index]
         return severity
+
+    def confidence(self, index: int) -> float:
+        """0 to 1."""
+        listed = self._listed(index)
+        if listed is None or listed.confidence is None:
+            return self._stream.confidence
+        return listed.confidence
+
+    def _listed(self, index: int) -> ListedEvent | None:
+        return self._stream.listed[index] if self._stream.listed else None
 
     def repeat_after(self, index: int) -> float | None:
         """Return how long after the first report a second source reports it [s]; None: never."""
@@ -134,6 +155,8 @@ class Demand:
                 self._rest[number] = times(self._streams, f"{name}/rest", stream.sources.rest)
                 for source in range(stream.sources.count):
                     self._rests(number, source, stream.from_s)
+            elif stream.listed:
+                self._next_listed(number, 0)
             elif stream.batch is not None:
                 for index in range(stream.batch.count):
                     self._at(number, index, stream.batch.at_s)
@@ -154,9 +177,11 @@ class Demand:
         zones = self._terrain.zones
         total = [0.0] * len(zones)
         for stream in self._scenario.demand:
-            weights = stream.zones or {
-                zone: self._terrain.size(number) for number, zone in enumerate(zones)
-            }
+            weights = (
+                _listed_zones(stream)
+                or stream.zones
+                or {zone: self._terrain.size(number) for number, zone in enumerate(zones)}
+            )
             whole = sum(weights.values()) or 1.0
             for zone, weight in weights.items():
                 total[zones.index(zone)] += _rate(stream) * weight / whole
@@ -171,6 +196,15 @@ class Demand:
 
     def _renew(self, stream: int, gaps: Draws[float], index: int, when: float) -> None:
         self._next(stream, gaps, index + 1, when)
+        self._break_out(stream, index)
+
+    def _next_listed(self, stream: int, index: int) -> None:
+        listed = self._scenario.demand[stream].listed
+        if index < len(listed) and listed[index].at_s <= self._ends(stream):
+            self._clock.call_at(listed[index].at_s, self._renew_listed, stream, index)
+
+    def _renew_listed(self, stream: int, index: int) -> None:
+        self._next_listed(stream, index + 1)
         self._break_out(stream, index)
 
     def _rests(self, stream: int, index: int, now: float) -> None:
@@ -200,7 +234,7 @@ class Demand:
             place=place,
             true=draws.true(index),
             severity=draws.severity(index),
-            confidence=config.confidence,
+            confidence=draws.confidence(index),
             occurred=now,
         )
         self._happens(incident)
@@ -211,11 +245,18 @@ class Demand:
             self._clock.call_after(after, self._noticed, incident)
 
 
+def _listed_zones(stream: EventStream) -> Counter[str]:
+    """Count the listed events of each zone."""
+    return Counter(event.zone for event in stream.listed if event.zone is not None)
+
+
 def _rate(stream: EventStream) -> float:
     """Events per second, as long as nobody is late."""
     if stream.between is not None:
         return 1.0 / stream.between.mean
     if stream.sources is not None:
         return stream.sources.count / max(stream.sources.rest.mean, 1e-9)
+    if stream.listed:
+        return len(stream.listed) / max(stream.listed[-1].at_s, 1.0)
     assert stream.batch is not None
     return float(stream.batch.count)

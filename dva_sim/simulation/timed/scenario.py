@@ -11,15 +11,24 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from dva_sim.kernel import config_overrides
-from dva_sim.kernel.config import Config, Fail, Key
+from dva_sim.kernel.config import Config, Fail, Key, validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.kernel.yaml_files import Document, KeyPath
 from dva_sim.protocol.event_kinds import EventKind
 from dva_sim.simulation.scenario import check_policy, locate_files
+from dva_sim.simulation.scenario.alarms import why_not
+from dva_sim.simulation.scenario.event_table import (
+    Alarm,
+    EventTable,
+    Ground,
+    TableEvents,
+    WithTable,
+    read_events,
+)
 from dva_sim.simulation.timed.distributions import ZERO, Constant, Law
 from dva_sim.worlds.site import load_site
 
@@ -33,6 +42,10 @@ def check_names(scenario: TimedScenario, error: Fail) -> TimedScenario:
     zones = zone_names(scenario, error)
     for number, stream in enumerate(scenario.demand):
         _known(stream.zones, zones, "zone", ("demand", number, "zones"), error)
+        for event, listed in enumerate(stream.listed):
+            if listed.zone is not None and listed.zone not in zones:
+                where: KeyPath = ("demand", number, "listed", event, "zone")
+                raise error(unknown("zone", listed.zone, zones), where)
         if stream.notice == "detectors" and scenario.site is None:
             raise error("notice 'detectors' needs a site", ("demand", number, "notice"))
     dispatch = scenario.dispatch
@@ -92,6 +105,70 @@ def _names_place(place: str, scenario: TimedScenario, names: list[str]) -> bool:
     if scenario.site is None or what not in ("post", "robot_base"):
         return False
     return not number or (number.isdigit() and int(number) > 0)
+
+
+def with_alarms(scenario: TimedScenario, error: Fail) -> TimedScenario:
+    """The scenario with the alarms of its table as streams, one for each kind.
+
+    Raises:
+        ConfigError: see `read_events`.
+    """
+    found = table_events(scenario, error)
+    by_kind: dict[str, list[ListedEvent]] = {}
+    for alarm in found.alarms:
+        by_kind.setdefault(alarm.kind, []).append(_listed(alarm))
+    taken = set(scenario.stream_names)
+    streams = []
+    for kind, events in by_kind.items():
+        name = f"{kind}_table" if kind in taken else ""
+        data = {"kind": kind, "name": name or kind, "listed": events}
+        streams.append(validate(EventStream, data, lambda p, _: error(p, ("events", "kinds"))))
+    scenario = scenario.model_copy(update={"demand": (*scenario.demand, *streams), "events": None})
+    scenario.tell(found)
+    return scenario
+
+
+def table_events(scenario: TimedScenario, error: Fail) -> TableEvents:
+    """The alarms of a scenario's table, and what is said of them; raises as `read_events`."""
+    assert scenario.events is not None
+
+    def fail(problem: str, path: KeyPath) -> ConfigError:
+        return error(problem, ("events", *path))
+
+    return read_events(scenario.events, scenario.horizon_s, _ground_of(scenario, error), fail)
+
+
+def _listed(alarm: Alarm) -> ListedEvent:
+    return ListedEvent(
+        at_s=alarm.at_s,
+        zone=alarm.room,
+        position=alarm.position,
+        severity=alarm.severity,
+        confidence=alarm.confidence,
+        false_alarm=alarm.false_alarm,
+    )
+
+
+def _ground_of(scenario: TimedScenario, error: Fail) -> Ground:
+    zones = zone_names(scenario, error)
+    if scenario.site is not None:
+        site = load_site(scenario.site.name)
+        return Ground(zones, True, site.frame.to_xy, lambda x, y: why_not(site, x, y), site.room_at)
+    area = scenario.area
+    if area is None:
+        return Ground(zones, False, None, lambda x, y: "", lambda x, y: None)
+    width, height = area.width_m, area.height_m
+
+    def outside(x: float, y: float) -> str:
+        inside = 0 <= x <= width and 0 <= y <= height
+        return "" if inside else f"is outside the area, which is {width:g} m by {height:g} m"
+
+    def zone_at(x: float, y: float) -> str | None:
+        boxes = scenario.zones.items()
+        within = (n for n, (a, b, c, d) in boxes if a <= x <= c and b <= y <= d)
+        return next(within, None if scenario.zones else zones[0])
+
+    return Ground(zones, True, None, outside, zone_at)
 
 
 Name = Annotated[str, Field(min_length=1, max_length=40)]
@@ -196,6 +273,25 @@ class Repeats(Config):
     after: Law = ZERO
 
 
+class ListedEvent(Config):
+    """An event at a certain time.
+
+    Attributes:
+        zone: Zone in which it is; by default as the stream says.
+        position: Its place x, y [m].
+        severity: Reported severity; by default as the stream says.
+        confidence: Reported confidence; by default as the stream says.
+        false_alarm: True for a false alarm.
+    """
+
+    at_s: NonNegative
+    zone: str | None = None
+    position: Point | None = None
+    severity: Share | None = None
+    confidence: Share | None = None
+    false_alarm: bool = False
+
+
 class EventStream(Config):
     """Events of one class, one after the other.
 
@@ -217,6 +313,7 @@ class EventStream(Config):
         repeats: Doubled reports.
         from_s: The first event comes one interval after this.
         until_s: No event after this; left out, the horizon.
+        listed: Certain events in order of time, in place of `between`.
     """
 
     kind: EventKind = "fire"
@@ -235,12 +332,21 @@ class EventStream(Config):
     repeats: Repeats | None = None
     from_s: NonNegative = 0.0
     until_s: Positive | None = None
+    listed: tuple[ListedEvent, ...] = ()
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, usual: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Dump listed events only where there are any, so that hashes stay the same."""
+        written: dict[str, Any] = usual(self)
+        if not self.listed:
+            written.pop("listed", None)
+        return written
 
     @model_validator(mode="after")
     def _one_origin(self) -> EventStream:
-        given = [self.between, self.sources, self.batch]
+        given = [self.between, self.sources, self.batch, self.listed or None]
         if sum(g is not None for g in given) != 1:
-            raise ValueError("a stream needs one of between, sources and batch")
+            raise ValueError("a stream needs one of between, sources, batch and listed")
         if isinstance(self.between, Constant) and self.between.mean_s <= 0:
             raise ValueError("between should be longer than 0 s")
         return self
@@ -284,7 +390,7 @@ class TimedDispatch(Config):
     stations: tuple[Station, ...] = ()
 
 
-class TimedScenario(Config):
+class TimedScenario(WithTable):
     """Everything one run needs but its seed.
 
     Attributes:
@@ -294,6 +400,8 @@ class TimedScenario(Config):
         zones: Named parts of an area: xmin, ymin, xmax, ymax [m].
         travel: `none`: no time; `straight`; `path`: planned on the site; or a law: a time for
             each pair of an event and a responder. Left out, whatever the ground allows best.
+        demand: Streams of events; may be left out with a table of events.
+        events: Table of dated alarms, which become streams, one for each kind.
         intensity: Events of every stream with a `between` come so many times as often.
         warm_up_s: Initial time that is not measured.
         horizon_s: No event after this.
@@ -311,7 +419,8 @@ class TimedScenario(Config):
     travel: Literal["none", "straight", "path"] | Law | None = None
     responders: Annotated[tuple[Group, ...], Field(min_length=1)]
     operators: Operators = Operators()
-    demand: Annotated[tuple[EventStream, ...], Field(min_length=1)]
+    demand: tuple[EventStream, ...] = ()
+    events: EventTable | None = None
     dispatch: TimedDispatch = TimedDispatch()
     intensity: Annotated[Positive, Key("rate of alarms", stated=False)] = 1.0
     warm_up_s: NonNegative = 0.0
@@ -350,6 +459,20 @@ class TimedScenario(Config):
     def stream_names(self) -> list[str]:
         """Names of all streams, in order."""
         return [stream.name or stream.kind for stream in self.demand]
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, usual: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Dump no table where there is none, so that hashes stay the same."""
+        written: dict[str, Any] = usual(self)
+        if self.events is None:
+            written.pop("events", None)
+        return written
+
+    @model_validator(mode="after")
+    def _something_happens(self) -> TimedScenario:
+        if not self.demand and self.events is None:
+            raise ValueError("nothing happens: give demand, or events with a table")
+        return self
 
     @model_validator(mode="after")
     def _ground(self) -> TimedScenario:
@@ -398,7 +521,13 @@ def build(
     Raises:
         ConfigError: an unknown key or name, a wrong type, a value out of range.
     """
-    return config_overrides.build(TimedScenario, source, changes, check_names, locate_files)
+    return config_overrides.build(TimedScenario, source, changes, _complete, locate_files)
+
+
+def _complete(scenario: TimedScenario, error: Fail) -> TimedScenario:
+    if scenario.events is not None:
+        scenario = with_alarms(scenario, error)
+    return check_names(scenario, error)
 
 
 def limit_of(value: float | None) -> float:

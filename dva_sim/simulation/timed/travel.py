@@ -79,6 +79,7 @@ class Terrain:
         self.zones, self.frame = list(zones), frame
         self._apart = apart
         self._known: dict[m.Position, Place] = {}
+        self._points: dict[Point, Place] = {}
         self._numbered = 0
 
     # --- places ------------------------------------------------------------------------
@@ -114,6 +115,18 @@ class Terrain:
     def event_place(self, zone: int, u: float, v: float) -> Place:
         """Return the place of an event by two uniform random numbers, at a position of its own."""
         return self.apart(self._middle(zone))
+
+    def exact_place(self, x: float, y: float, zone: str | None) -> Place:
+        """Return the place of an event at a point [m], at a position of its own."""
+        number = -1 if zone is None else self.zones.index(zone)
+        return self.apart(self._known_at_point(x, y, number))
+
+    def _known_at_point(self, x: float, y: float, zone: int) -> Place:
+        """A place that stays, so that ways to it are planned once."""
+        place = self._points.get((x, y))
+        if place is None:
+            place = self._points[x, y] = self.fix(x, y, zone)
+        return place
 
     def apart(self, place: Place) -> Place:
         """Return the place under a position of its own."""

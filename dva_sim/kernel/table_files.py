@@ -1,0 +1,121 @@
+"""Tables in CSV files as spreadsheets and other programs save them.
+
+Separated by commas, semicolons or tabs; where it is not the comma, numbers may have a decimal
+comma. Blank lines do not count, and every mistake has its line and column.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.read_once import read_once
+from dva_sim.kernel.yaml_files import read_text
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A row of a table, or one cell of it."""
+
+    table: Table
+    line: int
+    row: Sequence[str]
+    place: int = 0
+
+    @property
+    def text(self) -> str:
+        """Content of the cell."""
+        return self.row[self.place].strip()
+
+    def at(self, place: int) -> Cell:
+        """Another cell of the row."""
+        return Cell(self.table, self.line, self.row, place)
+
+    def number(self, what: str) -> float:
+        """Content as a finite number.
+
+        Raises:
+            ConfigError: it is none; `what` says what it should be.
+        """
+        try:
+            value = float(self.text.replace(",", "."))
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            name = self.table.names[self.place]
+            raise self.error(f"{name} should be {what}, not {self.text[:40]!r}")
+        return value
+
+    def error(self, problem: str) -> ConfigError:
+        """A mistake at this cell."""
+        column = 1 + sum(len(cell) + 1 for cell in self.row[: self.place])
+        return ConfigError(problem, self.table.file, self.line, column)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table with a header.
+
+    Attributes:
+        file: File that it was read from.
+        names: Names of the columns, as the header says.
+        rows: Line of each row, and its cells: as many as there are names.
+        line: Line of the header.
+    """
+
+    file: Path
+    names: tuple[str, ...]
+    rows: list[tuple[int, list[str]]]
+    line: int
+
+    def cells(self) -> Iterator[Cell]:
+        """Yield the first cell of each row."""
+        for line, row in self.rows:
+            yield Cell(self, line, row)
+
+    def error(self, problem: str, place: int) -> ConfigError:
+        """A mistake at a name of the header."""
+        return Cell(self, self.line, self.names, place).error(problem)
+
+
+@read_once(lambda path: [Path(path)])
+def read_table(path: str) -> Table:
+    """Read a table; what stands in its cells is not judged.
+
+    Raises:
+        ConfigError: it cannot be read, is no text in UTF-8, has no header, or a row has more or
+            fewer cells than the header.
+    """
+    file = Path(path)
+    try:
+        text = read_text(file)
+    except ConfigError as error:
+        if error.line is None:
+            raise
+        problem = f"{error.problem}: save it as UTF-8"
+        raise ConfigError(problem, file, error.line, error.column) from None
+    head = next((line for line in text.split("\n") if line.strip()), "")
+    delimiter = max(",;\t", key=head.count)
+    reader = csv.reader(text.split("\n"), delimiter=delimiter)
+    rows, line = list[tuple[int, list[str]]](), 1
+    try:
+        for row in reader:
+            if any(cell.strip() for cell in row):
+                rows.append((line, row))
+            line = reader.line_num + 1
+    except csv.Error as error:
+        raise ConfigError(f"is not a table: {error}", file, line, 1) from None
+    if not rows:
+        raise ConfigError("is empty: it needs a header with the names of its columns", file, 1, 1)
+    line, names = rows[0]
+    for number, row in rows[1:]:
+        if len(row) != len(names):
+            cells = "1 cell" if len(row) == 1 else f"{len(row)} cells"
+            fault = f"has {cells}, and the header {len(names)}"
+            problem = f"{fault}: fill in, or quote a cell that holds {delimiter!r}"
+            raise ConfigError(problem, file, number, 1)
+    return Table(file, tuple(name.strip() for name in names), rows[1:], line)

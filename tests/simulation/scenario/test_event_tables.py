@@ -1,0 +1,228 @@
+"""Events from a table: what is read, what is left out, and what is refused with its place."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dva_sim.experiments.study.hashing import stable_hash
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import load_yaml
+from dva_sim.simulation.models import model_of
+from dva_sim.testing.files import check_file
+
+FULL = "model: full\nhorizon_s: 600\n"
+TIMED = """
+model: timed
+site: {name: caparica}
+responders: [{name: guard, count: 2, speed_mps: 1.3}]
+horizon_s: 600
+"""
+MODELS = {"full": FULL, "timed": TIMED}
+HEAD = "time,kind,room\n"
+TWO = "2026-03-01T08:00:00Z,fire,Workshop\n2026-03-01T08:01:00Z,flood,Kitchen\n"
+
+
+def made(folder: Path, model: str, table: str | bytes, keys: str = "") -> Path:
+    """A scenario beside its table."""
+    data = table if isinstance(table, bytes) else table.encode()
+    (folder / "alarms.csv").write_bytes(data)
+    file = folder / "desk.yaml"
+    file.write_text(f"{MODELS[model]}events: {{table: alarms.csv{keys}}}\n")
+    return file
+
+
+def built(file: Path, changes: dict[str, Any] | None = None) -> Any:
+    document = load_yaml(file)
+    return model_of(document).build(document, changes or {})
+
+
+def events_of(scenario: Any) -> list[tuple[float, str, str | None]]:
+    """Time, kind and room of each event, in order of time."""
+    if scenario.model == "full":
+        return [(e.at_s, e.kind, e.room) for e in scenario.events]
+    found = [(e.at_s, s.kind, e.zone) for s in scenario.demand for e in s.listed]
+    return sorted(found)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    ("table", "keys"),
+    [
+        (HEAD + TWO, ""),
+        ("\ufeff" + HEAD + TWO, ""),
+        (HEAD.upper() + TWO, ""),
+        (HEAD + "\n" + TWO.replace("\n", "\n\n,,\n"), ""),
+        ((HEAD + TWO).replace("\n", "\r\n"), ""),
+        ((HEAD + TWO).replace(",", ";"), ""),
+        ((HEAD + TWO).replace(",", "\t"), ""),
+        (HEAD + "".join(reversed(TWO.splitlines(keepends=True))), ""),
+        (HEAD + TWO.replace("Z", "").replace("T", " "), ", time_zone: UTC"),
+        (HEAD + TWO.replace("Z", "").replace("T08", "T09"), ", time_zone: Europe/Berlin"),
+        (HEAD + TWO.replace("T08", "T09").replace("Z", "+01:00"), ""),
+        (HEAD + TWO, ", start: 2026-03-01T08:00:00Z"),
+        (HEAD + TWO, ", start: 2026-03-01T09:00:00+01:00"),
+        (HEAD + TWO.replace("Z", ""), ', time_zone: UTC, start: "2026-03-01 08:00"'),
+        (HEAD + "0,fire,Workshop\n60,flood,Kitchen\n", ""),
+        ("time;kind;room\n1000,0;fire;Workshop\n1060,0;flood;Kitchen\n", ", start: 1000"),
+        (HEAD + TWO.replace("fire", "Brand"), ", kinds: {Brand: fire}"),
+        (HEAD + TWO + "2026-03-01T08:02:00Z,test,Kitchen\n", ", kinds: {Test: null}"),
+        (
+            "time,kind,x,y\n0,fire,5,5\n60,flood,20.0,12.0\n".replace("0,fire,5,5", "0,fire,20,12"),
+            "",
+        ),
+    ],
+)
+def test_tables_of_all_forms_are_the_same_events(
+    tmp_path: Path, model: str, table: str, keys: str
+) -> None:
+    events = events_of(built(made(tmp_path, model, table, keys)))
+    rooms = ["Main corridor"] * 2 if ",x,y" in table else ["Workshop", "Kitchen"]
+    assert events == [(0.0, "fire", rooms[0]), (60.0, "flood", rooms[1])]
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    ("table", "keys", "line", "words"),
+    [
+        (HEAD + TWO + "2026-03-01T08:02:00Z,Brand,Kitchen\n", "", 4, "events.kinds: {Brand: fire}"),
+        (HEAD + TWO + "2026-03-01T08:02:00Z,fire,Kitchn\n", "", 4, "'Kitchen'"),
+        (HEAD + TWO + "2026-03-01T08:02:00Z,fire\n", "", 4, "has 2 cells, and the header 3"),
+        (HEAD + TWO + "2026-03-01T08:02:00Z,fire,\n", "", 4, "has no place"),
+        (HEAD + TWO + "2026-03-01T08:02:00,fire,Kitchen\n", "", 4, "set events.time_zone"),
+        (HEAD + TWO + "01.03.2026 08:02,fire,Kitchen\n", "", 4, "ISO 8601"),
+        (HEAD + TWO + "120,fire,Kitchen\n", "", 4, "write all in one form"),
+        (
+            HEAD + "2026-10-25 02:30,fire,Kitchen\n",
+            ", time_zone: Europe/Berlin",
+            2,
+            "occurs twice in Europe/Berlin",
+        ),
+        (
+            HEAD + "2026-03-29 02:30,fire,Kitchen\n",
+            ", time_zone: Europe/Berlin",
+            2,
+            "does not exist in Europe/Berlin",
+        ),
+        ("time,kind\n" + TWO.replace(",Workshop", "").replace(",Kitchen", ""), "", 1, "the place"),
+        (HEAD.replace("time", "when") + TWO, "", 1, "has no column 'time'; it has when"),
+        (HEAD.replace("room", "x") + TWO, "", 1, "has no column 'y'"),
+        ("time,kind,x,y,lat,lon\n0,fire,1,1,1,1\n", "", 1, "keep one pair"),
+        ("time,timestamp,kind,room\n0,0,fire,Kitchen\n", "", 1, "'time' and 'timestamp'"),
+        ("time,kind,x,y\n0,fire,500,5\n", "", 2, "outside the site"),
+        ("time,kind,x,y\n0,fire,0.01,0.01\n", "", 2, "open floor"),
+        ("time,kind,x,y\n0,fire,a,5\n", "", 2, "x should be a number of metres"),
+        ("time,kind,lat,lon\n0,fire,48.1,11.5\n", "", 2, "outside the site"),
+        ("time,kind,room,x,y\n0,fire,Kitchen,20,12\n", "", 2, "'Main corridor', not in 'Kitchen'"),
+        (HEAD[:-1] + ",severity\n0,fire,Kitchen,3\n", "", 2, "share from 0 to 1"),
+        (HEAD[:-1] + ",false_alarm\n0,fire,Kitchen,maybe\n", "", 2, "true or false"),
+        ((HEAD + "0,fire,Küche\n").encode("latin-1"), "", 2, "save it as UTF-8"),
+        ("", "", 1, "is empty"),
+    ],
+)
+def test_a_doubtful_row_is_named_with_its_place(
+    tmp_path: Path, model: str, table: str | bytes, keys: str, line: int, words: str
+) -> None:
+    with pytest.raises(ConfigError) as caught:
+        built(made(tmp_path, model, table, keys))
+    assert (caught.value.file, caught.value.line) == (str(tmp_path / "alarms.csv"), line)
+    assert caught.value.column is not None
+    assert words in caught.value.problem
+    assert "\n" not in caught.value.problem
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        (", time_zone: Europe/Lisbonne", "did you mean 'Europe/Lisbon'?"),
+        (", start: tomorrow", "start 'tomorrow' should be ISO 8601"),
+        (", start: 2027-01-01T00:00:00Z", "2 before events.start"),
+        (", starts: 5", "events.starts"),
+    ],
+)
+def test_a_wrong_key_of_the_table_is_named_in_the_scenario(
+    tmp_path: Path, model: str, keys: str, words: str
+) -> None:
+    with pytest.raises(ConfigError) as caught:
+        built(made(tmp_path, model, HEAD + TWO, keys))
+    assert caught.value.file == str(tmp_path / "desk.yaml")
+    assert words in caught.value.problem
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_missing_table_is_named(tmp_path: Path, model: str) -> None:
+    file = made(tmp_path, model, HEAD + TWO)
+    (tmp_path / "alarms.csv").unlink()
+    with pytest.raises(ConfigError, match=r"alarms\.csv' cannot be read: No such file"):
+        built(file)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_check_says_what_is_taken_and_what_is_left_out(tmp_path: Path, model: str) -> None:
+    early = "2026-03-01T07:00:00Z,fire,Kitchen\n"
+    late = "2026-03-01T09:00:00Z,fire,Kitchen\n"
+    table = f"{HEAD}{early}{TWO}{late}".replace("room\n", "room,severity,note\n")
+    table = table.replace("Kitchen\n", "Kitchen,0.5,x\n").replace("Workshop\n", "Workshop,,\n")
+    verdict = check_file(made(tmp_path, model, table, ", start: 2026-03-01T08:00:00Z"))
+    unused = "'severity', 'note'" if model == "full" else "'note'"
+    assert verdict.problems == []
+    assert verdict.note == (
+        "2 events of alarms.csv: 1 fire, 1 flood; the first at 0 s, the last at 60 s; "
+        f"time 0 is 2026-03-01T08:00:00+00:00; not used: {unused}"
+    )
+    assert list(verdict.doubts) == [
+        "events: 2 rows of alarms.csv left out: 1 before events.start, 1 not before horizon_s 600"
+    ]
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_content_of_the_table_is_what_a_scenario_is(tmp_path: Path, model: str) -> None:
+    file = made(tmp_path, model, HEAD + TWO)
+    first = built(file)
+    again = pickle.loads(pickle.dumps(first))
+    assert again == first
+    dump = first.model_dump(mode="json")
+    assert type(first).model_validate(dump).model_dump(mode="json") == dump
+    made(tmp_path, model, HEAD + TWO.replace("Kitchen", "Canteen"))
+    other = built(file)
+    assert stable_hash(dump) != stable_hash(other.model_dump(mode="json"))
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_run_has_the_events_of_the_table(tmp_path: Path, model: str) -> None:
+    file = made(tmp_path, model, HEAD + TWO)
+    document = load_yaml(file)
+    found = model_of(document)
+    tables = found.tables(built(file, {"horizon_s": 661}), 1, False)
+    kinds = [row["kind"] for row in tables["events"]]
+    assert kinds == ["fire", "flood"]
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_name_of_a_file_alone_is_a_table(tmp_path: Path, model: str) -> None:
+    file = made(tmp_path, model, HEAD + TWO)
+    file.write_text(MODELS[model] + "events: alarms.csv\n")
+    assert len(events_of(built(file))) == 2
+
+
+@pytest.mark.parametrize(
+    ("position", "words"),
+    [("[500, 5]", "is outside the site"), ("[20, 12], room: Kitchen", "not in 'Kitchen'")],
+)
+def test_a_position_where_no_event_can_be_is_refused(
+    tmp_path: Path, position: str, words: str
+) -> None:
+    file = tmp_path / "desk.yaml"
+    file.write_text(f"{FULL}events: [{{kind: fire, position: {position}}}]\n")
+    with pytest.raises(ConfigError, match=words):
+        built(file)
+
+
+def test_a_hundred_thousand_rows_are_read(tmp_path: Path) -> None:
+    rows = "".join(f"{n},fire,Kitchen\n" for n in range(100_000))
+    scenario = built(made(tmp_path, "timed", HEAD + rows), {"horizon_s": 1e6})
+    assert len(scenario.demand[0].listed) == 100_000
