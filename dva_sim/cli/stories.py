@@ -31,6 +31,13 @@ from dva_sim.recordings.pictures import Wanted
 from dva_sim.recordings.pictures.run_endings import story
 from dva_sim.simulation.full import Playback, Recording
 from dva_sim.simulation.full.episode_measures import RUN_COLUMNS
+from dva_sim.simulation.full.verdicts import (
+    BROKEN,
+    HELD,
+    RulesNotJudged,
+    Verdict,
+    unjudged_rules,
+)
 from dva_sim.simulation.models import Tables, model_for
 from dva_sim.simulation.task import TaskScenario
 from dva_sim.simulation.timed import TimedRecording, TimedScenario
@@ -104,12 +111,13 @@ def tell_side_by_side(runs: Sequence[Playback], console: Console) -> None:
     print_lines(story(runs), console)
 
 
-def tell_outcome(tables: Tables, how: str, console: Console) -> None:
+def tell_outcome(tables: Tables, how: str, console: Console, found: Sequence[Verdict] = ()) -> None:
     """Print the outcome of a run.
 
     Args:
         tables: The rows of the run, by table.
         how: Way in which it ran, printed after its length in seconds.
+        found: Verdicts on the safety rules, where facts may be missing to judge them.
     """
     row = tables["runs"][0]
     lines = [_event(event) for event in tables["events"]]
@@ -121,7 +129,10 @@ def tell_outcome(tables: Tables, how: str, console: Console) -> None:
     if tables["people"]:
         lines.append(f"people: {_fared(row, tables['people'])}")
     lines.append(f"{row['simulated_s']:.0f} s {how}, {row['messages']:,} messages")
-    lines.append(f"safety rules S1 to S7: {_violations(row['violations'])}")
+    if unjudged_rules(found):
+        lines.append(_unjudged(found))
+    else:
+        lines.append(f"safety rules S1 to S7: {_violations(row['violations'])}")
     lines += _failed(row)
     print_lines(["", *lines], console)
     tell_measures(row, RUN_COLUMNS)
@@ -172,6 +183,19 @@ def _fared(row: Row, people: list[dict[str, Any]]) -> str:
         last = f", the last at {max(out):.0f} s" if out else ""
         parts.insert(0, f"{len(out)} of {count} bystanders out{last}")
     return ", ".join(parts)
+
+
+def _unjudged(found: Sequence[Verdict]) -> str:
+    """Say which safety rules could not be judged and why, and what is known of the others."""
+    why: dict[str, list[str]] = {}
+    for verdict in found:
+        if verdict.lacks_facts:
+            why.setdefault(verdict.text, []).append(verdict.rule)
+    parts = [f"{', '.join(rules)} not judged: {text}" for text, rules in why.items()]
+    for state in (BROKEN, HELD):
+        if rules := list(dict.fromkeys(v.rule for v in found if v.state == state)):
+            parts.append(f"{', '.join(rules)} {state}")
+    return f"safety rules: {'; '.join(parts)}"
 
 
 def _violations(count: int) -> str:
@@ -386,15 +410,24 @@ def replay(
 
     Raises:
         ConfigError: not a recording, or what is asked for is not in it.
+        RulesNotJudged: facts are missing to judge it by all safety rules.
     """
     from dva_sim.live.recorded_lines import is_part, readable  # late: start-up
+    from dva_sim.recordings.channels import STORY  # late: start-up
+    from dva_sim.testing.evidence import judged_recording  # late: start-up
 
     with readable(file, mcap) as found:
         opened = open_recording(found, pictures)
         run = opened.playback
+        found = judged_recording(opened)
         tell_story(run, where)
+        if not run.recorder.timeline:
+            where.print(f"[yellow]the recording lacks {STORY}: nothing to tell[/yellow]")
         if opened.tables is not None:
-            tell_outcome(opened.tables, f"simulated by dva-sim {opened.about['version']}", where)
+            how = f"simulated by dva-sim {opened.about['version']}"
+            tell_outcome(opened.tables, how, where, found)
+        elif unjudged_rules(found):
+            print_lines([_unjudged(found)], where)
         there = f"{run.duration:.0f} of {opened.lasted:.0f} s are there"
         if is_part(file):
             there = f"{run.duration:.0f} s are there; the run was interrupted or is still running"
@@ -402,6 +435,8 @@ def replay(
             where.print(f"[yellow]{file} was cut short: {there}[/yellow]", soft_wrap=True)
         made = [] if mcap is None else [f"Recording: {mcap}"]
         _say_written(chain(made, write_replay(opened, pictures, ros2)), pictures, where)
+    if unjudged := unjudged_rules(found):
+        raise RulesNotJudged(unjudged)
 
 
 def _say_written(files: Iterable[str], pictures: Wanted, where: Console) -> None:

@@ -78,11 +78,60 @@ def check_recording(path: Path) -> tuple[list[Problem], list[str], str, list[Ver
 
 
 def judged_recording(opened: Opened) -> list[Verdict]:
-    """Return the verdict on each safety rule, as far as the recording goes."""
-    from dva_sim.simulation.full.verdicts import judged  # late: start-up
+    """Return the verdict on each safety rule, as far as the recording goes.
+
+    A rule whose topics are missing is not judged, whatever the others show.
+    """
+    from dva_sim.simulation.full.verdicts import (
+        NOT_JUDGED,
+        RULES,
+        Verdict,
+        judged,
+    )  # late: start-up
 
     until = "" if opened.is_whole else f", up to {opened.playback.duration:.0f} s"
-    return judged(opened.playback.recorder.facts, opened.terms, until)
+    found = judged(opened.playback.recorder.facts, opened.terms, until)
+    topics = missing_topics(opened)
+    verdicts = list[Verdict]()
+    for rule in RULES:
+        if lacking := topics.get(rule):
+            text = f"the recording lacks {listed(lacking)}"
+            verdicts.append(Verdict(rule, NOT_JUDGED, text, lacks_facts=True))
+        else:
+            verdicts += [verdict for verdict in found if verdict.rule == rule]
+    return verdicts
+
+
+def missing_topics(opened: Opened) -> dict[str, list[str]]:
+    """Return the topics that a recording lacks, by the rules that need them.
+
+    A file that says how many messages each topic had lacks any of them; another lacks what no
+    recording of facts is without.
+    """
+    from dva_sim.recordings.channels import MESSAGES, OBSERVED  # late: start-up
+    from dva_sim.recordings.raw_records import is_camera  # late: start-up
+    from dva_sim.simulation.full import observations as o  # late: start-up
+    from dva_sim.simulation.full.verdicts import OF_ROBOTS, OF_THE_DVA, RULES  # late: start-up
+
+    facts, terms = opened.playback.recorder.facts, opened.terms
+    if facts is None or terms is None:
+        return {}
+    moves, book = f"{OBSERVED}moves", f"{OBSERVED}book"
+    kinds = set(map(type, facts))
+    lacking = [topic for topic in sorted(opened.left_out) if opened.left_out[topic] > 0]
+    lacking += [moves] if o.MotionNews not in kinds and moves not in lacking else []
+    lacking += [book] if o.BookNews not in kinds and book not in lacking else []
+    found: dict[str, list[str]] = {}
+    for topic in lacking:
+        rules = OF_ROBOTS if topic.startswith(OBSERVED) or is_camera(topic) else ()
+        if topic == book:
+            rules = OF_THE_DVA
+        elif topic.startswith(MESSAGES):
+            rules = tuple(RULES)
+        for rule in rules:
+            if rule in OF_THE_DVA or terms.motors:
+                found.setdefault(rule, []).append(topic)
+    return found
 
 
 def check_trace(path: Path) -> Found:
