@@ -58,8 +58,8 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
     Decisions in which nothing can be done but wait end by themselves. Actions are numbers: 0 ends
     the decision, `1 + task * units + unit` sends a unit to a task, and where they are asked for,
     numbers after those announce tasks and let guards wait at stations. `info["action_mask"]`, also
-    an observation, says which are allowed; one that is not ends the decision, and
-    `info["refused"]` is true.
+    an observation, and `action_masks()` say which are allowed; one that is not ends the decision,
+    and `info["refused"]` is true. What is no action raises `ValueError`.
 
     Observations (float32 but for the mask; rows of what is not there are 0):
         tasks: `(tasks, columns)` as in `TASK_COLUMNS`, longest reported first.
@@ -146,7 +146,7 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
 
     @override
     def step(self, action: int) -> tuple[Observations, float, bool, bool, Info]:
-        shift, number = self._running(), int(action)
+        shift, number = self._running(), self._number(action)
         piece = self._piece(number) if self._mask[number] else None
         if piece is not None:
             self._take(piece)
@@ -167,6 +167,11 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
             self._shift.close()
             self._shift = None
 
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Return which actions are allowed now, as sb3-contrib asks for it, shape `(n,)`."""
+        self._running()
+        return self._mask.astype(np.bool_)
+
     # --- actions -------------------------------------------------------------------------
 
     def actions_of(self, advice: Sequence[Advice]) -> list[int]:
@@ -176,6 +181,18 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
             ValueError: a piece cannot be said here, such as a task beyond the last one seen.
         """
         return [*map(self._action, advice), DONE]
+
+    def _number(self, action: object) -> int:
+        """Read an action: a whole number, plain or of numpy.
+
+        Raises:
+            ValueError: it is none of this environment.
+        """
+        given, count = np.asarray(action), len(self._mask)
+        is_whole = given.ndim == 0 and np.issubdtype(given.dtype, np.integer)
+        if not is_whole or not 0 <= given < count:
+            raise ValueError(f"an action is a whole number from 0 to {count - 1}, not {action!r}")
+        return int(given)
 
     def _action(self, piece: Advice) -> int:
         if not isinstance(piece, Relocation) and piece.task >= self._tasks:

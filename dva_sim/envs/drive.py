@@ -37,14 +37,15 @@ COLUMNS: Final = (
 )
 NEAR, FAR = 0.8, 2.5  # [m]
 MOST: Final = 1e4  # bound of all observations
+ROUNDING: Final = 1e-6  # of a share at its limit, as of float32
 
 
 class DriveEnv(gymnasium.Env[Vector, Vector]):
     """One drive of one robot to the first event of a scenario.
 
     Actions are two shares of the robot's limits, asked for until the next step: speed, 0 to 1, and
-    turn rate, -1 to 1, positive to the left. Observations are those of `COLUMNS`, float32. The way
-    is planned once, from the first picture on.
+    turn rate, -1 to 1, positive to the left; what is no action raises `ValueError`. Observations
+    are those of `COLUMNS`, float32. The way is planned once, from the first picture on.
 
     The reward of a step is the time that the way gained takes at top speed minus the time of the
     step [s]: the return is minus the time that a drive took longer than one without any delay or
@@ -102,10 +103,7 @@ class DriveEnv(gymnasium.Env[Vector, Vector]):
         drive = self.drive
         if drive is None:
             raise RuntimeError("no drive has begun: call reset first")
-        speed, turn = (float(share) for share in np.asarray(action, dtype=np.float64))
-        if not np.isfinite([speed, turn]).all():
-            raise ValueError(f"an action is two finite numbers, not {speed}, {turn}")
-        self._asked = min(max(speed, 0.0), 1.0), min(max(turn, -1.0), 1.0)
+        self._asked = _shares(action)
         outcome = drive.step(*self._asked, self.dt)
         before, seen = self._left, self._seen()
         reward = (before - self._left) / drive.limits[0] - self.dt
@@ -125,3 +123,20 @@ class DriveEnv(gymnasium.Env[Vector, Vector]):
             pose = (far.remaining, near.offset, near.bearing, far.bearing)
             self._shown = (*pose, seen.speed, seen.turn_rate, age)
         return np.clip(np.array([*self._shown, *self._asked], np.float32), -MOST, MOST)
+
+
+def _shares(action: object) -> tuple[float, float]:
+    """Read an action; rounding beyond a limit is cut off.
+
+    Raises:
+        ValueError: it is not two finite shares within the limits.
+    """
+    rule = "an action is two finite numbers, speed from 0 to 1 and turn rate from -1 to 1"
+    try:
+        speed, turn = np.asarray(action, dtype=np.float64).tolist()
+        is_within = -ROUNDING <= speed <= 1 + ROUNDING and abs(turn) <= 1 + ROUNDING
+    except (TypeError, ValueError):
+        is_within = False
+    if not is_within:
+        raise ValueError(f"{rule}, not {action!r}")
+    return min(max(speed, 0.0), 1.0), min(max(turn, -1.0), 1.0)

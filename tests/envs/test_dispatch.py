@@ -74,6 +74,35 @@ def test_an_action_that_is_not_allowed_ends_the_decision():
     env.close()
 
 
+@pytest.mark.parametrize("action", [-1, 10**6, 1.5, 1.0, True, "1", None, np.nan, [1], [0, 1]])
+def test_what_is_no_action_is_refused(action):
+    env = made("min_eta", "small-shift")
+    env.reset(seed=1)
+    situation = env.situation
+    with pytest.raises(ValueError, match=r"a whole number from 0 to \d+, not"):
+        env.step(action)
+    assert env.situation is situation
+    env.close()
+
+
+def test_the_masks_for_sb3_contrib_are_those_of_step():
+    env = made("coverage", "small-shift")
+    with pytest.raises(RuntimeError, match="reset"):
+        env.action_masks()
+    _, info = env.reset(seed=5)
+    over, steps = False, 0
+    while not over:
+        masks = env.action_masks()
+        assert masks.dtype == np.bool_
+        assert masks.shape == (env.action_space.n,)
+        assert masks.tolist() == info["action_mask"].astype(bool).tolist()
+        _, _, over, _, info = env.step(np.flatnonzero(masks)[-1])
+        assert not info["refused"]
+        steps += 1
+    assert steps > 4
+    env.close()
+
+
 def test_a_shift_that_is_left_ends_with_its_environment():
     env = made("min_eta")
     env.reset(seed=1)

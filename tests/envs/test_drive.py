@@ -62,12 +62,19 @@ def test_a_link_that_breaks_stops_the_robot_and_ends_the_drive():
     assert body.speed == pytest.approx(0.0, abs=1e-6)
 
 
-@pytest.mark.parametrize("action", [(np.nan, 0.0), (0.1, np.inf)])
-def test_a_number_that_is_none_is_refused(action):
+NO_ACTIONS = [
+    *[(np.nan, 0.0), (0.1, np.inf), (-0.1, 0.0), (1.5, 0.0), (0.5, -1.1)],
+    *[(0.5,), (0.5, 0.0, 0.0), ((0.5, 0.0),), 0.5, None, "ab", ("a", "b"), {}],
+]
+
+
+def test_what_is_no_action_is_refused():
     env = DriveEnv()
     env.reset(seed=1)
-    with pytest.raises(ValueError, match="finite"):
-        env.step(np.array(action, np.float32))
+    for action in NO_ACTIONS:
+        with pytest.raises(ValueError, match="two finite numbers, speed from 0 to 1"):
+            env.step(action)
+    env.step(np.nextafter(np.array([1, -1], np.float32), np.float32(2)))
 
 
 @pytest.mark.parametrize(
