@@ -132,6 +132,22 @@ class Frame(dict[str, Array]):
         except ModuleNotFoundError:
             raise ConfigError("to_pandas needs pandas: pip install pandas") from None
 
+    def to_polars(self) -> Any:
+        """Convert to a polars.DataFrame; missing values are null.
+
+        Raises:
+            ConfigError: polars is not installed.
+        """
+        try:
+            frame = import_module("polars").DataFrame
+        except ModuleNotFoundError:
+            raise ConfigError("to_polars needs polars: pip install polars") from None
+        columns = {
+            name: values.tolist() if values.dtype == object else values
+            for name, values in self.items()
+        }
+        return frame(columns, nan_to_null=True)
+
     def to_duckdb(self) -> DuckDBPyRelation:
         """Convert to a DuckDB relation for SQL queries; missing numbers are NULL."""
         import duckdb

@@ -55,10 +55,24 @@ def test_sql_can_be_asked_of_a_table(results):
     assert row["story"] == pytest.approx(np.nanmean(times))
 
 
-def test_pandas_is_needed_only_by_who_asks_for_it(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "pandas", None)
-    with pytest.raises(ConfigError, match="pip install pandas"):
-        Frame({"t_s": np.array([1.0])}).to_pandas()
+@pytest.mark.parametrize("library", ["pandas", "polars"])
+def test_a_library_of_frames_is_needed_only_by_who_asks_for_it(monkeypatch, library):
+    monkeypatch.setitem(__import__("sys").modules, library, None)
+    frame = Frame({"t_s": np.array([1.0])})
+    with pytest.raises(ConfigError, match=f"pip install {library}"):
+        getattr(frame, f"to_{library}")()
+
+
+@pytest.mark.parametrize("library", ["pandas", "polars"])
+def test_a_frame_of_another_library_has_the_same_rows(library):
+    pytest.importorskip(library)
+    columns = {"t_s": np.array([0.5, math.nan]), "who": np.array(["a", None], dtype=object)}
+    columns["n"] = np.array([1, 2])
+    frame = getattr(Frame(columns), f"to_{library}")()
+    assert list(frame.columns) == ["t_s", "who", "n"]
+    assert frame.shape == (2, 3)
+    missing = frame.isna().sum().tolist() if library == "pandas" else frame.null_count().row(0)
+    assert list(missing) == [1, 1, 0]
 
 
 def test_a_notebook_shows_a_table_with_what_is_missing_left_empty():
