@@ -22,9 +22,9 @@ def tell(path: Path, as_json: bool, unit: Unit | None) -> None:
     motion, guesses = _motion(path, unit)
     found = figures_of(motion, path)
     if as_json:
-        print_json(found._asdict())
+        print_json(found._asdict() | {"guesses": guesses})
         return
-    for line in (*lines(found), *guesses):
+    for line in (*lines(found), *map(_guessed, guesses)):
         print(line)
 
 
@@ -34,7 +34,11 @@ def _motion(path: Path, unit: Unit | None) -> tuple[PhoneMotion, list[str]]:
         return read_motion(path), []
     except NoMotionOfOursError:
         log = read_sensor_log(path, unit)
-        return PhoneMotion(log.samples), [f"guessed: {guess}" for guess in log.guesses]
+        return PhoneMotion(log.samples), list(log.guesses)
+
+
+def _guessed(guess: str) -> str:
+    return f"guessed: {guess}"
 
 
 def lines(found: MotionFigures) -> list[str]:
@@ -84,7 +88,7 @@ def write_part(path: Path, out: Path, unit: Unit | None) -> None:
         raise ConfigError("already exists", out) from None
     except OSError as error:
         raise ConfigError(f"cannot be written: {error.strerror}", out) from None
-    for line in (*guesses, f"{out} written: name it as phone.accelerometer"):
+    for line in (*map(_guessed, guesses), f"{out} written: name it as phone.accelerometer"):
         print(line)
 
 

@@ -190,11 +190,17 @@ def check_recorded_link(path: Path) -> Found:
 
 
 def _of_delay_log(log: DelayLog) -> str:
+    from dva_sim.network.link.delay_logs import WRITE  # late: start-up
+
     lost, lasts = float(np.isnan(log.delays).mean()), log.times[-1] - log.times[0]
     runs = f" in {log.runs} runs of ping" if log.runs > 1 else ""
+    ask = ""
+    if log.assumed:
+        unnamed = " and ".join(log.assumed)
+        ask = f": assumed, as the file names no unit of its {unnamed}; if it is another, {WRITE}"
     return (
         f"{len(log.times)} probes{runs} in {lasts:,.6g} s, {lost:.1%} of them lost, "
-        f"{_spread_of(log.delays)}; times in {log.units[0]}, delays in {log.units[1]}"
+        f"{_spread_of(log.delays)}; times in {log.units[0]}, delays in {log.units[1]}{ask}"
     )
 
 

@@ -78,6 +78,7 @@ def test_what_was_guessed_is_said_with_its_reason(tmp_path, head, axes, guesses)
     assert bool(log.guesses) is bool(guesses)
     assert unnamed(" ".join(log.guesses), *guesses) == []
     assert call("phone-log", file).stdout.count("guessed: ") == len(log.guesses)
+    assert json.loads(call("phone-log", file, "--json").stdout)["guesses"] == list(log.guesses)
 
 
 def test_a_unit_that_nothing_tells_is_asked_for_and_taken_if_gravity_allows(tmp_path):

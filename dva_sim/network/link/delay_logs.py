@@ -34,7 +34,7 @@ _SPARSE_S: Final = 5.0  # between probes: a longer step is doubted
 _SPARSEST_S: Final = 60.0  # a longer step is in a smaller unit
 _USUAL_S: Final = (0.010, 2.0)  # median delay that needs no unit to be believed
 _TOO_SHORT: Final = "needs probes of at least two moments"
-_WRITE: Final = "write a first line such as time_s,delay_ms"
+WRITE: Final = "write a first line such as time_s,delay_ms"
 
 
 class DelayLog(NamedTuple):
@@ -45,6 +45,7 @@ class DelayLog(NamedTuple):
         delays: Measured delays [s]; not a number for lost probes, shape `(n,)`.
         runs: Number of runs of ping, each played right after the one before.
         units: Units of the file's times and delays.
+        assumed: `times`, `delays`: those whose unit the file does not name.
         doubts: Sentences on what is probably a mistake, without full stop.
     """
 
@@ -52,6 +53,7 @@ class DelayLog(NamedTuple):
     delays: Floats
     runs: int = 1
     units: tuple[str, str] = ("s", "ms")
+    assumed: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
 
 
@@ -125,8 +127,12 @@ def _in_columns(path: str, lines: list[tuple[int, str]]) -> DelayLog:
     if len(set(times)) < 2:
         raise ConfigError(_TOO_SHORT, path)
     time_unit = columns.time_unit or _unit_of_times(times)
+    named = {"times": columns.time_unit, "delays": columns.delay_unit}
     log = DelayLog(
-        np.array(times) * UNITS[time_unit], np.array(delays), units=(time_unit, delay_unit)
+        np.array(times) * UNITS[time_unit],
+        np.array(delays),
+        units=(time_unit, delay_unit),
+        assumed=tuple(what for what, unit in named.items() if unit is None),
     )
     return log._replace(doubts=tuple(_doubts(log, columns)))
 
@@ -157,7 +163,7 @@ def _named(names: list[str], path: str, number: int) -> _Columns:
         time = 1 - delay
     if time is None or delay is None:
         problem = f"needs a column of times and one of delays; it has {listed(names)}"
-        raise ConfigError(f"{problem}: {_WRITE}", path, number, 1)
+        raise ConfigError(f"{problem}: {WRITE}", path, number, 1)
     return _Columns(len(names), time, delay, _unit_of(names[time]), _unit_of(names[delay]))
 
 
@@ -198,14 +204,14 @@ def _doubts(log: DelayLog, columns: _Columns) -> list[str]:
     if columns.time_unit is None and (step := _step(log.times)) > _SPARSE_S:
         doubts.append(
             f"its times are taken for {time_unit}, {step:g} s between probes; if they are in "
-            f"another unit, {_WRITE}"
+            f"another unit, {WRITE}"
         )
     lasting = log.delays[~np.isnan(log.delays)]
     usual = float(np.median(lasting)) if len(lasting) else _USUAL_S[0]
     if columns.delay_unit is None and not _USUAL_S[0] <= usual <= _USUAL_S[1]:
         doubts.append(
             f"its delays are taken for {delay_unit}, {usual * 1000:.3g} ms in the median; if they "
-            f"are in another unit, {_WRITE}; if they are throughput, set link.rate_bps instead"
+            f"are in another unit, {WRITE}; if they are throughput, set link.rate_bps instead"
         )
     return doubts
 

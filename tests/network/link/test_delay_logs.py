@@ -8,6 +8,7 @@ from helpers.wording import unnamed
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.link import read_delay_log
+from dva_sim.testing.files import check_file
 
 EPOCH = 1_700_000_000
 
@@ -113,3 +114,22 @@ def test_a_log_of_throughput_is_refused_for_what_it_is(tmp_path, text, names):
     with pytest.raises(ConfigError) as error:
         read_delay_log(write(tmp_path, text))
     assert unnamed(str(error.value), "delays.log:1:1", *names) == []
+
+
+@pytest.mark.parametrize(
+    ("head", "asks"),
+    [
+        ("", "no unit of its times and delays; if it is another, write"),
+        ("time,delay_ms", "no unit of its times; if"),
+        ("time_s,rtt", "no unit of its delays; if"),
+        ("time_s,delay_ms", ""),
+        ("# s, ms", ""),
+    ],
+)
+def test_check_says_which_units_are_assumed_and_asks(tmp_path, head, asks):
+    rows = "0,40\n1,45\n2,42\n"
+    verdict = check_file(Path(write(tmp_path, f"{head}\n{rows}" if head else rows)))
+    assert (verdict.problems, list(verdict.doubts)) == ([], [])
+    assert "times in s, delays in ms" in verdict.note
+    assert asks in verdict.note
+    assert ("assumed" in verdict.note) is bool(asks)
