@@ -1,6 +1,6 @@
 """Tables in CSV files as spreadsheets and other programs save them.
 
-Separated by commas, semicolons or tabs; where it is not the comma, numbers may have a decimal
+Separated by commas, semicolons or tabs; where it is not the comma, all numbers may have a decimal
 comma. Blank lines do not count, and every mistake has its line and column.
 """
 
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,9 @@ from pathlib import Path
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.read_once import read_once
 from dva_sim.kernel.yaml_files import read_text
+
+_POINT = re.compile(r"[-+]?\d+\.\d+")
+_COMMA = re.compile(r"(?:^|[;\t])[\s\"]*[-+]?\d+,\d+[\s\"]*(?:$|[;\t])")
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +39,20 @@ class Cell:
         """Another cell of the row."""
         return Cell(self.table, self.line, self.row, place)
 
+    @property
+    def decimal(self) -> str:
+        """Content with a decimal point.
+
+        Raises:
+            ConfigError: it is a number with a point in a table of decimal commas, where 1.060 may
+                be a thousand.
+        """
+        if not self.table.has_commas:
+            return self.text
+        if _POINT.fullmatch(self.text):
+            raise self.error(f"{self.text!r} has a point, other numbers a decimal comma: write one")
+        return self.text.replace(",", ".")
+
     def number(self, what: str) -> float:
         """Content as a finite number.
 
@@ -42,7 +60,7 @@ class Cell:
             ConfigError: it is none; `what` says what it should be.
         """
         try:
-            value = float(self.text.replace(",", "."))
+            value = float(self.decimal)
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
@@ -65,12 +83,14 @@ class Table:
         names: Names of the columns, as the header says.
         rows: Line of each row, and its cells: as many as there are names.
         line: Line of the header.
+        has_commas: True if numbers have a decimal comma.
     """
 
     file: Path
     names: tuple[str, ...]
     rows: list[tuple[int, list[str]]]
     line: int
+    has_commas: bool
 
     def cells(self) -> Iterator[Cell]:
         """Yield the first cell of each row."""
@@ -118,4 +138,5 @@ def read_table(path: str) -> Table:
             fault = f"has {cells}, and the header {len(names)}"
             problem = f"{fault}: fill in, or quote a cell that holds {delimiter!r}"
             raise ConfigError(problem, file, number, 1)
-    return Table(file, tuple(name.strip() for name in names), rows[1:], line)
+    has_commas = delimiter != "," and any(_COMMA.search(line) for line in text.split("\n"))
+    return Table(file, tuple(name.strip() for name in names), rows[1:], line, has_commas)

@@ -221,8 +221,7 @@ class _Timed(Model[TimedScenario]):
     build = staticmethod(timed.build)
 
     def contradictions(self, scenario: TimedScenario) -> list[str]:
-        left_out = scenario.events_left_out
-        return [f"events: {left_out}"] if left_out else []
+        return [f"events: {doubt}" for doubt in scenario.events_doubts]
 
     rehearse = staticmethod(timed.rehearse_timed)
     simulate = staticmethod(timed.simulate_timed)

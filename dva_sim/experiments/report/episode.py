@@ -22,7 +22,7 @@ from dva_sim.recordings.writing import check_target, write_recording
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import Recording, simulate
 from dva_sim.simulation.models import AnyScenario, Tables, model_for, model_of
-from dva_sim.simulation.scenario import Scenario, contradictions
+from dva_sim.simulation.scenario import Scenario
 from dva_sim.simulation.task import TaskScenario
 
 
@@ -172,8 +172,8 @@ class EpisodeRequest:
 
 def doubts(played: Sequence[AnyScenario]) -> list[str]:
     """List the scenarios' contradictory settings, one sentence each, without duplicates."""
-    full = [scenario for scenario in played if isinstance(scenario, Scenario)]
-    return list(dict.fromkeys(doubt for scenario in full for doubt in contradictions(scenario)))
+    every = (model_for(scenario).contradictions(scenario) for scenario in played)
+    return list(dict.fromkeys(doubt for of_one in every for doubt in of_one))
 
 
 def open_recording(file: Path, pictures: Wanted) -> Opened:

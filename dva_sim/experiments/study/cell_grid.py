@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -33,6 +34,7 @@ from dva_sim.simulation.models import AnyScenario, model_for, model_of
 from dva_sim.simulation.run_measures import COVARIATES
 
 REFERENCE = -1
+_IN_FILES = {"dispatch.policy", "events", "events.table"}
 
 RunKey = tuple[str, int]
 
@@ -341,11 +343,14 @@ def _source_of(study: Study, part: str) -> str:
 
 
 def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """A policy in a file beside the study is found from anywhere."""
-    key = "dispatch.policy"
-    named: dict[str, Any] = {"dispatch": {"policy": changes.get(key)}}
-    scenarios.locate_files(named, [folder])
-    return {**changes, key: named["dispatch"]["policy"]} if key in changes else changes
+    """Let a policy or a table of events in a file beside the study be found from anywhere."""
+    found = dict(changes)
+    for key in _IN_FILES & changes.keys():
+        part, _, inner = key.partition(".")
+        named = {part: {inner: changes[key]} if inner else copy.deepcopy(changes[key])}
+        scenarios.locate_files(named, [folder])
+        found[key] = named[part][inner] if inner else named[part]
+    return found
 
 
 def _team(part_cells: Sequence[DesignCell]) -> int:

@@ -189,10 +189,9 @@ def _of_team(scenario: Scenario) -> Iterator[str]:
 
 
 def _of_time(scenario: Scenario) -> Iterator[str]:
-    """Yield what would happen after the end, or before the beginning."""
+    """Yield what would happen after the end, and rows of a table that are in doubt."""
     end = scenario.horizon_s
-    if scenario.events_left_out:
-        yield f"events: {scenario.events_left_out}"
+    yield from (f"events: {doubt}" for doubt in scenario.events_doubts)
     for number, event in enumerate(scenario.events):
         if event.at_s >= end:
             yield (

@@ -87,7 +87,7 @@ def _form_of(value: Any) -> str:
 class WithTable(Config):
     """A scenario whose events may have come from a table."""
 
-    _told: tuple[str, str] = PrivateAttr(("", ""))
+    _told: tuple[str, tuple[str, ...]] = PrivateAttr(("", ()))
 
     @property
     def events_summary(self) -> str:
@@ -95,13 +95,13 @@ class WithTable(Config):
         return self._told[0]
 
     @property
-    def events_left_out(self) -> str:
-        """Rows of a table that are not in the run, without full stop; empty: none."""
+    def events_doubts(self) -> tuple[str, ...]:
+        """Rows of a table that are not in the run, or repeat others; each without full stop."""
         return self._told[1]
 
     def tell(self, found: TableEvents) -> None:
         """Keep what is said of the table that the events have come from."""
-        self._told = found.summary, found.left_out
+        self._told = found.summary, found.doubts
 
 
 class Alarm(NamedTuple):
@@ -144,12 +144,12 @@ class TableEvents:
     Attributes:
         alarms: Alarms within the run.
         summary: Count per kind, first, last, and time 0, in a line.
-        left_out: Rows that are not in the run; empty: none.
+        doubts: Rows that are not in the run, and rows that repeat others.
     """
 
     alarms: list[Alarm]
     summary: str
-    left_out: str
+    doubts: tuple[str, ...]
 
 
 def read_events(table: EventTable, horizon_s: float, ground: Ground, error: Fail) -> TableEvents:
@@ -192,7 +192,7 @@ class _Reader:
 
     def events(self, horizon_s: float, error: Fail) -> TableEvents:
         found, skipped, order = list[tuple[float, Alarm]](), 0, 0
-        last = -math.inf
+        seen, repeats, last = set[tuple[float, Alarm]](), list[int](), -math.inf
         for cells in self._rows.cells():
             time = self._moments.read(self._cell(cells, "time"))
             kind = self._kind(self._cell(cells, "kind"))
@@ -203,6 +203,9 @@ class _Reader:
                 skipped += 1
                 continue
             found.append((time, self._alarm(cells, kind)))
+            if found[-1] in seen:
+                repeats.append(cells.line)
+            seen.add(found[-1])
         if not found:
             raise ConfigError("has no alarms: write a row for each below the header",
                               self._rows.file)  # fmt: skip
@@ -215,7 +218,8 @@ class _Reader:
         if not within:
             text = f"{left_out}: none is left; set events.start to a moment of the table"
             raise error(f"{text}, whose first row is at {self._moments.text(found[0][0])}", ())
-        return TableEvents(within, self._summary(within, zero, order), left_out)
+        doubts = tuple(filter(None, (left_out, self._repeated(repeats))))
+        return TableEvents(within, self._summary(within, zero, order), doubts)
 
     # --- columns -------------------------------------------------------------------------
 
@@ -346,7 +350,7 @@ class _Reader:
             f"time 0 is {self._moments.text(zero)}{first}",
         ]
         if order:
-            parts.append(f"row {order} is earlier than the one before: rows are taken by time")
+            parts.append(f"line {order} is earlier than the one before: rows are sorted by time")
         used = {n for column, n in self._columns.items() if column not in self._ground.ignored}
         unused = [repr(name) for n, name in enumerate(self._rows.names) if n not in used]
         if unused:
@@ -363,6 +367,13 @@ class _Reader:
         why = ", ".join(f"{n:,} {reason}" for reason, n in reasons.items() if n)
         rows = "1 row" if count == 1 else f"{count:,} rows"
         return f"{rows} of {self._rows.file.name} left out: {why}" if count else ""
+
+    def _repeated(self, lines: Sequence[int]) -> str:
+        if not lines:
+            return ""
+        rows = "1 row repeats" if len(lines) == 1 else f"{len(lines):,} rows repeat"
+        where = f"of {self._rows.file.name}: line {lines[0]}"
+        return f"{rows} an earlier one {where}; each counts, so delete what is one alarm"
 
 
 def _plain(word: str) -> str:

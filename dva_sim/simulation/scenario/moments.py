@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Final
@@ -12,6 +11,8 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import guess
 from dva_sim.kernel.table_files import Cell
 
+_MILLISECONDS: Final = 1e11  # since 1970; as seconds the year 5138
+_DAY: Final = len("2026-03-01")
 _FORMS: Final = "ISO 8601, such as 2026-03-01T08:00:00+01:00, or seconds"
 
 
@@ -25,7 +26,10 @@ def zone_named(name: str) -> ZoneInfo:
     try:
         return ZoneInfo(name)
     except (OSError, ValueError, KeyError):
-        near = guess(name, available_timezones())
+        if not (known := available_timezones()):
+            problem = "this computer knows no time zones: pip install tzdata"
+            raise ConfigError(f"time_zone {name!r}: {problem}") from None
+        near = guess(name, known)
         more = f"did you mean {near!r}?" if near else "write one such as Europe/Lisbon, or UTC"
         raise ConfigError(f"time_zone {name!r} is not known; {more}") from None
 
@@ -49,8 +53,10 @@ class Moments:
             ConfigError: it is no moment, or not a certain one, or of the other form.
         """
         try:
-            return self.parse(cell.text)
+            return self.parse(cell.decimal)
         except ConfigError as problem:
+            if problem.line is not None:
+                raise
             raise cell.error(f"time {problem.problem}") from None
 
     def parse(self, given: str | float) -> float:
@@ -81,6 +87,8 @@ class Moments:
             moment = datetime.fromisoformat(text)
         except ValueError:
             raise ConfigError(f"{text[:40]!r} should be {_FORMS}") from None
+        if len(text) <= _DAY:
+            raise ConfigError(f"{text!r} has no time of day: write {text}T08:00:00, or the like")
         if moment.tzinfo is not None:
             return moment.timestamp()
         if self._zone is None:
@@ -102,7 +110,9 @@ class Moments:
 
 def _seconds(text: str) -> float | None:
     try:
-        value = float(text.replace(",", ".") if text.count(",") == 1 else text)
+        value = float(text)
     except ValueError:
         return None
-    return value if math.isfinite(value) else None
+    if not abs(value) < _MILLISECONDS:
+        raise ConfigError(f"{text!r} is too large for seconds; of milliseconds, write a thousandth")
+    return value
