@@ -25,7 +25,7 @@ _COMMA = re.compile(r"(?:^|[;\t])[\s\"]*[-+]?\d+,\d+[\s\"]*(?:$|[;\t])")
 class Cell:
     """A row of a table, or one cell of it."""
 
-    table: Table
+    table: CsvTable
     line: int
     row: Sequence[str]
     place: int = 0
@@ -75,7 +75,7 @@ class Cell:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class CsvTable:
     """A table with a header.
 
     Attributes:
@@ -103,7 +103,7 @@ class Table:
 
 
 @read_once(lambda path: [Path(path)])
-def read_table(path: str) -> Table:
+def read_table(path: str) -> CsvTable:
     """Read a table; what stands in its cells is not judged.
 
     Raises:
@@ -139,4 +139,4 @@ def read_table(path: str) -> Table:
             problem = f"{fault}: fill in, or quote a cell that holds {delimiter!r}"
             raise ConfigError(problem, file, number, 1)
     has_commas = delimiter != "," and any(_COMMA.search(line) for line in text.split("\n"))
-    return Table(file, tuple(name.strip() for name in names), rows[1:], line, has_commas)
+    return CsvTable(file, tuple(name.strip() for name in names), rows[1:], line, has_commas)

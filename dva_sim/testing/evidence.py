@@ -82,21 +82,16 @@ def judged_recording(opened: Opened) -> list[Verdict]:
 
     A rule whose topics are missing is not judged, whatever the others show.
     """
-    from dva_sim.simulation.full.verdicts import (
-        NOT_JUDGED,
-        RULES,
-        Verdict,
-        judged,
-    )  # late: start-up
+    from dva_sim.simulation.full import verdicts as v  # late: start-up
 
     until = "" if opened.is_whole else f", up to {opened.playback.duration:.0f} s"
-    found = judged(opened.playback.recorder.facts, opened.terms, until)
+    found = v.judged(opened.playback.recorder.facts, opened.terms, until)
     topics = missing_topics(opened)
-    verdicts = list[Verdict]()
-    for rule in RULES:
+    verdicts = list[v.Verdict]()
+    for rule in v.RULES:
         if lacking := topics.get(rule):
             text = f"the recording lacks {listed(lacking)}"
-            verdicts.append(Verdict(rule, NOT_JUDGED, text, lacks_facts=True))
+            verdicts.append(v.Verdict(rule, v.NOT_JUDGED, text, lacks_facts=True))
         else:
             verdicts += [verdict for verdict in found if verdict.rule == rule]
     return verdicts

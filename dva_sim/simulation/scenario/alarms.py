@@ -6,8 +6,8 @@ from typing import Any, cast
 
 from dva_sim.kernel.config import Fail
 from dva_sim.simulation.scenario.event_table import (
-    Alarm,
-    EventTable,
+    TableAlarm,
+    EventTableConfig,
     Ground,
     TableEvents,
     read_events,
@@ -19,13 +19,13 @@ from dva_sim.worlds.site import Site
 FITS_M = 0.4  # radius that must fit where an event is, so that a robot can get near
 
 
-def table_of(scenario: Scenario) -> EventTable | None:
+def table_of(scenario: Scenario) -> EventTableConfig | None:
     """The table that a scenario has in place of a list of events, until it is expanded."""
     events = cast(Any, scenario.events)
-    return events if isinstance(events, EventTable) else None
+    return events if isinstance(events, EventTableConfig) else None
 
 
-def with_events(scenario: Scenario, table: EventTable, error: Fail) -> Scenario:
+def with_events(scenario: Scenario, table: EventTableConfig, error: Fail) -> Scenario:
     """The scenario with the alarms of its table.
 
     Raises:
@@ -37,7 +37,7 @@ def with_events(scenario: Scenario, table: EventTable, error: Fail) -> Scenario:
     return scenario
 
 
-def table_events(scenario: Scenario, table: EventTable, error: Fail) -> TableEvents:
+def table_events(scenario: Scenario, table: EventTableConfig, error: Fail) -> TableEvents:
     """The alarms of a scenario's table, and what is said of them; raises as `read_events`."""
     site = site_of(scenario, seed=0)
     is_on_earth = scenario.site.map is None
@@ -63,7 +63,7 @@ def why_not(site: Site, x: float, y: float) -> str:
     return ""
 
 
-def _event(alarm: Alarm) -> EventConfig:
+def _event(alarm: TableAlarm) -> EventConfig:
     return EventConfig(
         kind=alarm.kind,
         room=alarm.room,

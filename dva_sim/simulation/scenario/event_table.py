@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Annotated, Any, Final
 
 from pydantic import BeforeValidator, Field, GetCoreSchemaHandler, PrivateAttr
 from pydantic_core import CoreSchema, core_schema
@@ -19,9 +19,9 @@ from pydantic_core import CoreSchema, core_schema
 from dva_sim.kernel.config import Config, Fail
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either, hint, listed
-from dva_sim.kernel.table_files import Cell, Table, read_table
+from dva_sim.kernel.table_files import Cell, CsvTable, read_table
 from dva_sim.protocol.event_kinds import EVENT_KINDS
-from dva_sim.simulation.scenario.moments import Moments, zone_named
+from dva_sim.simulation.scenario.moments import MomentReader, zone_named
 
 Point = tuple[float, float]
 COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {
@@ -49,7 +49,7 @@ def _as_text(value: Any) -> Any:
     return value.isoformat() + ("+00:00" if offset == "Z" else offset or "")
 
 
-class EventTable(Config):
+class EventTableConfig(Config):
     """Events from a table of dated alarms; each is reported when it begins.
 
     Attributes:
@@ -70,18 +70,18 @@ class EventTable(Config):
 class OrTable:
     """Marks a list of events that a file may give as a table; `build` expands it."""
 
-    keyed: Final = EventTable
+    keyed: Final = EventTableConfig
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Choose by the form of the value, so that mistakes are told of that form alone."""
-        forms = {"list": handler(source), "keyed": handler.generate_schema(EventTable)}
+        forms = {"list": handler(source), "keyed": handler.generate_schema(EventTableConfig)}
         return core_schema.tagged_union_schema(forms, _form_of)
 
 
 def _form_of(value: Any) -> str:
-    return "keyed" if isinstance(value, Mapping | EventTable) else "list"
+    return "keyed" if isinstance(value, Mapping | EventTableConfig) else "list"
 
 
 class WithTable(Config):
@@ -104,7 +104,8 @@ class WithTable(Config):
         self._told = found.summary, found.doubts
 
 
-class Alarm(NamedTuple):
+@dataclass(frozen=True, kw_only=True)
+class TableAlarm:
     """A row: start [s], kind, place, share of severity and confidence; None where not given."""
 
     at_s: float
@@ -147,12 +148,14 @@ class TableEvents:
         doubts: Rows that are not in the run, and rows that repeat others.
     """
 
-    alarms: list[Alarm]
+    alarms: list[TableAlarm]
     summary: str
     doubts: tuple[str, ...]
 
 
-def read_events(table: EventTable, horizon_s: float, ground: Ground, error: Fail) -> TableEvents:
+def read_events(
+    table: EventTableConfig, horizon_s: float, ground: Ground, error: Fail
+) -> TableEvents:
     """Read the alarms of a table that fall into a run.
 
     Args:
@@ -182,17 +185,17 @@ def read_events(table: EventTable, horizon_s: float, ground: Ground, error: Fail
 class _Reader:
     """Reads the rows of one table."""
 
-    def __init__(self, table: EventTable, rows: Table, ground: Ground) -> None:
+    def __init__(self, table: EventTableConfig, rows: CsvTable, ground: Ground) -> None:
         self._table, self._rows, self._ground = table, rows, ground
         self._columns = self._find_columns()
-        self._moments = Moments(table.time_zone)
+        self._moments = MomentReader(table.time_zone)
         self._kinds = {_plain(kind): kind for kind in EVENT_KINDS}
         self._kinds |= {_plain(word): kind or "" for word, kind in table.kinds.items()}
         self._rooms = {room.casefold(): room for room in ground.rooms}
 
     def events(self, horizon_s: float, error: Fail) -> TableEvents:
-        found, skipped, order = list[tuple[float, Alarm]](), 0, 0
-        seen, repeats, last = set[tuple[float, Alarm]](), list[int](), -math.inf
+        found, skipped, order = list[tuple[float, TableAlarm]](), 0, 0
+        seen, repeats, last = set[tuple[float, TableAlarm]](), list[int](), -math.inf
         for cells in self._rows.cells():
             time = self._moments.read(self._cell(cells, "time"))
             kind = self._kind(self._cell(cells, "kind"))
@@ -211,7 +214,7 @@ class _Reader:
                               self._rows.file)  # fmt: skip
         found.sort(key=lambda each: each[0])
         zero = self._zero(found[0][0], error)
-        within = [a._replace(at_s=t - zero) for t, a in found if 0 <= t - zero < horizon_s]
+        within = [replace(a, at_s=t - zero) for t, a in found if 0 <= t - zero < horizon_s]
         early = sum(time < zero for time, _ in found)
         late = len(found) - early - len(within)
         left_out = self._left_out(skipped, early, late, horizon_s)
@@ -254,10 +257,18 @@ class _Reader:
 
     # --- cells ---------------------------------------------------------------------------
 
-    def _alarm(self, cells: Cell, kind: str) -> Alarm:
+    def _alarm(self, cells: Cell, kind: str) -> TableAlarm:
         room, position = self._place(cells) if self._ground.is_placed else (None, None)
         severity, confidence = self._share(cells, "severity"), self._share(cells, "confidence")
-        return Alarm(0.0, kind, room, position, severity, confidence, self._false_alarm(cells))
+        return TableAlarm(
+            at_s=0.0,
+            kind=kind,
+            room=room,
+            position=position,
+            severity=severity,
+            confidence=confidence,
+            false_alarm=self._false_alarm(cells),
+        )
 
     def _kind(self, cell: Cell) -> str:
         kind = self._kinds.get(_plain(cell.text))
@@ -340,7 +351,7 @@ class _Reader:
         except ConfigError as problem:
             raise error(f"start {problem.problem}", ("start",)) from None
 
-    def _summary(self, alarms: Sequence[Alarm], zero: float, order: int) -> str:
+    def _summary(self, alarms: Sequence[TableAlarm], zero: float, order: int) -> str:
         counts = Counter(alarm.kind for alarm in alarms)
         kinds = ", ".join(f"{count:,} {kind}" for kind, count in counts.most_common())
         first = " (the first row)" if self._table.start is None and self._moments.is_dated else ""

@@ -1,4 +1,4 @@
-"""Moments as tables write them: ISO 8601 with or without an offset, or seconds."""
+"""MomentReader as tables write them: ISO 8601 with or without an offset, or seconds."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def zone_named(name: str) -> ZoneInfo:
         raise ConfigError(f"time_zone {name!r} is not known; {more}") from None
 
 
-class Moments:
+class MomentReader:
     """Reads the moments of one table, which are all dates or all seconds."""
 
     def __init__(self, time_zone: str | None) -> None:

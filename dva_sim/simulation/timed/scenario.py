@@ -22,8 +22,8 @@ from dva_sim.protocol.event_kinds import EventKind
 from dva_sim.simulation.scenario import check_policy, locate_files
 from dva_sim.simulation.scenario.alarms import why_not
 from dva_sim.simulation.scenario.event_table import (
-    Alarm,
-    EventTable,
+    TableAlarm,
+    EventTableConfig,
     Ground,
     TableEvents,
     WithTable,
@@ -138,7 +138,7 @@ def table_events(scenario: TimedScenario, error: Fail) -> TableEvents:
     return read_events(scenario.events, scenario.horizon_s, _ground_of(scenario, error), fail)
 
 
-def _listed(alarm: Alarm) -> ListedEvent:
+def _listed(alarm: TableAlarm) -> ListedEvent:
     return ListedEvent(
         at_s=alarm.at_s,
         zone=alarm.room,
@@ -420,7 +420,7 @@ class TimedScenario(WithTable):
     responders: Annotated[tuple[Group, ...], Field(min_length=1)]
     operators: Operators = Operators()
     demand: tuple[EventStream, ...] = ()
-    events: EventTable | None = None
+    events: EventTableConfig | None = None
     dispatch: TimedDispatch = TimedDispatch()
     intensity: Annotated[Positive, Key("rate of alarms", stated=False)] = 1.0
     warm_up_s: NonNegative = 0.0
