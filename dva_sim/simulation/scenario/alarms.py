@@ -6,9 +6,9 @@ from typing import Any, cast
 
 from dva_sim.kernel.config import Fail
 from dva_sim.simulation.scenario.event_table import (
-    TableAlarm,
     EventTableConfig,
     Ground,
+    TableAlarm,
     TableEvents,
     read_events,
 )

@@ -22,9 +22,9 @@ from dva_sim.protocol.event_kinds import EventKind
 from dva_sim.simulation.scenario import check_policy, locate_files
 from dva_sim.simulation.scenario.alarms import why_not
 from dva_sim.simulation.scenario.event_table import (
-    TableAlarm,
     EventTableConfig,
     Ground,
+    TableAlarm,
     TableEvents,
     WithTable,
     read_events,
