@@ -27,6 +27,7 @@ from dva_sim.experiments.report.episode import (
     write_replay,
 )
 from dva_sim.kernel.measure import Measure
+from dva_sim.recordings.channels import STORY
 from dva_sim.recordings.pictures import Wanted
 from dva_sim.recordings.pictures.run_endings import story
 from dva_sim.simulation.full import Playback, Recording
@@ -413,7 +414,6 @@ def replay(
         RulesNotJudged: facts are missing to judge it by all safety rules.
     """
     from dva_sim.live.recorded_lines import is_part, readable  # late: start-up
-    from dva_sim.recordings.channels import STORY  # late: start-up
     from dva_sim.testing.evidence import judged_recording  # late: start-up
 
     with readable(file, mcap) as found:
