@@ -419,15 +419,15 @@ def replay(
     with readable(file, mcap) as found:
         opened = open_recording(found, pictures)
         run = opened.playback
-        found = judged_recording(opened)
+        verdicts = judged_recording(opened)
         tell_story(run, where)
         if not run.recorder.timeline:
             where.print(f"[yellow]the recording lacks {STORY}: nothing to tell[/yellow]")
         if opened.tables is not None:
             how = f"simulated by dva-sim {opened.about['version']}"
-            tell_outcome(opened.tables, how, where, found)
-        elif unjudged_rules(found):
-            print_lines([_unjudged(found)], where)
+            tell_outcome(opened.tables, how, where, verdicts)
+        elif unjudged_rules(verdicts):
+            print_lines([_unjudged(verdicts)], where)
         there = f"{run.duration:.0f} of {opened.lasted:.0f} s are there"
         if is_part(file):
             there = f"{run.duration:.0f} s are there; the run was interrupted or is still running"
@@ -435,7 +435,7 @@ def replay(
             where.print(f"[yellow]{file} was cut short: {there}[/yellow]", soft_wrap=True)
         made = [] if mcap is None else [f"Recording: {mcap}"]
         _say_written(chain(made, write_replay(opened, pictures, ros2)), pictures, where)
-    if unjudged := unjudged_rules(found):
+    if unjudged := unjudged_rules(verdicts):
         raise RulesNotJudged(unjudged)
 
 

@@ -65,7 +65,7 @@ class Clock:
             peek, step = self.env.peek, self.env.step
             while peek() < end:
                 step()
-            self._now_us, self.now = end, end / US
+            self._set(end)
 
     def step(self) -> None:
         """Let the next event happen."""
@@ -82,3 +82,7 @@ class Clock:
             action(*args)
 
         self.env.timeout(at - self._event_us).callbacks.append(call)
+
+    def _set(self, now: int) -> None:
+        """It is that time [us], and nothing before it is due."""
+        self._now_us, self.now = now, now / US

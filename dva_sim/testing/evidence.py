@@ -118,7 +118,7 @@ def missing_topics(opened: Opened) -> dict[str, list[str]]:
     lacking += [book] if o.BookNews not in kinds and book not in lacking else []
     found: dict[str, list[str]] = {}
     for topic in lacking:
-        rules = OF_ROBOTS if topic.startswith(OBSERVED) or is_camera(topic) else ()
+        rules: tuple[str, ...] = OF_ROBOTS if topic.startswith(OBSERVED) or is_camera(topic) else ()
         if topic == book:
             rules = OF_THE_DVA
         elif topic.startswith(MESSAGES):

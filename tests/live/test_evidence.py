@@ -21,7 +21,7 @@ from dva_sim.core.dva import Dva
 from dva_sim.core.events import EventTable
 from dva_sim.core.store import Store
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError, ExitCode
 from dva_sim.live import recorded_lines, recording
 from dva_sim.live.recording import Keeper, LiveRecorder, TraceFile
 from dva_sim.protocol import messages as m
@@ -331,10 +331,10 @@ def test_lines_that_were_left_are_read_like_a_recording_and_stay(tmp_path):
         file.write(b'["sent", 9.9, "02')
     left = keeper.path.read_bytes()
     done = call("check", str(keeper.path))
-    assert done.returncode == 0, done.stdout
+    assert done.returncode == ExitCode.NOT_JUDGED, done.stdout
     assert "interrupted" in done.stdout
     ended = call("replay", str(keeper.path))
-    assert (ended.returncode, ended.stderr) == (0, "")
+    assert (ended.returncode, unnamed(ended.stderr, "S1", "S7")) == (ExitCode.NOT_JUDGED, [])
     assert unnamed(ended.stdout, "mode Idle", "run.mcap.part", " 2 s ") == []
     with playing(ReplayOptions(file=keeper.path).player()) as player:
         assert player.run is not None
@@ -348,7 +348,7 @@ def test_a_recording_is_made_of_lines_that_were_left_where_one_is_asked_for(tmp_
     keeper.close()
     made = tmp_path / "made.mcap"
     ended = call("replay", str(keeper.path), "--mcap", str(made))
-    assert (ended.returncode, ended.stderr) == (0, "")
+    assert (ended.returncode, unnamed(ended.stderr, "S1", "S7")) == (ExitCode.NOT_JUDGED, [])
     assert found_in(made) == ([], [], "20 messages")
     assert keeper.path.exists()
     again = call("replay", str(keeper.path), "--mcap", str(made))
@@ -361,7 +361,7 @@ def test_the_lines_of_a_run_that_goes_on_can_be_read_meanwhile(tmp_path):
     keeper = record(tmp_path / "run.mcap")
     inlet = keeper.inlet()
     ended = call("replay", str(keeper.path))
-    assert (ended.returncode, ended.stderr) == (0, "")
+    assert (ended.returncode, unnamed(ended.stderr, "S1", "S7")) == (ExitCode.NOT_JUDGED, [])
     with pytest.raises(ConfigError, match=r"run\.mcap\.part.*in progress"):
         Keeper(tmp_path / "run.mcap", scenario_of(), 1)
     os.write(inlet, b'["told", 3.0, "dva", "is here", "event"]\n')

@@ -86,8 +86,8 @@ def beside_table(found: ChoiceMap, part: str) -> CellTable:
         cells = [found.beside["contacts"][g, c], stops]
         waits = [] if found.waiting is None else [regret_number(100.0 * float(found.waiting[g, c]))]
         choice = level_name(found.choice.name, found.choice.levels[c], short=True)
-        medians, behind = _range(found.median[g, c]), _behind(found, g, c)
-        rows.append([situation_name(found, g), choice, medians, behind, *map(_range, cells), *waits])
+        losses = _range(found.median[g, c]), _behind(found, g, c)
+        rows.append([situation_name(found, g), choice, *losses, *map(_range, cells), *waits])
     return CellTable(part, heads, 2, rows, note=note("beside", **facts_of(found)))
 
 

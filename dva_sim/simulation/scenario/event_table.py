@@ -75,7 +75,7 @@ class OrTable:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Choose by the form of the value, so that mistakes are told of that form alone."""
+        """Choose by the form of the value, so that mistakes are reported for that form alone."""
         forms = {"list": handler(source), "keyed": handler.generate_schema(EventTableConfig)}
         return core_schema.tagged_union_schema(forms, _form_of)
 
@@ -161,7 +161,7 @@ def read_events(
     Args:
         table: The scenario's keys.
         horizon_s: Length of the run [s].
-        ground: Where the places are.
+        ground: Floor and coordinates of the site.
         error: Makes the error for a problem at a key of the table.
 
     Raises:

@@ -50,7 +50,7 @@ class MomentReader:
         """Return the time of a cell [s], counted from 1970 if it is a date.
 
         Raises:
-            ConfigError: it is no moment, or not a certain one, or of the other form.
+            ConfigError: not a moment, or an ambiguous one, or one of the other form.
         """
         try:
             return self.parse(cell.decimal)
@@ -60,7 +60,7 @@ class MomentReader:
             raise cell.error(f"time {problem.problem}") from None
 
     def parse(self, given: str | float) -> float:
-        """The same of a text or number, without its place.
+        """Return the time of a text or number whose place is not known [s].
 
         Raises:
             ConfigError: as `read`.
