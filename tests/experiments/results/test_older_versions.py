@@ -9,6 +9,7 @@ from helpers.processes.command_line import call
 from helpers.wording import unnamed
 
 import dva_sim
+from dva_sim.kernel.errors import ExitCode
 
 DATA = TESTS / "data" / "results-0.7.0"
 CONFIRMED_S = {"req-rep": [39.477242, 110.563333], "latest-wins": [35.876995, 88.163333]}
@@ -44,13 +45,18 @@ def test_older_results_are_loaded(older):
         ("show .", "dva-sim 0.7.0"),
         ("show .", "too small to tell"),
         ("show . --columns", "somebody is on scene"),
-        ("replay recordings/drive-0-0-0.mcap", "dva-sim 0.7.0"),
     ],
 )
-def test_older_results_and_recordings_are_shown(older, command, expected):
+def test_older_results_are_shown(older, command, expected):
     done = call(*command.split(), cwd=older)
     assert (done.returncode, done.stderr) == (0, "")
     assert expected in done.stdout
+
+
+def test_an_older_recording_is_told_and_its_rules_are_not_judged(older):
+    done = call("replay", "recordings/drive-0-0-0.mcap", cwd=older)
+    assert (done.returncode, unnamed(done.stderr, "S1", "S7")) == (ExitCode.NOT_JUDGED, [])
+    assert "dva-sim 0.7.0" in done.stdout
 
 
 @pytest.mark.system  # draws
