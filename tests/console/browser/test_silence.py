@@ -108,8 +108,16 @@ def opened(page: Page, cut: Cut, address: str, name: str) -> None:
     if name == "guard":
         page.get_by_role("button", name="guard-1").click()
     if name == "phone#/teleoperation":
-        page.get_by_role("button", name="Take control").tap()
-        page.get_by_role("link", name="Go on").wait_for()
+        # The DVA may have given the robot away just before; a person asks again.
+        goes_on, take = (
+            page.get_by_role("link", name="Go on"),
+            page.get_by_role("button", name="Take control"),
+        )
+        while not goes_on.is_visible():
+            take.or_(goes_on).first.wait_for()
+            if take.is_visible():
+                take.tap()
+            page.wait_for_timeout(1000)
         page.evaluate("location.hash = '#/teleoperation'")
     if name == "drive":
         page.get_by_role("button", name="Take control").click()
