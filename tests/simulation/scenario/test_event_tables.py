@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from dva_sim.console.options import ConsoleOptions
+from dva_sim.experiments.report.episode import EpisodeRequest
+from dva_sim.experiments.study.cell_grid import cells
 from dva_sim.experiments.study.hashing import stable_hash
+from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import load_yaml
+from dva_sim.live.options import LiveOptions
 from dva_sim.simulation.models import model_of
 from dva_sim.testing.files import check_file
 
@@ -95,6 +101,11 @@ def test_tables_of_all_forms_are_the_same_events(
         (HEAD + TWO + "2026-03-01T08:02:00,fire,Kitchen\n", "", 4, "set events.time_zone"),
         (HEAD + TWO + "01.03.2026 08:02,fire,Kitchen\n", "", 4, "ISO 8601"),
         (HEAD + TWO + "120,fire,Kitchen\n", "", 4, "write all in one form"),
+        (HEAD + TWO + "2026-03-01,fire,Kitchen\n", "", 4, "has no time of day"),
+        (HEAD + "1772352000000,fire,Kitchen\n", "", 2, "too large for seconds"),
+        (HEAD + "nan,fire,Kitchen\n", "", 2, "too large for seconds"),
+        (HEAD.replace(",", ";") + "0,5;fire;Kitchen\n1.060;fire;Kitchen\n", "", 3, "has a point"),
+        (HEAD + '"1,060",fire,Kitchen\n', "", 2, "ISO 8601"),
         (
             HEAD + "2026-10-25 02:30,fire,Kitchen\n",
             ", time_zone: Europe/Berlin",
@@ -177,6 +188,66 @@ def test_check_says_what_is_taken_and_what_is_left_out(tmp_path: Path, model: st
     assert list(verdict.doubts) == [
         "events: 2 rows of alarms.csv left out: 1 before events.start, 1 not before horizon_s 600"
     ]
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_row_that_repeats_another_counts_again_and_is_named(tmp_path: Path, model: str) -> None:
+    verdict = check_file(made(tmp_path, model, HEAD + TWO + TWO.splitlines()[0]))
+    assert "3 events of alarms.csv" in verdict.note
+    assert list(verdict.doubts) == [
+        "events: 1 row repeats an earlier one of alarms.csv: line 4; each counts, so delete what "
+        "is one alarm"
+    ]
+
+
+@pytest.mark.parametrize(
+    "scenario_at",
+    [
+        lambda file: EpisodeRequest(file).scenarios()[0],
+        lambda file: LiveOptions(scenario=file).read(),
+        lambda file: ConsoleOptions(scenario=file).read(),
+    ],
+    ids=["episode", "live", "console"],
+)
+def test_every_door_opens_the_same_events(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scenario_at: Callable[[str], Any]
+) -> None:
+    file = made(tmp_path, "full", HEAD + TWO)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    events = [(0.0, "fire", "Workshop"), (60.0, "flood", "Kitchen")]
+    assert events_of(scenario_at(str(file))) == events
+
+
+STUDY = """
+question: Which morning is slower?
+seed: 5
+persons: 2
+factors: {events.table: [alarms.csv, other.csv], horizon_s: [600]}
+parts: {shift: {scenario: desk.yaml}}
+answer:
+  part: shift
+  measure: response_mean_s
+  factor: events.table
+  contrast: [other.csv, alarms.csv]
+  over: horizon_s
+  smallest_effect_s: 1.0
+"""
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_study_varies_the_tables_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, model: str
+) -> None:
+    made(tmp_path, model, HEAD + TWO)
+    (tmp_path / "other.csv").write_text(HEAD + TWO.replace("Kitchen", "Canteen"))
+    (tmp_path / "mornings.yaml").write_text(STUDY)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    made_of = cells(load_study(tmp_path / "mornings.yaml"))
+    rooms = [[room for _, _, room in events_of(cell.scenario)] for cell in made_of]
+    assert rooms == [["Workshop", "Kitchen"], ["Workshop", "Canteen"]]
+    assert len({cell.config for cell in made_of}) == 2
 
 
 @pytest.mark.parametrize("model", MODELS)
