@@ -151,6 +151,7 @@ class Opened:
         audit: The rows of the audit log.
         terms: Limits that the safety rules hold the run to; None: the file has no facts.
         left_out: Number of messages that the file lacks on each topic, for a filtered file.
+        is_counted: True if the file says how many messages it had, so that any loss is known.
     """
 
     playback: Playback
@@ -161,6 +162,7 @@ class Opened:
     audit: list[dict[str, Any]] = field(default_factory=list)
     terms: SafetyTerms | None = None
     left_out: Mapping[str, int] = field(default_factory=dict)
+    is_counted: bool = False
 
     @property
     def is_whole(self) -> bool:
@@ -238,6 +240,7 @@ def _opened(raw: RawRecords) -> Opened:
         audit=audit,
         terms=terms,
         left_out=Counter(raw.written) - raw.found,
+        is_counted=bool(raw.written),
     )
 
 

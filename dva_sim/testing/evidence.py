@@ -100,33 +100,53 @@ def judged_recording(opened: Opened) -> list[Verdict]:
 def missing_topics(opened: Opened) -> dict[str, list[str]]:
     """Return the topics that a recording lacks, by the rules that need them.
 
-    A file that says how many messages each topic had lacks any of them; another lacks what no
-    recording of facts is without.
+    A whole file that does not say how many messages each topic had was filtered, and may lack any
+    topic; of these, what no recording of facts is without is named.
     """
     from dva_sim.recordings.channels import MESSAGES, OBSERVED  # late: start-up
     from dva_sim.recordings.raw_records import is_camera  # late: start-up
-    from dva_sim.simulation.full import observations as o  # late: start-up
-    from dva_sim.simulation.full.verdicts import OF_ROBOTS, OF_THE_DVA, RULES  # late: start-up
+    from dva_sim.simulation.full.verdicts import (  # late: start-up
+        OF_MESSAGES,
+        OF_ROBOTS,
+        OF_THE_DVA,
+        RULES,
+    )
 
     facts, terms = opened.playback.recorder.facts, opened.terms
     if facts is None or terms is None:
         return {}
-    moves, book = f"{OBSERVED}moves", f"{OBSERVED}book"
-    kinds = set(map(type, facts))
-    lacking = [topic for topic in sorted(opened.left_out) if opened.left_out[topic] > 0]
-    lacking += [moves] if o.MotionNews not in kinds and moves not in lacking else []
-    lacking += [book] if o.BookNews not in kinds and book not in lacking else []
+    needed_by = {"book": OF_THE_DVA, "arrived": OF_MESSAGES, "heard": ("S2",), "places": ("S6",)}
     found: dict[str, list[str]] = {}
-    for topic in lacking:
-        rules: tuple[str, ...] = OF_ROBOTS if topic.startswith(OBSERVED) or is_camera(topic) else ()
-        if topic == book:
-            rules = OF_THE_DVA
-        elif topic.startswith(MESSAGES):
-            rules = tuple(RULES)
+    for topic in _lacking(opened):
+        rules = tuple(RULES)
+        if topic.startswith(OBSERVED):
+            rules = needed_by.get(topic.removeprefix(OBSERVED), OF_ROBOTS)
+        elif is_camera(topic):
+            rules = OF_ROBOTS
+        elif topic.startswith("/") and not topic.startswith(MESSAGES):
+            rules = ()  # drawn, and not judged
         for rule in rules:
             if rule in OF_THE_DVA or terms.motors:
                 found.setdefault(rule, []).append(topic)
     return found
+
+
+def _lacking(opened: Opened) -> Iterator[str]:
+    """Yield what was left out of a recording, as far as it shows that."""
+    from dva_sim.recordings.channels import OBSERVED  # late: start-up
+    from dva_sim.recordings.writing import COUNTS  # late: start-up
+    from dva_sim.simulation.full import observations as o  # late: start-up
+
+    yield from sorted(opened.left_out)
+    kinds = set(map(type, opened.playback.recorder.facts or ()))
+    usual = {"moves": o.MotionNews, "book": o.BookNews}
+    if not opened.is_counted:
+        usual["arrived"] = o.Arrived
+    for word, kind in usual.items():
+        if kind not in kinds and f"{OBSERVED}{word}" not in opened.left_out:
+            yield f"{OBSERVED}{word}"
+    if opened.is_whole and not opened.is_counted:
+        yield f"the metadata {COUNTS!r}, without which missing topics are not seen"
 
 
 def check_trace(path: Path) -> Found:

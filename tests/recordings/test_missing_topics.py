@@ -12,12 +12,15 @@ from rich.console import Console
 from dva_sim.cli import checks, stories
 from dva_sim.kernel.errors import ExitCode
 from dva_sim.recordings.pictures import Wanted
+from dva_sim.recordings.reading import read_recording
 from dva_sim.recordings.writing import COUNTS, write_recording
 from dva_sim.simulation.full.episode_measures import tables_of
-from dva_sim.simulation.full.verdicts import RulesNotJudged
+from dva_sim.simulation.full.verdicts import HELD, RulesNotJudged
+from dva_sim.testing.evidence import judged_recording
 
 OF_ROBOTS, OF_THE_DVA = ["S1", "S2", "S3", "S4", "S5"], ["S6", "S7"]
-FACTS = ("accepted", "arrived", "book", "heard", "moves", "places")
+ALL = [*OF_ROBOTS, *OF_THE_DVA]
+FACTS = ("accepted", "arrived", "heard", "places", "moves", "book")
 
 
 @pytest.fixture(scope="module")
@@ -55,45 +58,73 @@ def filtered(source: Path, made: Path, topics: Collection[str], counts: bool) ->
     return made
 
 
+NEEDED_BY = {
+    "/observed/accepted": OF_ROBOTS,
+    "/observed/arrived": ["S1", "S2", "S3", "S5", "S6"],
+    "/observed/book": OF_THE_DVA,
+    "/observed/heard": ["S2"],
+    "/observed/moves": OF_ROBOTS,
+    "/observed/places": ["S6"],
+    "/messages/robot-1/operator-1": ALL,
+    "/messages/operator-1/dva": ALL,
+    "/robot-1/camera": OF_ROBOTS,
+    "/robot-1/pose": [],
+    "/story": [],
+    "/tf": [],
+}
+"""Rules that need a topic."""
+SUBSETS = [(), *((topic,) for topic in NEEDED_BY), ("/observed/heard", "/tf"), tuple(NEEDED_BY)]
+
+
+@pytest.mark.parametrize("counts", [True, False])
+def test_a_rule_is_judged_where_all_its_topics_are_there(
+    whole: Path, tmp_path: Path, counts: bool
+) -> None:
+    for topics in SUBSETS:
+        opened = read_recording(filtered(whole, tmp_path / "part.mcap", topics, counts))
+        found = {verdict.rule: verdict for verdict in judged_recording(opened)}
+        lacking = {rule for topic in topics for rule in NEEDED_BY[topic]} if counts else {*ALL}
+        assert {rule for rule, of in found.items() if of.lacks_facts} == lacking, topics
+        assert all(found[rule].state == HELD for rule in ALL if rule not in lacking), topics
+        for topic in topics if counts else ():
+            assert all(topic in found[rule].text for rule in NEEDED_BY[topic]), topics
+
+
 @pytest.mark.parametrize("counts", [True, False])
 @pytest.mark.parametrize(
-    ("topics", "rules", "named"),
+    ("topics", "rules"),
     [
-        (["/observed/moves"], OF_ROBOTS, "/observed/moves"),
-        (["/observed/book"], OF_THE_DVA, "/observed/book"),
-        (
-            ["/story", *(f"/observed/{fact}" for fact in FACTS)],
-            [*OF_ROBOTS, *OF_THE_DVA],
-            "/observed/book",
-        ),
+        (["/observed/moves"], OF_ROBOTS),
+        (["/observed/book"], OF_THE_DVA),
+        (["/story", *(f"/observed/{fact}" for fact in FACTS)], ALL),
     ],
 )
-def test_rules_whose_topics_are_missing_are_named(
+def test_check_and_replay_name_the_rules_and_the_missing_topics(
     whole: Path,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     topics: list[str],
     rules: list[str],
-    named: str,
     counts: bool,
 ) -> None:
     file = filtered(whole, tmp_path / "part.mcap", topics, counts)
+    lacking = rules if counts else ALL
     code = checks.check([str(file)])
     said = capsys.readouterr().out
     # A file that says how many messages it had is known to have been filtered.
     assert code == (ExitCode.DOES_NOT_HOLD if counts else ExitCode.NOT_JUDGED)
     for rule in rules:
-        assert f"{rule} not judged: the recording lacks /observed/" in said
-    assert named in said
-    assert said.count(" not judged: the recording lacks") == len(rules)
+        assert f"{rule} not judged: the recording lacks /observed/" in said, rule
+    assert topics[-1] in said
+    assert said.count(" not judged: the recording lacks") == len(lacking)
 
     console = Console(width=300)
     with console.capture() as captured, pytest.raises(RulesNotJudged) as caught:
         stories.replay(file, Wanted(), where=console)
-    assert str(caught.value) == f"facts are missing to judge {', '.join(rules)}"
+    assert str(caught.value) == f"facts are missing to judge {', '.join(lacking)}"
     told = captured.get()
     assert "none was broken" not in told
-    assert named in told
+    assert topics[-1] in told
     assert ("the recording lacks /story" in told) == ("/story" in topics)
 
 

@@ -30,6 +30,7 @@ OF_ROBOTS: Final = ("S1", "S2", "S3", "S4", "S5")
 OF_THE_DVA: Final = ("S6", "S7")
 _AT_ROBOTS: Final = ("S1", "S2", "S3", "S5")  # rules on messages that reach robots
 _AT_THE_DVA: Final = ("S2", "S6")  # rules on messages that reach the DVA
+OF_MESSAGES: Final = tuple(sorted({*_AT_ROBOTS, *_AT_THE_DVA}))
 SETTLES: Final = OBEYS_WITHIN  # for which the facts of a gap may still have effects [s]
 EVENTS_UNKNOWN = "what the DVA's book showed is not known here"
 MOST_SPANS: Final = 3  # gaps that a verdict names
