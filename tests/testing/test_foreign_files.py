@@ -1,6 +1,7 @@
 """`dva-sim check` of files as other programs write them: maps, recorded links, recordings."""
 
 import gzip
+import json
 
 import numpy as np
 import pytest
@@ -167,6 +168,15 @@ def test_a_report_of_iperf3_is_named_for_what_it_is(tmp_path, name):
     verdict = check_file(link_file(tmp_path, text, name))
     assert verdict.kind == "recorded link"
     assert unnamed(verdict.problems[0].text, "iperf3", "5,000,000 bit/s", "link.rate_bps") == []
+    assert "round trips" not in verdict.problems[0].text
+
+
+def test_round_trips_in_a_report_of_iperf3_are_turned_into_the_key_that_they_can_give(tmp_path):
+    streams = [{"bits_per_second": 5e6, "rtt": trip} for trip in (40_000, 0, 46_000, 60_000)]
+    text = json.dumps({"intervals": [{"streams": [stream]} for stream in streams]})
+    verdict = check_file(link_file(tmp_path, text, "iperf.json"))
+    named = "46 ms in the median", "link.delay_s=0.023"
+    assert unnamed(verdict.problems[0].text, "iperf3", "link.rate_bps", *named) == []
 
 
 def test_a_doubtful_unit_of_a_delay_log_is_a_warning_of_the_file_and_the_scenario(tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import statistics
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from dva_sim.kernel.read_once import read_once
 Floats = NDArray[np.float64]
 _LONGEST_S = 60.0
 _RATE = re.compile(r'"bits_per_second"\s*:\s*([\d.eE+-]+)')
+_ROUND_TRIP = re.compile(r'"rtt"\s*:\s*(\d+)')
 
 
 @read_once(lambda path: [file_of(path)])
@@ -90,6 +92,19 @@ def file_of(path: str) -> Path:
     return next((file for file in (Path(path), *shipped) if resources.is_file(file)), Path(path))
 
 
+def _of_trips(content: str) -> str:
+    """Return the key that the round trips in a report of iperf3 [us] can give; empty: it has none.
+
+    They are of a link under load, so a log of delays is not made of them.
+    """
+    trips = [float(text) for text in _ROUND_TRIP.findall(content) if float(text) > 0]
+    if not trips:
+        return ""
+    half_s = statistics.median(trips) / 2e6
+    usual = f"{half_s * 2000:.3g} ms in the median"
+    return f"; for its round trips under load, {usual}, set link.delay_s={half_s:.3g}"
+
+
 def numbered_lines(path: str, what: str) -> Iterator[tuple[int, str]]:
     """Number and text of each line that is not empty.
 
@@ -104,7 +119,7 @@ def numbered_lines(path: str, what: str) -> Iterator[tuple[int, str]]:
     if content.lstrip().startswith("{") and (rates := _RATE.findall(content)):
         rate = f"throughput of at most {max(map(float, rates)):,.0f} bit/s"
         problem = f"is a report of iperf3, {rate}, not a {what}; for a rate set link.rate_bps"
-        raise ConfigError(problem, path, 1, 1)
+        raise ConfigError(problem + _of_trips(content), path, 1, 1)
     for number, line in enumerate(content.split("\n"), start=1):
         text = line.strip()
         if text:
