@@ -1,5 +1,6 @@
 """Sphinx configuration: Markdown pages, generated reference, no address outside the site."""
 
+import re
 import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
@@ -44,6 +45,7 @@ def setup(app: Sphinx) -> None:
     """Write the generated pages before Sphinx looks for pages."""
     generators.write(Path(app.srcdir))
     app.connect("env-get-outdated", _outdated)
+    app.connect("source-read", _lead_to_generated_pages)
 
 
 def _outdated(
@@ -52,3 +54,22 @@ def _outdated(
     """Return all pages if the tree of pages has changed: each page shows it beside its text."""
     has_changed = added or removed or any(name.endswith("index") for name in changed)
     return set(env.found_docs) if has_changed else set()
+
+
+# Links of pages as files lead to what is there without a build; a title names a place on the page.
+_INDEX = re.compile(r'\]\(((?:\.\./reference/)?)index\.md#([\w-]+)(?: "([\w-]+)")?\)')
+_STUDY = re.compile(r"\]\(\.\./\.\./experiments/([\w-]+)\.(?:yaml|md)\)")
+
+
+def _lead_to_generated_pages(_app: Sphinx, _name: str, source: list[str]) -> None:
+    """Let links to a section of the reference, or to a study, lead to the page of it."""
+
+    def of_reference(link: re.Match[str]) -> str:
+        folder, page, place = link.groups()
+        known = f"reference/{page}.md" in generators.PAGES
+        return f"]({folder}{page}.md{f'#{place}' if place else ''})" if known else link[0]
+
+    def of_study(link: re.Match[str]) -> str:
+        return f"](../results/{'index' if link[1] == 'README' else link[1]}.md)"
+
+    source[0] = _STUDY.sub(of_study, _INDEX.sub(of_reference, source[0]))
