@@ -109,11 +109,13 @@ class AnswerWatch:
                 each.since = now
                 self._open[each] = None
                 continue
+            # Those that waited are judged after younger ones, whose counts are not theirs.
             silently = self._silently[each.node]
-            while silently and silently[0] < each.arrived:
+            while silently and now - silently[0] > QUEUED_WITHIN + ANSWERED_WITHIN:
                 silently.popleft()
-            if silently:
-                silently.popleft()
+            counted = next((when for when in silently if when >= each.arrived), None)
+            if counted is not None:
+                silently.remove(counted)
             else:
                 self._breach(each.node, "has neither answered nor counted a request")
 

@@ -70,6 +70,18 @@ def test_a_request_that_is_answered_late_or_counted_breaks_nothing():
     assert asked.after(ANSWERED_WITHIN + 1) == set()
 
 
+def test_a_younger_request_does_not_use_up_the_count_of_one_that_waits():
+    asked, waits = Asked(), [True]
+    asked.answers._waits = lambda node, data: waits[0]
+    asked.ask(lambda request: count(asked))
+    asked.now += ANSWERED_WITHIN / 2
+    asked.ask(lambda request: count(asked))
+    assert asked.after(ANSWERED_WITHIN / 2 + 1) == set()  # the first was sent again, and waits
+    waits[0] = False
+    for _ in range(2):
+        assert asked.after(ANSWERED_WITHIN) == set()
+
+
 def test_one_count_excuses_one_request():
     asked = Asked()
     asked.ask(lambda request: None)

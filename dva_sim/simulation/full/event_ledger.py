@@ -260,9 +260,9 @@ class EventLedger:
             word.taken.add(device)
 
     def _finds(self, word: Word, source: str, number: int, finding: str) -> None:
-        """It counts if who was sent there says so; what is confirmed, was looked at there.
+        """Count a finding of somebody who was sent; a confirmation needs a device at the place.
 
-        Who has been sent again, with another robot, may still speak of the first.
+        An operator who has been sent again with another robot may still report for the first.
         """
         event, went = self._events.get(number), [goes for who, goes in word.went if who == source]
         if not went or event is None:
@@ -512,7 +512,9 @@ class EventLedger:
             word.sent_again = True
         if word.sent_again or hands != old.hands:
             word.taken -= word.loose  # the order may still wait in the DVA's queue
-        taken = bool(word.taken.intersection(hands))
+        # A DVA that comes back knows of who has set out; who registers again goes on.
+        under_way = ("act_departed" if hands[:1] == ("act",) else "departed") in event.times
+        taken = bool(word.taken.intersection(hands)) or (bool(hands) and under_way)
         confirmed = "confirmed" in found - old.found
         waits = now if taken or word.busy or confirmed else old.waits
         since = old.since if hands == old.hands and not word.sent_again else now

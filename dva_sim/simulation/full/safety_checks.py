@@ -905,8 +905,12 @@ def _stopping(motion: RobotMotion, limits: MotorLimits) -> float:
 
 
 def _pushed(motion: RobotMotion, limits: MotorLimits, now: float) -> bool:
-    """Return True while a robot that another one pushed has not been stopped by its brakes."""
-    return motion.touched + _stopping(motion, limits) >= now
+    """Return True while a robot that another one pushed has not been stopped by its brakes.
+
+    One that was pushed backwards on its way is stopped by its motors, which speed up half as hard.
+    """
+    times = 2 if motion.speed < -MOVING else 1
+    return motion.touched + times * _stopping(motion, limits) >= now
 
 
 def _end(witness: Witness, session: int, when: float) -> None:

@@ -204,3 +204,21 @@ def test_an_arrival_that_is_forgotten_when_another_is_sent_is_none_of_the_other(
     heard.orders(3.0, OTHER)
     del heard.event.times["departed"], heard.event.times["arrived"]
     assert heard.broken(4.0) == []
+
+
+@pytest.mark.invariant("S6")
+@pytest.mark.parametrize(("has_set_out", "breaks"), [(True, False), (False, True)])
+def test_who_registers_again_on_the_way_has_taken_the_event_up(has_set_out, breaks):
+    heard = Hearer()
+    assert heard.broken(1.0) == []
+    heard.orders(1.0)
+    heard.says(1.0, m.Registration("operator-1", "TeleOp", "192.168.1.9"))
+    heard.assigns(1.5, OTHER)  # the order with it is sent, and its answer is lost
+    if has_set_out:
+        heard.event.times["departed"] = 1.5
+        heard.says(1.5, m.OrderProgress(heard.event.number, "departed"))
+    heard.broken(80.0)
+    heard.event.operator = heard.event.responder = None
+    heard.table.move(heard.event, State.PENDING, 80.0)
+    found = heard.broken(80.0 + RULES.escalate_after - 1.0)
+    assert any("is pending after" in line for line in found) is breaks
