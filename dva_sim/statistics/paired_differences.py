@@ -8,10 +8,11 @@ tests of one family the chance of any false alarm is kept.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dva_sim.statistics.bands import band, chance_above
 from dva_sim.statistics.persons import LEVEL, Floats, Interval, person_means
@@ -158,11 +159,8 @@ def holm(p_values: ArrayLike, family: ArrayLike | None = None) -> Floats:
         Holm, Scand. J. Stat. 6 (1979) 65-70.
     """
     values = np.asarray(p_values, dtype=float)
-    families = np.zeros(len(values)) if family is None else np.asarray(family)
     adjusted = np.full(len(values), np.nan)
-    for name in np.unique(families):
-        ours = np.flatnonzero((families == name) & ~np.isnan(values))
-        ours = ours[np.argsort(values[ours], kind="stable")]
+    for ours in _by_family(values, family):
         stepped = np.arange(len(ours), 0, -1) * values[ours]
         adjusted[ours] = np.minimum(1.0, np.maximum.accumulate(stepped))
     return adjusted
@@ -185,13 +183,18 @@ def holm_levels(
         Levels `(m,)`; nan for tests that could not be made.
     """
     values = np.asarray(p_values, dtype=float)
-    families = np.zeros(len(values)) if family is None else np.asarray(family)
     levels = np.full(len(values), np.nan)
-    for name in np.unique(families):
-        ours = np.flatnonzero((families == name) & ~np.isnan(values))
-        ours = ours[np.argsort(values[ours], kind="stable")]
+    for ours in _by_family(values, family):
         left = np.arange(len(ours), 0, -1)
         fails = np.flatnonzero(left * values[ours] > alpha)
         left[fails[0] if len(fails) else len(left) :] = left[fails[0]] if len(fails) else 1
         levels[ours] = alpha / left
     return levels
+
+
+def _by_family(values: Floats, family: ArrayLike | None) -> Iterator[NDArray[np.intp]]:
+    """Yield the places of each family's tests, by rising p-value, without those not made."""
+    families = np.zeros(len(values)) if family is None else np.asarray(family)
+    for name in np.unique(families):
+        ours = np.flatnonzero((families == name) & ~np.isnan(values))
+        yield ours[np.argsort(values[ours], kind="stable")]

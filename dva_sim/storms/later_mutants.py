@@ -343,7 +343,7 @@ LATER_MUTANTS: Final[dict[str, Mutant]] = {
     ),
     "arrives-from-afar": Mutant(
         "S7",
-        "whoever has the order has arrived when somebody else finds something",
+        "a finding counts as the arrival of a robot that is far away",
         "dva_sim.core.orders:Orders._was_near",
         afterwards(lambda self, near, event, device: None if near else True),
     ),

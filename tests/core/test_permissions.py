@@ -207,7 +207,7 @@ def test_an_order_belongs_to_no_session(office):
     assert [send.session for send in office.fire(80)] == [0]
 
 
-# --- what a robot is told that asks --------------------------------------------------------
+# --- answers to a robot that asks for its holder -------------------------------------------
 
 
 @pytest.mark.parametrize(

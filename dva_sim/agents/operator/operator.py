@@ -262,8 +262,8 @@ class OperatorAgent:
             self._give_back(drive.robot, drive.session)
 
         if outcome == "lost link":
-            # Whatever still gets through shall stop the robot; nobody waits for the answer. A
-            # mission is called back: nothing but a start would release it from an emergency.
+            # One message to stop the robot, in case the link still carries it; the answer is not
+            # awaited. A mission is cancelled: after an emergency only teleoperation could begin.
             ending = drive.ending()
             stop = m.Emergency() if isinstance(ending, m.StopTeleOp) else ending
             device.ask(drive.robot, stop, session=drive.session)

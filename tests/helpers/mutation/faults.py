@@ -38,7 +38,7 @@ OPERATORS = {
 
 @dataclass(frozen=True)
 class Mutant:
-    """One fault: bytes of a file, and what stands there in its place."""
+    """Fault planted in one file: some of its bytes, and the bytes that replace them."""
 
     file: str  # from the root of the project
     line: int
@@ -83,7 +83,7 @@ class Mutant:
 
 
 class Sites(ast.NodeVisitor):
-    """All candidates of one module."""
+    """Collector of all faults that can be planted in a module."""
 
     def __init__(self, file: str, source: bytes) -> None:
         self._file, self._source = file, source
