@@ -448,8 +448,11 @@ class SafetyAudit:
         self._ledger.is_heard(device, now)
 
     def kept_nothing_for(self, seconds: float) -> None:
-        """Implement `EventLedger.kept_nothing_for`."""
+        """Implement `EventLedger.kept_nothing_for`; what robots said is forgotten, too."""
         self._ledger.kept_nothing_for(seconds)
+        if seconds > 0.0:
+            for told in self._told_stopped.values():
+                told.at = -math.inf
 
     def _reaches_robot(self, now: float, source: str, robot: str, data: bytes) -> None:
         witness, message = self.witness(robot), _read(data)

@@ -8,9 +8,10 @@ import pytest
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import encode
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.run import Run
-from dva_sim.simulation.full.stage import id_of
+from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.storms.intruder import Intruder
 from dva_sim.storms.mutants import planted
 from dva_sim.storms.releaser import LABEL, Releaser
@@ -86,3 +87,13 @@ def test_a_dva_that_lets_the_policy_go_on_is_found(name):
         run.clock.run(200.0)
     assert bug.acts > 0
     assert set(run.recorder.violations) == {"S3"}
+
+
+@pytest.mark.parametrize(("kept_nothing_s", "broken"), [(0.0, {"S3"}), (5.0, set())])
+def test_a_dva_that_could_keep_nothing_has_forgotten_what_robots_told_it(kept_nothing_s, broken):
+    run, _ = patrol()
+    run.clock.run(120.0)
+    run.audit.kept_nothing_for(kept_nothing_s)
+    order = m.Message(ROBOTS[0], 9999, DVA, "12:00:00", 0, m.ReturnToBase())
+    run.audit.sent(run.clock.now, DVA, ROBOTS[0], encode(order))
+    assert set(run.recorder.violations) == broken
