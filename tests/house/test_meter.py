@@ -96,11 +96,24 @@ with version("HEAD") as folder:
 """
 
 
+STARTING = """
+import subprocess
+start = subprocess.Popen.__init__
+def slowly(*args, **options):
+    start(*args, **options)
+    import time
+    if options.get("start_new_session"):
+        time.sleep(0.5)
+subprocess.Popen.__init__ = slowly
+"""
+
+
 @pytest.mark.system
+@pytest.mark.parametrize("before", ["", STARTING], ids=["runs", "starts"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_meter_that_is_stopped_leaves_no_folder_and_no_program_behind(tmp_path, number):
+def test_a_meter_that_is_stopped_leaves_no_folder_and_no_program_behind(tmp_path, number, before):
     environment = os.environ | {"TMPDIR": str(tmp_path), "PYTHONPATH": str(TESTS)}
-    words = [sys.executable, "-c", ASKING]
+    words = [sys.executable, "-c", before + ASKING]
     with subprocess.Popen(words, env=environment, stderr=subprocess.PIPE, text=True) as meter:
         assert meter.stderr is not None
         assert meter.stderr.readline() == "1\n"  # what it asked for runs

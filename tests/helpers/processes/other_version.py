@@ -16,6 +16,10 @@ from helpers.paths import ROOT
 
 RUNNING: list[subprocess.Popen[Any]] = []
 """Processes that end with this program; each leads a session of its own."""
+STARTING: list[Sequence[str]] = []
+"""Programs that may run already, and are not among those yet."""
+HELD: list[int] = []
+"""Signals that came meanwhile."""
 
 
 @contextmanager
@@ -35,12 +39,24 @@ def output(words: Sequence[str], **options: Any) -> str:
         subprocess.CalledProcessError: it failed.
     """
     pipes = {"stdout": subprocess.PIPE, "text": True, "start_new_session": True}
-    with subprocess.Popen(words, **pipes, **options) as program:
-        RUNNING.append(program)
+    with _started(words, pipes | options) as program:
         text, _ = program.communicate()
     if program.returncode:
         raise subprocess.CalledProcessError(program.returncode, list(words))
     return str(text)
+
+
+def _started(words: Sequence[str], options: dict[str, Any]) -> subprocess.Popen[Any]:
+    """A program that runs and is known to run: no signal comes between the two."""
+    STARTING.append(words)
+    try:
+        program = subprocess.Popen(words, **options)
+        RUNNING.append(program)
+    finally:
+        STARTING.remove(words)
+        if HELD and not STARTING:
+            os.kill(os.getpid(), HELD.pop())
+    return program
 
 
 def end_with_signals() -> None:
@@ -50,6 +66,9 @@ def end_with_signals() -> None:
 
 
 def _end(number: int, _: object) -> None:
+    if STARTING:
+        HELD.append(number)
+        return
     for program in RUNNING:
         if program.poll() is None:
             os.killpg(program.pid, signal.SIGKILL)
