@@ -12,7 +12,7 @@ DEMO := results/demo
 SITE := build/docs
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-extras extras test-long test-soak storms mutants tools check docs release-check same-bytes bench goals clean
+.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-extras extras test-long test-soak storms mutants tools check docs release-check same-bytes statements bench budget goals clean
 
 # Compiled files are kept whatever a shell says: without them each program that a test starts
 # compiles all modules again.
@@ -57,7 +57,7 @@ test-extras: $(EXTRAS)  ## what needs extras: every transport over its real midd
 	@$(BIN)/python -c 'import shutil, sys; sys.exit(shutil.which("mosquitto") is None)' \
 	  || echo "MQTT is left out: the program mosquitto is missing; try: apt-get install mosquitto"
 	@$(PYTEST) -m "system or not system" tests/testing/test_transports.py tests/network/middleware tests/simulation/middleware \
-	  tests/network/test_mqtt.py tests/live/test_over_mqtt.py tests/live/test_taking_over.py tests/contracts tests/envs tests/ros/test_with_roslibpy.py
+	  tests/live/test_taking_over.py tests/contracts tests/envs tests/ros/test_with_roslibpy.py
 
 test-long: $(DEV)  ## long searches and whole studies, the same cases each time
 	@echo "Running the long tests ..."
@@ -69,8 +69,8 @@ test-soak: $(DEV)  ## the same and all searches with 20 times as many cases, new
 storms: $(RUNTIME)  ## a hundred hours of a team in which much goes wrong; goes on where it stopped
 	@$(BIN)/dva-sim storm --hours $(or $(HOURS),100) -o results/storms
 
-mutants: $(DEV)  ## whether tests notice planted faults: make mutants ROOM=core DRAW=2
-	@$(BIN)/python tests/mutants.py --room "$(ROOM)" --draw "$(or $(DRAW),1)"
+mutants: $(DEV)  ## whether tests notice planted faults: make mutants ROOM=core DRAW=2, or storms: PLANTED=all
+	@$(BIN)/python tests/mutants.py --room "$(ROOM)" --draw "$(or $(DRAW),1)" --planted "$(PLANTED)" --storms $(or $(STORMS),32)
 
 tools: $(DEV)  ## what some tests need besides Python: Chromium, node, TypeScript, Spin
 	@tests/install_tools.sh $(VENV)
@@ -93,8 +93,14 @@ release-check: $(DEV)  ## the wheel, built, installed in an empty environment an
 same-bytes: $(DEV)  ## whether results are those of another version: make same-bytes AGAINST=COMMIT
 	@$(BIN)/python tests/same_bytes.py --against $(or $(AGAINST),HEAD)
 
+statements: $(DEV)  ## how much there is to hold, by room: make statements AGAINST=COMMIT
+	@$(BIN)/python tests/statements.py --against "$(AGAINST)"
+
 bench: $(BENCH)  ## what the program costs, in instructions: make bench AGAINST=COMMIT ONLY=WORD
 	@$(BIN)/python tests/benchmarks/meter.py --against "$(AGAINST)" --only "$(ONLY)"
+
+budget: $(DEV)  ## whether the program costs more than it may: make budget REASON="..." raises what is missed
+	@$(BIN)/python tests/benchmarks/budget.py --reason "$(REASON)"
 
 goals: $(DEV)  ## what performance work aims at by the clock: crowds, memory, floods, the console
 	@$(BIN)/python -m pytest tests/benchmarks --benchmark-disable-gc -p no:cacheprovider -s

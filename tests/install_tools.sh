@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# What some tests need besides Python, where it is missing: a browser, node, a model checker.
+# What some checks need besides Python, where it is missing: a browser, node, a counter of
+# instructions, a model checker.
 # `tests/install_tools.sh FOLDER` keeps those packages in FOLDER/node_modules.
 set -euo pipefail
 folder=$1
@@ -13,6 +14,7 @@ missing=()
 installed chromium || installed chromium-browser || installed google-chrome || missing+=(chromium)
 installed node || missing+=(nodejs)
 installed npm || missing+=(npm)
+installed valgrind || [[ $(uname) != Linux ]] || missing+=(valgrind)
 if ((${#missing[@]})); then
   if ! installed apt-get; then
     echo "please install: ${missing[*]}" >&2

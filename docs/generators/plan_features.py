@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from dva_sim.worlds.drawn_features import KINDS, FeatureKind
+from dva_sim.worlds.geojson import KINDS, FeatureKind
 from dva_sim.worlds.site_parts import QUALITIES, LinkQuality
 from generators.configuration import Keys
 from generators.markdown import code, table

@@ -9,7 +9,6 @@ import dva_sim
 from dva_sim.testing.promises import TRIALS
 from generators.markdown import page as page_of
 
-_READERS = ("read_recording", "read_lapse")
 _VALUES = {
     "dva_sim.core.dispatch": (
         *("Situation", "Task", "Responder", "Assignment", "Announcement", "Relocation"),
@@ -21,7 +20,6 @@ _VALUES = {
     "dva_sim.network.middleware": ("Rendezvous", "TransportEnd"),
     "dva_sim.worlds.hazards": ("HazardField", "Conditions"),
     "dva_sim.kernel.measure": ("Measure",),
-    "dva_sim.experiments.report.figures": ("StudyView", "Drawn"),
 }
 """Classes of what plug-ins receive and return, by the package that they are imported from."""
 _HEAD = """\
@@ -52,7 +50,7 @@ def page() -> str:
             "autoclass", [f"{m}.{name}" for m, names in _VALUES.items() for name in names], True
         ),
         "## Recordings",
-        _directives("autofunction", [f"dva_sim.recordings.reading.{n}" for n in _READERS]),
+        _directives("autofunction", ["dva_sim.recordings.reading.read_recording"]),
         "## Checks for tests of your own",
         "`dva-sim check KIND NAME` calls these.",
         _directives("autofunction", checks),

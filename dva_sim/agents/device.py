@@ -290,7 +290,8 @@ class AgentDevice:
 
     def introduce(self, peer: str, address: str) -> None:
         """Say where a peer is found; what it was asked elsewhere, it is asked there again."""
-        before, self._addresses[peer] = self._addresses.get(peer, address), address
+        before = self._addresses.get(peer, address)
+        self._addresses[peer] = address
         self.network.introduce(peer, address)
         if before != address:
             for urgent in (True, False):
@@ -316,7 +317,8 @@ class AgentDevice:
         Invalid messages are refused at once, at no cost but that of reading. A sender of little
         else gets no replies, and then is not read (`Nuisances`). A possible emergency always is.
         """
-        now, count = self.clock.now, self.recorder.counters
+        now = self.clock.now
+        count = self.recorder.counters
         hearing = self._nuisances.hearing(request.peer, now)
         if hearing is IGNORED and b"<EmergencyMsg" not in request.data:
             self._nuisances.bad(request.peer, now)
@@ -402,7 +404,8 @@ class AgentDevice:
 
     def reply(self, message: m.Message, body: m.Reply) -> bytes:
         """A reply to `message` as bytes; one that no message can hold keeps its code alone."""
-        session, now = message.session or 0, self.clock.now
+        session = message.session or 0
+        now = self.clock.now
         try:
             return self.outbox.encode(message.source, body, now, session)
         except ProtocolError:
@@ -487,7 +490,8 @@ class AgentDevice:
 
     def _look_for_dva(self) -> None:
         """Say when the DVA has fallen silent, and when it is back."""
-        now, watch = self.clock.now, self.dva_watch
+        now = self.clock.now
+        watch = self.dva_watch
         if not watch.look(now) or self.silent:
             return
         if watch.silent:

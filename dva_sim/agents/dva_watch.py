@@ -32,11 +32,13 @@ class DvaWatch:
 
     def beat(self, now: float) -> None:
         """Note a heartbeat."""
-        self.heard, self.beats = now, True
+        self.heard = now
+        self.beats = True
 
     def answered(self, now: float) -> None:
         """Note an answer to a request."""
-        self.heard, self.unanswered = now, False
+        self.heard = now
+        self.unanswered = False
 
     def failed(self) -> None:
         """Note that a request was not answered after all attempts."""
@@ -44,7 +46,8 @@ class DvaWatch:
 
     def look(self, now: float) -> bool:
         """Update `silent`; return True if it has changed."""
-        before, late = self.silent, self.beats and self.silence(now) > SILENT_AFTER
+        before = self.silent
+        late = self.beats and self.silence(now) > SILENT_AFTER
         self.silent = late or self.unanswered
         return self.silent != before
 

@@ -58,7 +58,8 @@ _Leg = tuple[float, float, float, float, float, float]
 
 
 def _leg(ax: float, ay: float, bx: float, by: float) -> _Leg:
-    dx, dy = bx - ax, by - ay
+    dx = bx - ax
+    dy = by - ay
     square = dx * dx + dy * dy
     return ax, ay, dx, dy, square, math.sqrt(square)
 
@@ -126,9 +127,15 @@ class _Line:
         place on it than from the nearest one need not look at what comes within as much behind it.
         Nor need who has left no piece behind: a route that goes on about as straight leads away.
         """
-        at, legs, nearest, found = self.at, self.legs, math.inf, (last.leg, 0.0, math.inf, 0.0)
+        at = self.at
+        legs = self.legs
+        nearest = math.inf
+        found = (last.leg, 0.0, math.inf, 0.0)
         end = last.along + reach + BENT * math.hypot(x - last.x, y - last.y)
-        i, count, away, until = last.leg, len(legs), math.inf, 0
+        i = last.leg
+        count = len(legs)
+        away = math.inf
+        until = 0
         while i < count and at[i] <= end:
             begins = at[i]
             ax, ay, dx, dy, square, length = legs[i]
@@ -136,14 +143,13 @@ class _Line:
             share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
             if at[i + 1] > end:
                 share = min(share, (end - begins) / (at[i + 1] - begins))
-            along, away_x, away_y = (
-                begins + share * length,
-                ax + share * dx - x,
-                ay + share * dy - y,
-            )
+            along = begins + share * length
+            away_x = ax + share * dx - x
+            away_y = ay + share * dy - y
             far = away_x * away_x + away_y * away_y
             if far < nearest:
-                nearest, found = far, (i, along, away_x, away_y)
+                nearest = far
+                found = (i, along, away_x, away_y)
                 away = along + AWAY * math.sqrt(far) + ROUNDED if share < 1.0 else math.inf
                 until = bisect_right(self._turned, self._turned[i] + BEND, i)
                 i += 1
@@ -176,9 +182,11 @@ class Route:
     """
 
     def __init__(self, points: NDArray[np.float64], reach: float = REACH) -> None:
-        self._line, self._reach = _Line(points), reach
+        self._line = _Line(points)
+        self._reach = reach
         self._place = self._line.begin
-        self.points, self.length = points, self._line.at[-1]
+        self.points = points
+        self.length = self._line.at[-1]
 
     def twin(self) -> Route:
         """Return the route for another follower; look-ups of both are shared."""
@@ -224,7 +232,8 @@ class Route:
 
     def point_at(self, along: float) -> tuple[float, float]:
         """The place a given way along the route [m]; beyond its end, the end."""
-        at, legs = self._line.at, self._line.legs
+        at = self._line.at
+        legs = self._line.legs
         i = bisect_right(at, along, 0, len(legs)) - 1
         ax, ay, dx, dy, _, _ = legs[i]
         length = at[i + 1] - at[i]
@@ -309,7 +318,8 @@ class PurePursuit:
     """
 
     def __init__(self, person: Person, reach: Reach) -> None:
-        self.person, self.reach = person, reach
+        self.person = person
+        self.reach = reach
         self._steering_habits = person.habits.steering
         self._turning = False
 
@@ -321,11 +331,15 @@ class PurePursuit:
             view: Current observation and its time.
             stop_before: Distance from the end of the route at which to stop [m].
         """
-        person, reach, seen, habits = self.person, self.reach, view.seen, self._steering_habits
+        person = self.person
+        reach = self.reach
+        seen = view.seen
+        habits = self._steering_habits
         delay = view.delay if view.delay > SHORTEST else SHORTEST
         wanted = person.pace * reach.speed
         look = wanted * delay / person.caution
-        nearest, farthest = habits.nearest_look_m, habits.farthest_look_m
+        nearest = habits.nearest_look_m
+        farthest = habits.farthest_look_m
         look = look if look > nearest else nearest
         look = look if look < farthest else farthest
         ahead = route.ahead(seen.x, seen.y, seen.heading, look)
@@ -337,7 +351,8 @@ class PurePursuit:
         if self._turning or is_there:
             gain = gain_at(person.crossover, person.margin, delay)
             return reach.turn(self._clamp(gain * ahead.bearing))
-        speed, slow = person.caution * look / delay, ahead.remaining / (2.0 * delay + 1.0)
+        speed = person.caution * look / delay
+        slow = ahead.remaining / (2.0 * delay + 1.0)
         speed = speed if speed < wanted else wanted
         return self._along(route, view, ahead, look, speed if speed < slow else slow)
 

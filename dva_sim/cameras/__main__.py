@@ -83,7 +83,8 @@ async def _refused(_: Request, error: Exception) -> Response:
 
 
 async def _serve(world: int, listener: socket.socket, host: str, labels: Sequence[str]) -> None:
-    loop, ended = asyncio.get_running_loop(), asyncio.Event()
+    loop = asyncio.get_running_loop()
+    ended = asyncio.Event()
     painter, ours = socket.socketpair()
 
     def watch(robots: list[int], _: bool) -> None:
@@ -138,7 +139,7 @@ def main(given: Sequence[str] | None = None) -> int:
     parser.add_argument("--host", required=True, help="host that it listens on")
     parser.add_argument("--labels", type=json.loads, required=True, help="of the robots, as JSON")
     options = parser.parse_args(given)
-    # Ctrl-C reaches all processes of a terminal; the run says when it is over.
+    # Ctrl-C may reach all processes; the run says when it is over.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(NICENESS)
     listener = socket.socket(fileno=options.listen_fd)

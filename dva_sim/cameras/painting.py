@@ -83,7 +83,8 @@ class Painter:
         self._due[robot] = now + 1.0 / max(LEAST_RATE, RATE_ROOM * rate)
         self.drawn += 1
         jpeg = self._jpeg(frame)
-        captured, arrived = round(frame["captured_ms"]), round(frame["t"])
+        captured = round(frame["captured_ms"])
+        arrived = round(frame["t"])
         return Picture(robot, frame["number"], captured, arrived, jpeg)
 
     def _jpeg(self, frame: Line) -> bytes:
@@ -96,7 +97,8 @@ class Painter:
 
 def run(world: PipeEnd, web: PipeEnd) -> Painter:
     """Draw until one of both has ended."""
-    painter, alive = Painter(), 0.0
+    painter = Painter()
+    alive = 0.0
     while world.is_open and web.is_open:
         wait = painter.wait(time.monotonic())
         ready, _, _ = select.select([world, web], [], [], wait)

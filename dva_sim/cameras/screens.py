@@ -61,7 +61,10 @@ class Screens:
         numbers: dict[str, int],
         tell: Callable[[FrameLine, int], object],
     ) -> None:
-        self._run, self._screen, self._numbers, self._tell = run, screen, numbers, tell
+        self._run = run
+        self._screen = screen
+        self._numbers = numbers
+        self._tell = tell
         self._taken: dict[str, OrderedDict[int, tuple[int, list[Any]]]] = {}
         self._count: dict[str, int] = {}
         self._subscribed: dict[str, Subscription] = {}
@@ -92,7 +95,8 @@ class Screens:
         frame = came if isinstance(came, CameraFrame) else CameraFrame.unpack(came)
         if robot not in self._watched or taken is None or frame is None:
             return
-        tick, now = frame.observation.tick, self._run.clock.now
+        tick = frame.observation.tick
+        now = self._run.clock.now
         known = taken.get(tick)
         if known is None:
             return
@@ -135,8 +139,10 @@ class Screens:
 
     def _figures(self, robot: str, frame: CameraFrame) -> list[Any]:
         """Return the figures that may be in the picture: kind, number, place, heading, activity."""
-        field, seen = self._run.field, frame.observation
-        here, figures = (seen.x, seen.y), list[Any]()
+        field = self._run.field
+        seen = frame.observation
+        here = (seen.x, seen.y)
+        figures = list[Any]()
         for id_tag, other in field.robots.items():
             pose = other.body.pose()
             if id_tag != robot and math.dist(here, (pose.x, pose.y)) < self._reach:

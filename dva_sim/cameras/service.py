@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import base64
 import json
-import time
 from collections.abc import Callable
 
 from typing_extensions import override
 
-from dva_sim.cameras.children import END_WITHIN, PAINTED, Child
+from dva_sim.cameras.children import END_SOON, PAINTED, PipedChild
 from dva_sim.cameras.lines import FrameLine, PictureLine, contained_line, scene_line
 from dva_sim.cameras.screens import FilmedRun, OwnScreens, camera_url
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.realtime import LiveClock
 from dva_sim.serving.listening import listen
+from dva_sim.serving.processes import end_all
 
 MODULE = "dva_sim.cameras"
 FLUSH = 0.02  # from one try to write what waits to the next [s]
@@ -49,12 +49,14 @@ class CameraService:
             self._listener = listen(host, port)
         except ConfigError:
             self._listener = listen(host, 0)
-        self._clock, self._tell, self._host = clock, tell, host
+        self._clock = clock
+        self._tell = tell
+        self._host = host
         shown = f"[{host}]" if ":" in host else host
         self.base = f"http://{shown}:{self._listener.getsockname()[1]}/"
         self._run: FilmedRun | None = None
         self._labels: list[str] = []
-        self._child: Child | None = None
+        self._child: PipedChild | None = None
         self._numbers = _Numbers()
         self._contained: set[int] = set()
 
@@ -64,7 +66,8 @@ class CameraService:
 
     def film(self, run: FilmedRun, seed: int) -> None:
         """Serve the cameras of a run from now on."""
-        self._run, self._seed = run, seed
+        self._run = run
+        self._seed = seed
         self._labels = [robot.device.label for robot in run.field.robots.values()]
         for id_tag in run.field.robots:
             self._numbers[id_tag]  # robots come first, in the order of their labels
@@ -81,12 +84,14 @@ class CameraService:
         self._clock.unwatch(self._listener.fileno())
         words = ["--listen-fd", str(self._listener.fileno()), "--host", self._host]
         words += ["--labels", json.dumps(self._labels)]
-        child = self._child = Child("camera process", MODULE, words, [self._listener], PAINTED)
+        child = self._child = PipedChild(
+            "the camera process", MODULE, words, [self._listener], PAINTED
+        )
         self._clock.watch(child.pipe.fileno(), self._hear)
         self._greet(child)
         self._clock.every(FLUSH, lambda: self._flush(child))
 
-    def _greet(self, child: Child) -> None:
+    def _greet(self, child: PipedChild) -> None:
         """Send what the process has to know before the first picture."""
         assert self._run is not None
         scenario = self._run.scenario.model_dump(mode="json")
@@ -99,7 +104,7 @@ class CameraService:
         ids = list(self._run.field.robots)
         self._screens.watch({ids[n] for n in numbers if 0 <= n < len(ids)})
 
-    def _flush(self, child: Child) -> bool:
+    def _flush(self, child: PipedChild) -> bool:
         child.pipe.flush()
         return child is self._child
 
@@ -136,10 +141,10 @@ class CameraService:
             self._child.pipe.put(line, robot)
 
     def _end(self) -> None:
-        child, self._child = self._child, None
+        child = self._child
+        self._child = None
         if child is not None:
-            child.end()
-            child.make_sure(time.monotonic() + END_WITHIN)
+            end_all([child], END_SOON)
 
     def close(self) -> None:
         """End all streams."""
@@ -156,7 +161,9 @@ class PictureService(CameraService):
 
     def serve(self, label: str) -> None:
         """Serve the camera of one robot from now on."""
-        self._labels, self._number, self._is_watched = [label], 0, False
+        self._labels = [label]
+        self._number = 0
+        self._is_watched = False
         self._await_viewers()
 
     def show(self, jpeg: bytes) -> None:
@@ -175,7 +182,7 @@ class PictureService(CameraService):
             self._child.pipe.put(line, 0)
 
     @override
-    def _greet(self, child: Child) -> None:
+    def _greet(self, child: PipedChild) -> None:
         child.pipe.put({"k": "ready", "t": 0})
 
     @override

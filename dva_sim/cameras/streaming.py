@@ -27,7 +27,8 @@ class PictureStream(Response):
     def __init__(self, cameras: CameraStreams, viewer: Viewer) -> None:
         super().__init__(headers={"Cache-Control": "no-store", "Connection": "close"})
         del self.headers["content-length"]
-        self._cameras, self._viewer = cameras, viewer
+        self._cameras = cameras
+        self._viewer = viewer
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send until the viewer leaves, or is cut."""

@@ -54,7 +54,8 @@ class CameraStreams:
         watch: Callable[[list[int], bool], object],
         watched_elsewhere: Callable[[], Iterable[int]] = tuple,
     ) -> None:
-        self._watch, self._watched_elsewhere = watch, watched_elsewhere
+        self._watch = watch
+        self._watched_elsewhere = watched_elsewhere
         self._unpacker = Unpacker()
         self._newest: dict[int, tuple[Picture, float]] = {}
         self._drawn = asyncio.Condition()

@@ -2,30 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dva_sim import __version__
-from dva_sim.cli.options import Jobs, argument, asks, flag, several
 from dva_sim.kernel.errors import ConfigError, ExitCode
 from dva_sim.kernel.suggestions import hint
 from dva_sim.kernel.wording import first_and_rest
+from dva_sim.options.forms import Jobs, OptionForm, argument
 
 if TYPE_CHECKING:
     from dva_sim.experiments.execution.sampled_runs import SampledRuns
     from dva_sim.experiments.report.kept_answers import KeptAnswer
 
 
-@asks(
-    studies=(argument("Only these studies.", "STUDY", of=list[str]), ()),
-    keep=(several("Keep the answer of a results folder.", "FOLDER", "--keep"), ()),
-    mark=(flag("--mark", "Mark answers that are no longer given."), False),
-    jobs=(Jobs, None),
-)
-def answers(studies: list[str], keep: list[str], mark: bool, jobs: int | None) -> None:
+def answers(
+    studies: Annotated[
+        tuple[str, ...], argument("Only these studies.", "STUDY", is_repeated=True)
+    ] = (),
+    keep: Annotated[
+        tuple[str, ...],
+        OptionForm("Keep the answer of a results folder.", metavar="FOLDER", is_repeated=True),
+    ] = (),
+    mark: Annotated[bool, OptionForm("Mark answers that are no longer given.")] = False,
+    jobs: Jobs = None,
+) -> None:
     """Check which published answers this version still gives.
 
     Each study, its scenarios and its files are compared with those of the answer that is kept,
@@ -64,7 +69,7 @@ def _keep(results: Path, folder: Path, jobs: int | None) -> None:
     print(f"Kept in {kept_answers.keep(replace(answer, sampled=digests), manifest, folder)}")
 
 
-def _compare(folder: Path, studies: list[str], mark: bool, jobs: int | None) -> ExitCode:
+def _compare(folder: Path, studies: Sequence[str], mark: bool, jobs: int | None) -> ExitCode:
     """Say of each kept answer whether it is still given; a gate fails if an unmarked one is not."""
     from dva_sim.experiments.report import kept_answers  # late: start-up
 

@@ -19,8 +19,10 @@ STDIN: Final = "-"
 LINK: Final = "link"
 OFFER: Final = "a relay of TCP over the loopback can take its place for measurements without loss"
 QUIET: Final = "run as root for real-time priority, or use an idle machine"
-VALID, NOT_JUDGED = ExitCode.OK, ExitCode.NOT_JUDGED
-INVALID, NOT_READ = ExitCode.DOES_NOT_HOLD, ExitCode.MISTAKE
+VALID = ExitCode.OK
+NOT_JUDGED = ExitCode.NOT_JUDGED
+INVALID = ExitCode.DOES_NOT_HOLD
+NOT_READ = ExitCode.MISTAKE
 WORDS: Final = {
     VALID: "valid",
     NOT_JUDGED: "not judged",
@@ -123,7 +125,8 @@ def _check_one(name: str) -> ExitCode:
     for problem in verdict.problems[:_SHOWN]:
         where = _near(problem.file) if problem.file else name
         _say(f"{where}:{problem.line}:{problem.column}: {problem.text}")
-    number, broken = len(verdict.problems), verdict.broken
+    number = len(verdict.problems)
+    broken = verdict.broken
     for doubt in verdict.doubts:
         _say(f"{name}: warning: {doubt}")
     for rule in verdict.rules:

@@ -13,6 +13,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command, get_group
 
+from dva_sim.cli.options import from_words
 from dva_sim.kernel.suggestions import hint
 
 Command = Callable[..., None] | typer.Typer
@@ -124,7 +125,7 @@ def _made(name: str, command: Command) -> Any:
     if isinstance(command, typer.Typer):
         return get_group(command)
     alone = typer_of(None)
-    alone.command(name, cls=CommandWithExamples, context_settings=HELP)(command)
+    alone.command(name, cls=CommandWithExamples, context_settings=HELP)(from_words(command))
     return get_command(alone)
 
 

@@ -156,6 +156,9 @@ def _differences(name: str, found: Sequence[Difference], console: Console) -> No
     heads = ["part", *map(factor_name, factors), "runs A", "runs B", "median A", "median B"]
     rows = [[row.part, *_names(row.levels, factors), *_numbers(row)] for row in found]
     print_table([*heads, "B - A, mean (95 % interval)"], rows, console, 1 + len(factors))
+    if not all(row.is_identical for row in found):
+        text = "B - A is the mean over persons, not the difference of the medians beside it"
+        console.print(text, style="dim", soft_wrap=True)
     clear = sum(row.differs_from_zero for row in found)
     if clear:
         console.print(

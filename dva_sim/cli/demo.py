@@ -18,7 +18,8 @@ from dva_sim.cli.stories import episode
 from dva_sim.experiments.execution.runner import RunRequest
 from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.kernel.errors import DvaSimError, ExitCode
-from dva_sim.recordings.pictures import Wanted
+from dva_sim.options.runs import EpisodeOptions
+from dva_sim.options.studies import RunOptions
 
 STUDY: Final = "req-rep-vs-pub-sub"
 SCENARIO: Final = "drive-to-event"
@@ -52,11 +53,12 @@ def demo(out: Path, jobs: int | None) -> ExitCode:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise DvaSimError(f"{out} cannot be written: {error.strerror}") from None
-    picture = Wanted(still=out / PICTURE)
-    episode(EpisodeRequest(SCENARIO, SEED, [DELAY], side_by_side=PATTERNS, pictures=picture))
+    still = out / PICTURE
+    drive = EpisodeOptions(SCENARIO, SEED, set=[DELAY], side_by_side=PATTERNS, still=still)
+    episode(EpisodeRequest(drive))
     say("")
     with _film_under_way(out / FILM):
-        code = study_runs.run(RunRequest(STUDY, out, quick=True, jobs=jobs))
+        code = study_runs.run(RunRequest(RunOptions(STUDY, out, quick=True, jobs=jobs)))
     if code in (ExitCode.OK, ExitCode.RUNS_FAILED):
         _tell(out, time.monotonic() - began)
     return code

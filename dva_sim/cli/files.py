@@ -3,29 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
-from typer import Option
+from typer import Argument, Option
 
-from dva_sim.cli.options import (
-    REQUIRED,
-    Jobs,
-    Json,
-    Quiet,
-    Verbose,
-    argument,
-    asks,
-    count,
-    file,
-    flag,
-    folder,
-    one_of,
-    several,
-    text,
-)
+from dva_sim.cli.options import Json, Quiet, Verbose
 from dva_sim.cli.verbosity import loudness, print_json
 from dva_sim.kernel.suggestions import either
+from dva_sim.options.forms import OptionForm, argument
+from dva_sim.options.studies import ValidateOptions
 from dva_sim.testing.promises import TRIALS
 
 _FILES = (
@@ -34,7 +21,6 @@ _FILES = (
     "Or link, to test the emulated link."
 )
 _SCHEMAS = "message", "study", "scenario", "cases", "site", "agent"
-_EVIDENCE = "dispatch", "operators", "network"
 _RATE = "Rate of the printed commands."
 _UNIT = "Unit of acceleration, if the log's header does not give it."
 
@@ -43,11 +29,16 @@ def _listed(incomplete: str) -> list[str]:
     """Completes a kind of things that can be listed."""
     from dva_sim.cli import names  # late: start-up
 
-    return one_of(*names.kinds())(incomplete)
+    return [kind for kind in names.kinds() if kind.startswith(incomplete)]
 
 
-@asks(kind=(argument("Only this kind, such as studies.", "KIND", _listed, str | None), None))
-def list_(kind: str | None, as_json: Json = False) -> None:
+def list_(
+    kind: Annotated[
+        str | None,
+        Argument(metavar="KIND", autocompletion=_listed, help="Only this kind, such as studies."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
     """List all studies, scenarios, sites, agents and policies.
 
     Prints one line per name, with a description.
@@ -101,11 +92,13 @@ def assumed(as_json: Json = False) -> None:
         names.tell(listed.lines())
 
 
-@asks(
-    files=(argument(_FILES, "FILE...", of=list[str]), REQUIRED),
-    set_=(several("An option of the plug-in under test.", "KEY=VALUE", "--set"), ()),
-)
-def check(files: list[str], set_: list[str]) -> None:
+def check(
+    files: Annotated[tuple[str, ...], argument(_FILES, "FILE...", is_repeated=True)],
+    set: Annotated[
+        tuple[str, ...],
+        OptionForm("An option of the plug-in under test.", metavar="KEY=VALUE", is_repeated=True),
+    ] = (),
+) -> None:
     """Check files and point to each error in them.
 
     Plug-ins such as policies and robots are tested against the promises of their kind. The emulated
@@ -120,25 +113,17 @@ def check(files: list[str], set_: list[str]) -> None:
     """
     from dva_sim.cli import checks  # late: start-up
 
-    raise typer.Exit(checks.check(files, set_))
+    raise typer.Exit(checks.check(files, set))
 
 
-@asks(
-    file=(argument("A log of a phone's motion sensor.", "FILE", of=Path), REQUIRED),
-    commands=(flag("--commands", "Print the commands that the app would send."), False),
-    rate=(Annotated[float, Option(metavar="HZ", min=0.1, max=100.0, help=_RATE)], 10.0),
-    part=(
-        file("Write an accelerometer part with these properties.", "--part", metavar="OUT"),
-        None,
-    ),
-    unit=(Annotated[Literal["m/s2", "g"] | None, Option(help=_UNIT)], None),
-)
 def phone_log(
-    file: Path,
-    commands: bool,
-    rate: float,
-    part: Path | None,
-    unit: Literal["m/s2", "g"] | None,
+    file: Annotated[Path, argument("A log of a phone's motion sensor.", "FILE")],
+    commands: Annotated[bool, OptionForm("Print the commands that the app would send.")] = False,
+    rate: Annotated[float, Option(metavar="HZ", min=0.1, max=100.0, help=_RATE)] = 10.0,
+    part: Annotated[
+        Path | None, OptionForm("Write an accelerometer part with these properties.", metavar="OUT")
+    ] = None,
+    unit: Annotated[Literal["m/s2", "g"] | None, Option(help=_UNIT)] = None,
     as_json: Json = False,
 ) -> None:
     """Analyse or replay a log of a phone's motion sensor.
@@ -161,13 +146,11 @@ def phone_log(
         phone_log.tell(file, as_json, unit)
 
 
-@asks(
-    kind=(
-        argument(f"{', '.join(_SCHEMAS[:-1])} or {_SCHEMAS[-1]}.", "KIND", one_of(*_SCHEMAS)),
-        REQUIRED,
-    )
-)
-def schema(kind: str) -> None:
+def schema(
+    kind: Annotated[
+        str, argument(f"{', '.join(_SCHEMAS[:-1])} or {_SCHEMAS[-1]}.", "KIND", words=_SCHEMAS)
+    ],
+) -> None:
     """Print the schema of a file type.
 
     The schema is XSD for messages and JSON Schema for everything else.
@@ -180,28 +163,7 @@ def schema(kind: str) -> None:
     checks.print_schema(kind)
 
 
-@asks(
-    what=(argument("dispatch, operators or network.", "WHAT", one_of(*_EVIDENCE)), "dispatch"),
-    out=(folder("Write tables, figures and a page there.", "-o", "--out"), None),
-    cases=(file("A file of cases, by name or path; not for operators.", of=str | None), None),
-    strategy=(text("Driving strategy of the operators; operators only."), None),
-    quick=(flag("--quick", "Run fewer cases, with wider error bounds."), False),
-    jobs=(Jobs, None),
-    seed=(count("Random seed.", "--seed"), 1),
-    ablate=(flag("--ablate", "Remove mechanisms one by one; network only."), False),
-    live=(flag("--live", "Measure real sockets now; network only."), False),
-    measure=(file("Measure the whole design, or resume it; network only."), None),
-    beside=(
-        text(
-            "Compare the results of a middleware study with predictions; network only.",
-            metavar="FOLDER",
-        ),
-        None,
-    ),
-)
-def validate(
-    what: str, cases: str | None, quiet: Quiet = False, verbose: Verbose = False, **asked: Any
-) -> None:
+def validate(options: ValidateOptions, quiet: Quiet = False, verbose: Verbose = False) -> None:
     """Compare the models with theory, people and sockets.
 
     Runs cases with known answers. The exit code is 4 if a prediction misses.
@@ -214,5 +176,5 @@ def validate(
     from dva_sim.cli import validation  # late: start-up
 
     with loudness(quiet, verbose):
-        code = validation.validate(what, case_file=cases, **asked)
+        code = validation.validate(options)
     raise typer.Exit(code)

@@ -8,41 +8,45 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from typer import Argument
 
-from dva_sim.cli.options import RUN, SCENARIOS, Overwrite, Quiet, asks, count, file, text
+from dva_sim.cli.options import Quiet
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.options.forms import (
+    MOST_PORT,
+    SCENARIOS,
+    Changes,
+    OptionForm,
+    Overwrite,
+    RunSeed,
+    argument,
+    out_form,
+)
 
 _FILE = "Keys of a link, or a scenario with a link; default: a fast link."
-_KEYS = Annotated[str | None, Argument(metavar="LINK.yaml", autocompletion=SCENARIOS, help=_FILE)]
-_PUBLISH = "Make a port of the near end available on 127.0.0.1 of this computer."
-_OUT = "Save the counts: X.csv, or a folder for link.csv."
 
 
-@asks(
-    keys=(
-        Annotated[str | None, Argument(metavar="LINK.yaml", autocompletion=SCENARIOS, help=_FILE)],
-        None,
-    ),
-    near=(
-        text("Command at one end; when it ends, the other is stopped.", metavar="CMD", of=str),
-        "",
-    ),
-    far=(text("Command at the other end.", metavar="CMD", of=str), ""),
-    publish=(count(_PUBLISH, metavar="PORT", least=1, most=65_535, of=list[int] | None), None),
-    **RUN,
-    out=(file(_OUT, "-o", "--out", metavar="PATH"), None),
-    overwrite=(Overwrite, False),
-)
 def link(
-    keys: str | None,
-    near: str,
-    far: str,
-    publish: list[int] | None,
-    seed: int,
-    set_: list[str] | None,
-    out: Path | None,
-    overwrite: bool,
+    keys: Annotated[str | None, argument(_FILE, "LINK.yaml", *SCENARIOS)] = None,
+    near: Annotated[
+        str, OptionForm("Command at one end; when it ends, the other is stopped.", metavar="CMD")
+    ] = "",
+    far: Annotated[str, OptionForm("Command at the other end.", metavar="CMD")] = "",
+    publish: Annotated[
+        tuple[int, ...],
+        OptionForm(
+            "Make a port of the near end available on 127.0.0.1 of this computer.",
+            metavar="PORT",
+            least=1,
+            most=MOST_PORT,
+            is_repeated=True,
+        ),
+    ] = (),
+    seed: RunSeed = 1,
+    set: Changes = (),
+    out: Annotated[
+        Path | None, out_form("Save the counts: X.csv, or a folder for link.csv.", "PATH")
+    ] = None,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> None:
     """Run any two programs over a link you choose.
@@ -79,15 +83,14 @@ def link(
     for name, command in (("--near", near), ("--far", far)):
         if not command.strip():
             raise ConfigError(f"{name} needs a command, such as {name} 'ping $DVA_LINK_NEAR'")
-    pairs = tuple(set_ or ())
     try:
-        config = read_link(keys, parse_changes(pairs), (NEAR, FAR))
+        config = read_link(keys, parse_changes(set), (NEAR, FAR))
     except ConfigError as error:
-        raise set_by(pairs, error) from None
+        raise set_by(set, error) from None
     links_of(config, seed)  # files that the link names are read before anything starts
     files = link_counts.files_of(out, overwrite)
     with ExitStack() as at_end:
-        ports = [at_end.enter_context(_listening(port)) for port in publish or ()]
+        ports = [at_end.enter_context(_listening(port)) for port in publish]
         joined = at_end.enter_context(LinkProcess(config, seed))
         outcome = run_pair(joined, near, far, link_counts.tell, ports)
     if not quiet:

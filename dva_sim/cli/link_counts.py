@@ -84,7 +84,8 @@ def _milliseconds(**durations: float) -> str:
 def _disturbed(report: LinkReport) -> str:
     if report.overrun_packets:
         return f"disturbed: the emulator was too slow for {report.overrun_packets} packets"
-    late, most = 1e3 * report.late_p99_s, 1e3 * LATE_S
+    late = 1e3 * report.late_p99_s
+    most = 1e3 * LATE_S
     return f"disturbed: the emulator's p99 of {late:.1f} ms is above {most:g} ms"
 
 

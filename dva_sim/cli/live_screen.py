@@ -19,10 +19,11 @@ from dva_sim.cli.verbosity import detail, is_verbose
 from dva_sim.core.registry import DETECTOR
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live import process
-from dva_sim.live.options import LOCALHOST, PARTS, LiveOptions
+from dva_sim.live.options import check, scenario_of
 from dva_sim.live.process import Report, run_part
 from dva_sim.live.supervisor import Summary, Supervisor
 from dva_sim.network.sockets import DEFAULT_PORT
+from dva_sim.options.runs import LOCALHOST, PARTS, LiveOptions
 from dva_sim.serving.open_port import OpenPort, open_port
 from dva_sim.simulation.full.verdicts import Verdict, refuse_unheld
 from dva_sim.simulation.scenario import contradictions
@@ -57,7 +58,8 @@ class Board:
         self.events: list[dict[str, Any]] = []
         self.story: list[list[Any]] = []
         self.time = 0.0
-        self.dva, self.addresses = "", list[str]()
+        self.dva = ""
+        self.addresses = list[str]()
         self._registered: set[str] = set()
 
     def hear(self, report: Report) -> list[list[Any]]:
@@ -133,19 +135,20 @@ def run_all(options: LiveOptions) -> None:
     Raises:
         DvaSimError: the scenario cannot be run, or a part failed.
     """
-    console, board = _console(), Board()
+    console = _console()
+    board = Board()
     warn(console, options)
     door = None
     if options.rosbridge is not None:
-        door = open_port(options.host, options.rosbridge, "--rosbridge", options.token)
+        door = open_port(options.host, options.rosbridge, "--rosbridge", not options.no_token)
         board.addresses.append(f"rosbridge: {door.url}")
     with ExitStack() as at_end:
         viewer = None
         if options.foxglove is not None:
             from dva_sim.live.foxglove_server import FoxgloveServer  # late: start-up
 
-            port = open_port(LOCALHOST, options.foxglove, "--foxglove", options.token)
-            viewer = FoxgloveServer(options.read(), options.seed, port)
+            port = open_port(LOCALHOST, options.foxglove, "--foxglove", not options.no_token)
+            viewer = FoxgloveServer(scenario_of(options), options.seed, port)
             at_end.callback(viewer.close)
             board.addresses.append(viewer.where)
         summary = _watched(console, board, partial(Supervisor, options), door, viewer)
@@ -178,7 +181,7 @@ def _watched(
 
 def warn(console: Console, options: LiveOptions) -> None:
     """Say what does not go together, before anything starts."""
-    for entry in contradictions(options.read(), live=not options.emulated):
+    for entry in contradictions(scenario_of(options), live=not options.link):
         _print(console, f"warning: {entry}")
 
 
@@ -199,17 +202,18 @@ def _console() -> Console:
     return console if console.is_terminal else Console(width=WIDTH)
 
 
-def run_one(part: str, options: LiveOptions, number: int) -> None:
+def run_one(part: str, options: LiveOptions) -> None:
     """Run one part in this process and show what it knows.
 
     Raises:
         DvaSimError: the scenario, the keys or the ports are not as they should be.
     """
-    console, board = _console(), Board()
+    console = _console()
+    board = Board()
     warn(console, options)
     if options.dva is None and (part != "dva" or not options.port):
         options = replace(options, dva=DEFAULT_DVA)
-    options.check(part)
+    check(options)
     if part in PARTS and part != "dva":
         _print(console, f"Looking for the DVA at {options.dva} for {process.PATIENCE:g} s ...")
     with Live(console=console, refresh_per_second=4, transient=True) as screen:
@@ -221,7 +225,7 @@ def run_one(part: str, options: LiveOptions, number: int) -> None:
             if console.is_terminal:
                 screen.update(board.table())
 
-        found = run_part(part, options, say, number)
+        found = run_part(part, options, say, options.number)
     console.print(board.table())
     _print_rules(console, found)
     refuse_unheld(found)
@@ -231,7 +235,8 @@ class InOrder:
     """Prints the story in order of time, although each part tells its own lines once a second."""
 
     def __init__(self, console: Console, board: Board) -> None:
-        self._console, self._board = console, board
+        self._console = console
+        self._board = board
         self._waiting: list[list[Any]] = []
 
     def hear(self, report: Report) -> None:

@@ -11,6 +11,7 @@ import shutil
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -75,13 +76,13 @@ def _facts(word: str, plugins: Plugins[Any]) -> Iterator[tuple[str, str]]:
 
 def key_of(plugins: Plugins[Any]) -> str:
     """Return the key that names a plug-in of a kind, and the file that has the key."""
-    where = {"drive": "a robot profile", "figure": "a study, a list", "measure": "a study, a list"}
+    where = {"drive": "a robot profile", "measure": "a study, a list"}
     return f"{plugins.key} of {where.get(plugins.kind, 'a scenario')}"
 
 
 def named_as(plugins: Plugins[Any]) -> str:
     """Return how a configuration writes the name of a user's plug-in."""
-    return "[mine.py:Mine]" if plugins.kind in ("figure", "measure") else "mine.py:Mine"
+    return "[mine.py:Mine]" if plugins.kind == "measure" else "mine.py:Mine"
 
 
 def _package(entry: Any) -> str:
@@ -183,12 +184,17 @@ def _described(path: Path) -> str:
     return _first(" ".join(str(next(iter(found.values()), "")).split())) if found else ""
 
 
+@cache
+def _installed() -> Any:
+    """Read what all installed packages offer; reading it for each kind takes as long each time."""
+    return entry_points()
+
+
 def _plugins_of(trial: CheckedKind) -> Iterator[NamedThing]:
     """Shipped and installed classes; an installed one is loaded only when it is used."""
-    values = {entry.name: f"of {entry.value}" for entry in entry_points(group=trial.group)}
+    values = {entry.name: f"of {entry.value}" for entry in _installed().select(group=trial.group)}
     for name, words in trial.words().items():
-        summary = words.partition("\n\n")[0]
-        values[name] = _first(" ".join(summary.split())) or values.get(name, "")
+        values[name] = _first(words) or values.get(name, "")
     for name, description in sorted(values.items()):
         yield NamedThing(name, description)
 

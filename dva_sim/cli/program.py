@@ -19,15 +19,18 @@ from dva_sim.cli.commands import Command, PanelGroup, Panels, name_of, typer_of
 from dva_sim.cli.plain_output import replace_what_cannot_be_shown
 from dva_sim.kernel import early_stop
 from dva_sim.kernel.errors import DvaSimError, ExitCode, error_line
+from dva_sim.kernel.retired import use_now
 from dva_sim.kernel.suggestions import either, hint
 
 
 def in_a_line(error: Any) -> str:
     """Describe what is wrong with a call, and what would be right."""
     path = error.ctx.command_path if error.ctx is not None else "dva-sim"
-    more, kind = f"see {path} --help", type(error).__name__
+    more = f"see {path} --help"
+    kind = type(error).__name__
     if kind == "NoSuchOption":
-        return f"{path} has no option {error.option_name!r}; {_options(error, more)}"
+        instead = use_now("option", error.option_name)
+        return instead or f"{path} has no option {error.option_name!r}; {_options(error, more)}"
     if kind == "MissingParameter":
         return f"{path} needs {name_of(error.param)}: {_help(error.param)}; {more}"
     if kind == "BadParameter" and error.param is not None:

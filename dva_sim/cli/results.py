@@ -3,37 +3,34 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import typer
 
-from dva_sim import api
-from dva_sim.cli.options import Json, Quiet, Verbose, asks, several, takes
+from dva_sim.cli.options import Json, Quiet, Verbose
 from dva_sim.cli.verbosity import WRITTEN, loudness, print_json, tell_files
+from dva_sim.options.forms import OptionForm
+from dva_sim.options.studies import CompareOptions, ExportOptions, ReportOptions, ShowOptions
 
 
-@takes(api.report)
-def report(
-    folder: str, pdf: bool, quiet: Quiet = False, verbose: Verbose = False, **asked: Any
-) -> None:
+def report(options: ReportOptions, quiet: Quiet = False, verbose: Verbose = False) -> None:
     """Rebuild the report of a results folder.
 
     A report is a page, its figures and the numbers behind them. While a study is running, the page
-    shows the results so far. Your own figures, named in the study's file, are drawn when the study
-    is run; later they are drawn only if --figure names them.
+    shows the results so far.
 
     Examples:
         dva-sim report results/req-rep-vs-pub-sub --pdf  # and report.pdf for print
-        dva-sim report small --figure risk.py:Risk  # with a figure of your own
     """
+    from dva_sim.experiments.report.report import write_report  # late: start-up
+
     with loudness(quiet, verbose):
-        page = api.report(folder, pdf=pdf, **asked)
+        page = write_report(Path(str(options.folder)), options.pdf)
         tell_files(page.parent, *WRITTEN)
-        typer.echo(f"Report: {page}{' and report.pdf' if pdf else ''}")
+        typer.echo(f"Report: {page}{' and report.pdf' if options.pdf else ''}")
 
 
-@takes(api.show)
-def show(folder: str, table: str | None, rows: int, columns: bool, as_json: Json = False) -> None:
+def show(options: ShowOptions, as_json: Json = False) -> None:
     """Show a results folder in the terminal.
 
     Shows the answer and every cell, or a table, or the meaning of the columns. While a study is
@@ -45,25 +42,28 @@ def show(folder: str, table: str | None, rows: int, columns: bool, as_json: Json
         dva-sim show small --columns  # what the columns of every table mean
         dva-sim show small --json  # the same for other programs
     """
-    if not as_json:
-        api.show(folder, table=table, rows=rows, columns=columns)
-        return
-    from dva_sim.cli import results_json  # late: start-up
     from dva_sim.experiments.execution.checkpoint import load_so_far  # late: start-up
 
-    results = load_so_far(folder)
-    if columns:
+    results = load_so_far(str(options.folder))
+    table = options.table
+    if not as_json:
+        from dva_sim.experiments.report import terminal  # late: start-up
+
+        terminal.show(results, table, options.columns, options.rows)
+        return
+    from dva_sim.cli import results_json  # late: start-up
+
+    if options.columns:
         print_json(results_json.columns(results, [] if table is None else [table]))
     else:
         print_json(
             results_json.shown(results)
             if table is None
-            else results_json.table(results, table, rows)
+            else results_json.table(results, table, options.rows)
         )
 
 
-@takes(api.export)
-def export(**asked: Any) -> None:
+def export(options: ExportOptions) -> None:
     """Write tables of results for other programs.
 
     In a folder, columns.csv says what the columns mean.
@@ -72,26 +72,37 @@ def export(**asked: Any) -> None:
         dva-sim export small -o small.csv  # one row for each run
         dva-sim export small -o tables --format parquet  # every table
     """
-    for path in api.export(**asked):
+    from dva_sim import api  # late: start-up
+
+    for path in api.export(**vars(options)):
         print(path)
 
 
-@takes(api.compare)
-@asks(
-    measure=(
-        several("NAME or TABLE.NAME; default: the answer's. May be given again.", "MEASURE"),
-        (),
-    ),
-    by=(
-        several(
-            "Compare by the levels of this factor instead of by cell; may be given again.", "FACTOR"
-        ),
-        (),
-    ),
-    fail_if=(several("Exit with 4 if it holds; may be given again.", "CONDITION"), ()),
-)
 def compare(
-    first: str, second: str, measure: list[str], as_json: Json = False, **asked: Any
+    options: CompareOptions,
+    measure: Annotated[
+        tuple[str, ...],
+        OptionForm(
+            "NAME or TABLE.NAME; default: the answer's. May be given again.",
+            metavar="MEASURE",
+            is_repeated=True,
+        ),
+    ] = (),
+    by: Annotated[
+        tuple[str, ...],
+        OptionForm(
+            "Compare by the levels of this factor instead of by cell; may be given again.",
+            metavar="FACTOR",
+            is_repeated=True,
+        ),
+    ] = (),
+    fail_if: Annotated[
+        tuple[str, ...],
+        OptionForm(
+            "Exit with 4 if it holds; may be given again.", metavar="CONDITION", is_repeated=True
+        ),
+    ] = (),
+    as_json: Json = False,
 ) -> None:
     """Compare two results folders, run by run.
 
@@ -105,5 +116,12 @@ def compare(
     """
     from dva_sim.cli import comparison  # late: start-up
 
-    code = comparison.compare(Path(first), Path(second), measures=measure, as_json=as_json, **asked)
+    code = comparison.compare(
+        Path(str(options.first)),
+        Path(str(options.second)),
+        measures=measure,
+        by=by,
+        fail_if=fail_if,
+        as_json=as_json,
+    )
     raise typer.Exit(code)

@@ -24,7 +24,9 @@ Data = dict[str, Any]
 
 def shown(results: Results) -> Data:
     """The answer, what it rests on, and every cell."""
-    status, reading, study = status_of(results.manifest), Reading(results), results.study
+    status = status_of(results.manifest)
+    reading = Reading(results)
+    study = results.study
     return {
         "folder": str(results.folder),
         "question": results.question,
@@ -87,7 +89,8 @@ def compared(
     Raises:
         ConfigError: no such measure or factor.
     """
-    matched, (pairs, runs) = comparison.matched, comparison.paired
+    matched = comparison.matched
+    (pairs, runs) = comparison.paired
     wanted: Sequence[str | None] = measures or [None]
     return {
         "a": _side(comparison.sides[0]),
@@ -129,7 +132,8 @@ def _cells(reading: Reading) -> Iterator[Data]:
     runs, factors = layout_of(reading.study, reading.runs, are_points_trials=False)
     for name in dict.fromkeys(str(part) for part in runs["part"]):
         part = RunGrid(runs, name, factors)
-        made, grid = part.grid("seed"), part.grid(view.measure)
+        made = part.grid("seed")
+        grid = part.grid(view.measure)
         for setting in part.settings():
             count = int((part.where(made, setting) == part.where(made, setting)).sum())
             found = interval_of(part.where(grid, setting))

@@ -4,26 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from dva_sim.cli.options import REQUIRED, SITES, argument, asks, count, file, flag, several
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.options.forms import OptionForm, argument, out_form
 
 if TYPE_CHECKING:
     from dva_sim.worlds.site import Site
 
-_NAME = argument("A site by name or path, or a ROS map by path.", "SITE", SITES), REQUIRED
-_CHANGES = several("An option of a generated site.", "KEY=VALUE", "--set"), ()
+_Site = Annotated[str, argument("A site by name or path, or a ROS map by path.", "SITE", "worlds")]
+_Changes = Annotated[
+    tuple[str, ...],
+    OptionForm("An option of a generated site.", metavar="KEY=VALUE", is_repeated=True),
+]
 
 
-@asks(
-    name=_NAME,
-    out=(file("Picture; default: NAME.png.", "-o", "--out"), None),
-    set_=_CHANGES,
-    coverage=(flag("--coverage", "Shade areas with weak Wi-Fi."), False),
-    width=(count("Width of the picture.", metavar="PIXELS", least=200, most=8000), 1650),
-)
-def show(name: str, out: Path | None, set_: list[str], coverage: bool, width: int) -> None:
+def show(
+    name: _Site,
+    out: Annotated[Path | None, out_form("Picture; default: NAME.png.", "FILE")] = None,
+    set: _Changes = (),
+    coverage: Annotated[bool, OptionForm("Shade areas with weak Wi-Fi.")] = False,
+    width: Annotated[
+        int, OptionForm("Width of the picture.", metavar="PIXELS", least=200, most=8000)
+    ] = 1650,
+) -> None:
     """Draw a site and describe it in one line.
 
     Examples:
@@ -32,18 +36,17 @@ def show(name: str, out: Path | None, set_: list[str], coverage: bool, width: in
     """
     from dva_sim.worlds.view import write_poster  # late: start-up
 
-    site = _open(name, set_)
+    site = _open(name, set)
     file = out or Path(f"{Path(name).stem}.png")
     write_poster(site, file, coverage, width)
     print(f"{describe(site)}\n{file}")
 
 
-@asks(
-    name=_NAME,
-    out=(file("Where to.", "-o", "--out", metavar="FOLDER", of=Path), Path()),
-    set_=_CHANGES,
-)
-def export(name: str, out: Path, set_: list[str]) -> None:
+def export(
+    name: _Site,
+    out: Annotated[Path, out_form("Where to.")] = Path(),
+    set: _Changes = (),
+) -> None:
     """Export a site as YAML and GeoJSON for editing.
 
     Examples:
@@ -51,7 +54,7 @@ def export(name: str, out: Path, set_: list[str]) -> None:
     """
     from dva_sim.worlds.site_export import write_site  # late: start-up
 
-    site = _open(name, set_)
+    site = _open(name, set)
     print(f"{describe(site)}\n{write_site(site, out)}")
 
 

@@ -97,7 +97,8 @@ def _columns(run: Played) -> Sequence[Measure]:
 def tell_story(playback: Playback, console: Console) -> None:
     """Print the events of a run in order."""
     scenario = playback.scenario
-    delay, phone = scenario.link.delay_s * 1000, scenario.phone.profile
+    delay = scenario.link.delay_s * 1000
+    phone = scenario.phone.profile
     console.rule(f"{scenario.pattern}, {delay:g} ms each way, phone {phone}, seed {playback.seed}")
     table = _table(["time", "who", "what"], right=["time"])
     for moment in playback.recorder.timeline:
@@ -209,7 +210,8 @@ def _violations(count: int) -> str:
 # --- a shift -------------------------------------------------------------------------
 def tell_shift(run: Played, console: Console) -> None:
     """A shift: its first events, and what it took to deal with all."""
-    scenario, recording = run.scenario, run.kept
+    scenario = run.scenario
+    recording = run.kept
     assert isinstance(scenario, TimedScenario)
     assert isinstance(recording, TimedRecording)
     console.rule(f"{scenario.dispatch.policy}, seed {run.seed}")
@@ -251,7 +253,8 @@ def _shift_lines(recording: TimedRecording) -> Iterator[str]:
     parts = [f"{n} {name}" for name in OUTCOMES if (n := recording.count(name))]
     yield f"{total} events measured: {', '.join(parts)}"
     if recording.columns:
-        columns, here = recording.columns, recording.measured
+        columns = recording.columns
+        here = recording.measured
         response = (columns["arrived"] - columns["detected"])[here]
         there = response[np.isfinite(response)]
         if len(there):
@@ -280,7 +283,8 @@ def _seconds(value: float) -> str:
 # --- a session on a congested link ---------------------------------------------------
 def tell_session(run: Played, console: Console) -> None:
     """A session on a congested link: each flow, and what the drive came to."""
-    scenario, row = run.scenario, run.tables["runs"][0]
+    scenario = run.scenario
+    row = run.tables["runs"][0]
     assert isinstance(scenario, TransportScenario)
     console.rule(f"{scenario.transport.kind}, {scenario.operator.strategy}, seed {run.seed}")
     console.print(_flows(run.tables["flows"]))
@@ -314,7 +318,8 @@ def _session_lines(row: Row) -> Iterator[str]:
         f"{_ms(row['picture_age_mean_s'])} old on average, "
         f"95 % within {_ms(row['picture_age_p95_s'])}"
     )
-    mean, late = _ms(row["round_trip_mean_s"]), _ms(row["round_trip_p95_s"])
+    mean = _ms(row["round_trip_mean_s"])
+    late = _ms(row["round_trip_p95_s"])
     yield f"round trip: {mean} on average, {late} at 95 %"
     done = "done" if row["completed"] else "not done"
     yield (
@@ -331,7 +336,9 @@ def _ms(seconds: float) -> str:
 # --- a task --------------------------------------------------------------------------
 def tell_task(run: Played, console: Console) -> None:
     """A block of trials: the first ones, and all in a few words."""
-    scenario, trials, row = run.scenario, run.tables["trials"], run.tables["runs"][0]
+    scenario = run.scenario
+    trials = run.tables["trials"]
+    row = run.tables["runs"][0]
     assert isinstance(scenario, TaskScenario)
     console.rule(f"{scenario.task.kind}, {scenario.operator.strategy}, seed {run.seed}")
     console.print(_first_trials(trials))

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from typer import Argument, Option
 
-from dva_sim.cli.options import Jobs, Quiet, asks, folder, number, text
+from dva_sim.cli.options import Quiet
 from dva_sim.kernel.errors import ConfigError, ExitCode
+from dva_sim.options.forms import Jobs, OptionForm, argument, out_form
 
 if TYPE_CHECKING:
     from dva_sim.storms.campaign import StormTally
@@ -24,23 +24,17 @@ _PLAN = "Saved plan of one storm, such as a failure, to replay alone."
 _HOURS = "Continue with further seeds until this many fleet-hours are reached in total."
 
 
-@asks(
-    plan=(Annotated[Path | None, Argument(metavar="PLAN.yaml", help=_PLAN)], None),
-    seeds=(text("Seeds of the storms, from and to.", metavar="FIRST:LAST", of=str), "1:16"),
-    hours=(Annotated[float | None, Option(metavar="H", parser=number(), help=_HOURS)], None),
-    profile=(text("Kinds of faults: all, messages, nodes, people or none.", of=str), "all"),
-    mutants=(text("Look for planted bugs: all, or one by name.", metavar="NAME", of=str), ""),
-    jobs=(Jobs, None),
-    out=(folder("Folder for the journal and for failures.", "-o", "--out"), OUT),
-)
 def storm(
-    plan: Path | None,
-    seeds: str,
-    hours: float | None,
-    profile: str,
-    mutants: str,
-    jobs: int | None,
-    out: Path,
+    plan: Annotated[Path | None, argument(_PLAN, "PLAN.yaml")] = None,
+    seeds: Annotated[
+        str, OptionForm("Seeds of the storms, from and to.", metavar="FIRST:LAST")
+    ] = "1:16",
+    hours: Annotated[float | None, OptionForm(_HOURS, metavar="H")] = None,
+    profile: Annotated[
+        str, OptionForm("Kinds of faults: all, messages, nodes, people or none.")
+    ] = "all",
+    jobs: Jobs = None,
+    out: Annotated[Path, out_form("Folder for the journal and for failures.")] = OUT,
     quiet: Quiet = False,
 ) -> None:
     """Simulate hours of faults and check the safety rules.
@@ -55,13 +49,12 @@ def storm(
     timeline are saved in the folder, and the plan can be replayed. The same seed gives the same
     storm. Storms already in the folder are counted, not repeated.
 
-    The exit code is 1 if a rule was broken, or with --mutants, if a planted bug was not found.
+    The exit code is 1 if a rule was broken.
 
     Examples:
         dva-sim storm --seeds 1:256  # 60 fleet-hours
         dva-sim storm --hours 100  # continue with further seeds until 100 fleet-hours are reached
         dva-sim storm results/storms/found/all-7.yaml  # replay a failure
-        dva-sim storm --mutants all --seeds 1:32  # how many storms it takes to find planted bugs
     """
     from dva_sim.experiments.execution.executors import local  # late: start-up
     from dva_sim.storms.campaign import Journal, StormTally, outcomes  # late: start-up
@@ -72,10 +65,9 @@ def storm(
         raise typer.Exit(_replay(load_plan(plan)))
     first, last = _range(seeds)
     draw(first, profile)  # an unknown profile is refused before anything starts
-    if mutants:
-        raise typer.Exit(_hunt(mutants, range(first, last + 1), profile, out))
     out.mkdir(parents=True, exist_ok=True)
-    tally, known = StormTally(), 0
+    tally = StormTally()
+    known = 0
     failed: list[StormOutcome] = []
     numbers: Iterable[int] = itertools.count(first) if hours else range(first, last + 1)
     for outcome, is_known in outcomes(numbers, profile, Journal(out / "storms.jsonl"), local(jobs)):
@@ -114,23 +106,6 @@ def _replay(plan: StormPlan) -> ExitCode:
     if outcome.is_clean:
         typer.echo("no rule was broken")
     return ExitCode.OK if outcome.is_clean else ExitCode.DOES_NOT_HOLD
-
-
-def _hunt(mutants: str, seeds: range, profile: str, out: Path) -> ExitCode:
-    """Print how many storms it takes to find each planted bug, and keep that as a table."""
-    from dva_sim.storms.hunting import hunt, table  # late: start-up
-    from dva_sim.storms.mutants import named  # late: start-up
-
-    hunts = []
-    for mutant in named(mutants):
-        hunts.append(hunt(mutant, seeds, profile))
-        typer.echo(str(hunts[-1]))
-    missed = sum(not found.rules for found in hunts)
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "mutants.md").write_text(table(hunts), encoding="utf-8")
-    typer.echo(table(hunts))
-    typer.echo(f"{missed} planted bugs were not found" if missed else "all were found")
-    return ExitCode.DOES_NOT_HOLD if missed else ExitCode.OK
 
 
 def _tell_failure(outcome: StormOutcome, profile: str) -> None:
@@ -176,7 +151,8 @@ def _progress(tally: StormTally, hours: float | None) -> None:
 
 
 def _tell(tally: StormTally, known: int) -> None:
-    faults, touched = sum(tally.faults.values()), sum(tally.messages.values())
+    faults = sum(tally.faults.values())
+    touched = sum(tally.messages.values())
     typer.echo(
         f"{tally.storms} storms ({known} played before), {tally.hours:.1f} fleet-hours, "
         f"{faults} faults, {touched} messages touched; {tally.cpu_s:.0f} s of CPU time"

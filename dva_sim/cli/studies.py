@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import typer
 
-from dva_sim import api
-from dva_sim.cli.options import REQUIRED, Jobs, Quiet, Verbose, argument, asks, file, flag, takes
+from dva_sim.cli.options import Quiet, Verbose
 from dva_sim.cli.verbosity import loudness
-
-
-@asks(
-    out=(
-        file("Where pictures, film and report go.", "-o", "--out", metavar="FOLDER", of=Path),
-        Path("results/demo"),
-    ),
-    jobs=(Jobs, None),
+from dva_sim.options.forms import Jobs, out_form
+from dva_sim.options.studies import (
+    STUDY,
+    DryRun,
+    NewOptions,
+    RegisterOptions,
+    RunOptions,
+    TuneOptions,
 )
-def demo(out: Path, jobs: int | None) -> None:
+
+
+def demo(
+    out: Annotated[Path, out_form("Where pictures, film and report go.")] = Path("results/demo"),
+    jobs: Jobs = None,
+) -> None:
     """Show what delay and messaging do to driving.
 
     It shows one drive under two patterns, as a picture, a story and a film, then runs the small
@@ -34,9 +38,12 @@ def demo(out: Path, jobs: int | None) -> None:
     raise typer.Exit(show_it(out, jobs))
 
 
-@takes(api.run, but=("progress", "report"))
-@asks(dry_run=(flag("--dry-run", "Show what would run, and run nothing."), False))
-def run(dry_run: bool, quiet: Quiet = False, verbose: Verbose = False, **asked: Any) -> None:
+def run(
+    options: RunOptions,
+    dry_run: DryRun = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
     """Run or resume a study and write its report.
 
     An interrupted study resumes where it stopped: finished runs are kept in its folder.
@@ -50,7 +57,7 @@ def run(dry_run: bool, quiet: Quiet = False, verbose: Verbose = False, **asked: 
     from dva_sim.cli import study_runs  # late: start-up
     from dva_sim.experiments.execution.runner import RunRequest  # late: start-up
 
-    request = RunRequest(**asked)
+    request = RunRequest(options)
     with loudness(quiet, verbose):
         if dry_run:
             study_runs.plan(request)
@@ -59,8 +66,7 @@ def run(dry_run: bool, quiet: Quiet = False, verbose: Verbose = False, **asked: 
     raise typer.Exit(code)
 
 
-@takes(api.new)
-def new(name: str) -> None:
+def new(options: NewOptions) -> None:
     """Write a new study that runs as it is, to be edited.
 
     Its comments explain what can be changed.
@@ -68,11 +74,12 @@ def new(name: str) -> None:
     Examples:
         dva-sim new mine  # writes mine.yaml here
     """
-    typer.echo(next_steps(api.new(name)))
+    from dva_sim.experiments.study.loading import write_study  # late: start-up
+
+    typer.echo(next_steps(write_study(str(options.name))))
 
 
-@takes(api.register)
-def register(study: str, full: bool, again: bool) -> None:
+def register(options: RegisterOptions) -> None:
     """Fix a study's hypotheses and size before running it.
 
     The run then confirms or refutes the hypotheses.
@@ -83,11 +90,11 @@ def register(study: str, full: bool, again: bool) -> None:
     from dva_sim.experiments.study.file_kinds import open_study  # late: start-up
     from dva_sim.experiments.study.registration import register as write_down  # late: start-up
 
-    typer.echo(write_down(open_study(study, version="full" if full else None), again))
+    study = open_study(options.study, version="full" if options.full else None)
+    typer.echo(write_down(study, options.again))
 
 
-@takes(api.tune, but=("progress",))
-def tune(quiet: Quiet = False, verbose: Verbose = False, **asked: Any) -> None:
+def tune(options: TuneOptions, quiet: Quiet = False, verbose: Verbose = False) -> None:
     """Choose the values of a study's tuned key.
 
     Candidates are tried on persons who take no part in the study. The chosen values are saved
@@ -99,24 +106,17 @@ def tune(quiet: Quiet = False, verbose: Verbose = False, **asked: Any) -> None:
     from dva_sim.cli import study_runs  # late: start-up
 
     with loudness(quiet, verbose):
-        code = study_runs.tune(**asked)
+        code = study_runs.tune(options)
     raise typer.Exit(code)
 
 
-@asks(
-    study=(argument("A study, by name or path.", "STUDY"), REQUIRED),
-    out=(
-        file("Results folder; default: results/STUDY-screening.", "-o", "--out", metavar="FOLDER"),
-        None,
-    ),
-    jobs=(Jobs, None),
-    dry_run=(flag("--dry-run", "Show what would run, and run nothing."), False),
-)
 def screen(
-    study: str,
-    out: str | None,
-    jobs: int | None,
-    dry_run: bool,
+    study: Annotated[str, STUDY],
+    out: Annotated[
+        str | None, out_form("Results folder; default: results/STUDY-screening.")
+    ] = None,
+    jobs: Jobs = None,
+    dry_run: DryRun = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:

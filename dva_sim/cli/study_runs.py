@@ -30,30 +30,31 @@ from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned, tuning_study
 from dva_sim.kernel.errors import ExitCode, error_line
 from dva_sim.kernel.wording import capital
+from dva_sim.options.studies import TuneOptions
 
 _FEW = 5  # failures that are told one by one
 _MANY = 500  # configurations, which take some seconds to check
 _MANY_RUNS = 100_000  # whose list takes seconds, too
 _LINE_S = 30.0  # between two lines of progress in a file
-_MINUTE_S, _HOUR_S = 60, 3600
+_MINUTE_S = 60
+_HOUR_S = 3600
 _SURE_AFTER_S, _SURE_SHARE = 10.0, 0.05  # before both, the first runs say little of the others
 
 
 def run(request: RunRequest) -> ExitCode:
     """Run a study and show how far it is, then write its report; the exit code."""
-    from dva_sim.experiments.report.figures.registry import load_figures  # late: start-up
     from dva_sim.experiments.report.report import write_report  # late: start-up
 
     try:
         plan = _loaded(request)
-        figures = load_figures(plan.study.figures, plan.study.folder)  # before hours of simulation
-        before, folder = _planned(request, plan), request.folder
+        before = _planned(request, plan)
+        folder = request.folder
         with _shown("running", before.runs) as show:
             request.run(plan, show)
         results = Results.load(folder)
         failures = _report_failures(results) + _recorded(request, plan)
         with console.status("Writing the report ..."):
-            report = write_report(folder, figures=figures)
+            report = write_report(folder)
             distrusted = results.distrusted
         for part, entry in distrusted.items():
             problem = f"in part {part} {entry}: no contrast of it is shown"
@@ -66,13 +67,14 @@ def run(request: RunRequest) -> ExitCode:
     return ExitCode.RUNS_FAILED if failures or distrusted else ExitCode.OK
 
 
-def tune(study: str, out: str | None, jobs: int | None) -> ExitCode:
+def tune(options: TuneOptions) -> ExitCode:
     """Choose what a study has tuned, and write it beside the study; the exit code."""
     from dva_sim.experiments.analysis.tuning import tune as try_all  # late: start-up
 
-    asked = open_study(study)
+    asked = open_study(options.study)
+    jobs = options.jobs
     trials = tuning_study(asked)
-    folder = Path(out or folder_of_tuning(study))
+    folder = Path(options.out or folder_of_tuning(str(options.study)))
     say(f"[bold]{escape(trials.question)}[/bold]")
     before = dry_run(trials, folder, jobs=jobs)
     say(_plan(before, folder))
@@ -126,7 +128,7 @@ def plan(request: RunRequest) -> None:
 
 def _loaded(request: RunRequest) -> StudyPlan:
     """The plan of a study without mistakes."""
-    study = open_study(request.study, request.changes, version=request.version, pilot=request.pilot)
+    study = request.open()
     say(f"[bold]{escape(study.question)}[/bold]")
     plan = _checked(study)
     tell_cells(study, plan.cells)
@@ -176,7 +178,8 @@ def _time(found: DryRun) -> str:
     runs = f"{_counted(found.tried, 'run')} tried now" if found.tried else "the runs done already"
     about = "more than" if found.is_least else "about"
     who = _counted(found.workers, "process", "processes")
-    text = f"{about} {duration(found.estimate_s)} to go with {who}, judged by {runs}"
+    cpu = f" ({duration(found.cpu_s)} of CPU time)" if found.cpu_s else ""
+    text = f"{about} {duration(found.estimate_s)} to go with {who}{cpu}, judged by {runs}"
     text += "; the last was stopped before its end" if found.is_least else ""
     return f"{text}; {failed}" if failed else text
 
@@ -201,7 +204,7 @@ def _recorded(request: RunRequest, plan: StudyPlan) -> int:
     """Make the recordings that the study asks for; how many could not be made."""
     if plan.study.record is None:
         return 0
-    if request.scheduler is not None:
+    if request.options.scheduler is not None:
         say("Recordings are made on this machine, from the same seeds")
     with _shown("recording", 0) as show:
         problems = request.record(plan, show)
@@ -242,7 +245,9 @@ class _Lines:
     """Progress in a file: the first line, the last, and one now and then."""
 
     def __init__(self, where: Console, pace: RunPace) -> None:
-        self._where, self._pace, self._last = where, pace, -_LINE_S
+        self._where = where
+        self._pace = pace
+        self._last = -_LINE_S
 
     def show(self, done: int, total: int) -> None:
         line = self._pace.line(done, total)
@@ -260,14 +265,16 @@ class RunPace:
     """
 
     def __init__(self, clock: Callable[[], float], things: str = "runs") -> None:
-        self._clock, self._things = clock, things
+        self._clock = clock
+        self._things = things
         self._first: tuple[int, float] | None = None
 
     def line(self, done: int, total: int) -> str:
         """Runs that are done, their rate, and once that says something, the time left at it."""
         now = self._clock()
         self._first = self._first or (done, now)
-        made, took = done - self._first[0], now - self._first[1]
+        made = done - self._first[0]
+        took = now - self._first[1]
         if not made or not took:
             return f"{done}/{total} {self._things}"
         rate = made / took

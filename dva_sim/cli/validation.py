@@ -23,6 +23,7 @@ from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import ConfigError, ExitCode
 from dva_sim.kernel.suggestions import either
+from dva_sim.options.studies import VALIDATED, ValidateOptions
 from dva_sim.validation.dispatch import cases, identities
 from dva_sim.validation.dispatch import checks as dispatch
 from dva_sim.validation.dispatch import result_page as dispatch_page
@@ -42,7 +43,6 @@ from dva_sim.validation.operators.exact import EXACT
 from dva_sim.validation.operators.experiments import EXPERIMENTS
 from dva_sim.validation.operators.verdicts import judge, outcome_of
 
-WHAT = ("dispatch", "operators", "network")
 WIDTH, WIDE = 110, 240  # of tables at least, also in a file; of those with many columns
 _MANY = 8  # columns
 _STYLES = {
@@ -53,73 +53,52 @@ _STYLES = {
 }
 
 
-def validate(
-    what: str,
-    out: Path | None = None,
-    *,
-    case_file: str | None = None,
-    strategy: str | None = None,
-    quick: bool = False,
-    jobs: int | None = None,
-    seed: int = 1,
-    ablate: bool = False,
-    live: bool = False,
-    measure: Path | None = None,
-    beside: str | None = None,
-) -> ExitCode:
+def validate(options: ValidateOptions) -> ExitCode:
     """Play, print the comparison, write it if asked to; how it ended.
-
-    Args:
-        what: `dispatch`, `operators` or `network`.
-        out: Folder for tables, figures and the page.
-        case_file: A file of cases, for dispatch and network.
-        strategy: Strategy of the operators, for operators; by default that of the split file.
-        quick: Fewer runs.
-        jobs: Processes; left out, one per core.
-        seed: Random seed.
-        ablate: Leave mechanisms of the network's model out one by one.
-        live: Measure sockets now, and compare with that alone.
-        measure: Measure the whole design into this table; nothing is compared.
-        beside: Results of a middleware study to stand beside predictions, or a study, of which
-            predictions alone are made.
 
     Raises:
         ConfigError: something else to validate, an option that belongs to another, or a
             mistake in the files.
         EmulatorError: nothing can be measured here.
     """
-    of_network = ablate or live or measure is not None or beside is not None
-    _refuse_foreign(what, case_file, strategy, of_network)
+    what = options.what
+    out = options.out
+    quick = options.quick
+    seed = options.seed
+    _refuse_foreign(options)
     if out is not None and out.exists() and not out.is_dir():
         raise ConfigError(f"--out {out} is a file; give a folder")
-    workers = jobs or os.cpu_count() or 1
+    workers = options.jobs or os.cpu_count() or 1
     detail(f"{what}, seed {seed}, {workers} processes{', quick' if quick else ''}")
-    for key, value in (("cases", case_file), ("strategy", strategy), ("out", out)):
+    for key in ("cases", "strategy", "out"):
+        value = getattr(options, key)
         detail(f"  {key}: {'as shipped' if value is None else value}")
     try:
         if what == "dispatch":
-            return conclude(partial(_dispatch, case_file, quick, workers, seed), out)
+            return conclude(partial(_dispatch, options.cases, quick, workers, seed), out)
         if what == "operators":
-            return conclude(partial(_operators, strategy, quick, workers, seed), out)
-        if beside is not None:
-            return conclude(partial(_beside, beside, quick, workers), out)
-        setting = comparison.NetworkSetting(seed, quick, workers, ablate)
-        return _network(case_file, setting, measure, live, out)
+            return conclude(partial(_operators, options.strategy, quick, workers, seed), out)
+        if options.beside is not None:
+            return conclude(partial(_beside, options.beside, quick, workers), out)
+        setting = comparison.NetworkSetting(seed, quick, workers, options.ablate)
+        return _network(options.cases, setting, options.measure, options.live, out)
     except KeyboardInterrupt:
         say("Stopped.")
         return ExitCode.INTERRUPTED
 
 
-def _refuse_foreign(what: str, cases: str | None, strategy: str | None, sockets: bool) -> None:
+def _refuse_foreign(options: ValidateOptions) -> None:
     """Refuse something else to validate, and options that belong to another."""
-    if what not in WHAT:
-        raise ConfigError(f"{what!r} cannot be validated; should be {either(WHAT)}")
-    if strategy is not None and what != "operators":
+    what = options.what
+    if what not in VALIDATED:
+        raise ConfigError(f"{what!r} cannot be validated; should be {either(VALIDATED)}")
+    if options.strategy is not None and what != "operators":
         raise ConfigError(f"--strategy is for `validate operators`: {what} has none")
-    if cases is not None and what == "operators":
+    if options.cases is not None and what == "operators":
         text = "`validate dispatch` and `validate network`: operators have no cases"
         raise ConfigError(f"--cases is for {text}")
-    if sockets and what != "network":
+    measures = options.measure is not None or options.beside is not None
+    if (options.ablate or options.live or measures) and what != "network":
         text = "--ablate, --live, --measure and --beside are for `validate network`"
         raise ConfigError(text)
 

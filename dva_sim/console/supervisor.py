@@ -8,25 +8,24 @@ from contextlib import closing, contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
-from dva_sim.cameras.children import ChildFailed
 from dva_sim.console.audit.audit_keeper import auditing
-from dva_sim.console.options import ConsoleOptions
+from dva_sim.console.options import kept_results, motion_folder, scenario_of, sockets
 from dva_sim.console.pages.processes import ConsoleProcesses
 from dva_sim.console.people.actions import Actions
 from dva_sim.console.run.recorder import keep_run
 from dva_sim.console.world.kept_results import KeptResults
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.kernel.errors import DvaSimError
-from dva_sim.live.options import LOCALHOST
 from dva_sim.live.pipes import Inlets
 from dva_sim.live.process import ending_when_asked
 from dva_sim.live.recording import Keeper, LiveRecorder
-from dva_sim.network.emulator.process import LinkEnded
 from dva_sim.network.emulator.report import LinkReport
+from dva_sim.options.runs import LOCALHOST, ConsoleOptions
 from dva_sim.ros.gateway import RosGateway
 from dva_sim.ros.server import RosbridgeServer
 from dva_sim.serving.open_port import OpenPort, open_port
 from dva_sim.serving.pipes import PipeEnd
+from dva_sim.serving.processes import ChildFailed
 from dva_sim.simulation.full.verdicts import refuse_unheld, verdicts
 from dva_sim.simulation.scenario import Scenario
 
@@ -50,15 +49,17 @@ class ConsoleSupervisor:
     """
 
     def __init__(self, options: ConsoleOptions, say: Say) -> None:
-        self._options, self._say = options, say
-        self._processes = ConsoleProcesses(options, say)
+        self._options = options
+        self._say = say
+        phones = (options.phones_host, options.phones_port) if options.phones else None
+        self._processes = ConsoleProcesses(options, say, phones)
         self.packets: LinkReport | None = None
         self._rosbridge: OpenPort | None = None
         self._foxglove: OpenPort | None = None
         self._viewer: FoxgloveServer | None = None
 
     def run(self) -> None:
-        """Run until Ctrl-C, SIGTERM, or the end of the web process.
+        """Run until Ctrl-C, SIGTERM, SIGHUP, or the end of the web process.
 
         Raises:
             ConfigError: the scenario cannot be run, or not recorded as wanted.
@@ -67,8 +68,9 @@ class ConsoleSupervisor:
             RunsFailed: some tables of the results could not be made.
             RulesBroken: a safety rule was broken.
         """
-        options, scenario = self._options, self._options.read()
-        results = options.kept_results()
+        options = self._options
+        scenario = scenario_of(self._options)
+        results = kept_results(options)
         if results is None:
             self._play(scenario, options.seed, None)
         else:
@@ -82,11 +84,13 @@ class ConsoleSupervisor:
         self._rosbridge = self._open("--rosbridge", options.host, options.rosbridge)
         self._foxglove = self._open("--foxglove", LOCALHOST, options.foxglove)
         world = ConsoleWorld(
-            *(scenario, options.scenario, seed),
-            sockets=options.sockets(),
+            scenario,
+            name=options.played,
+            seed=seed,
+            sockets=sockets(options),
             measured=results is not None,
         )
-        world.phones.motion_folder = options.motion_folder()
+        world.phones.motion_folder = motion_folder(options)
         if results is not None:
             results.follow(world)
         try:
@@ -115,12 +119,15 @@ class ConsoleSupervisor:
             if isinstance(before, DvaSimError):
                 raise type(before)(f"{before}; {error}") from None
             raise
-        self._say(f"{self._options.results} written")
+        self._say(f"{self._options.out} written")
 
     @contextmanager
     def _recorded(self, world: ConsoleWorld) -> Iterator[None]:
         """Keep a recording of what happens, if one is wanted; in the end all is closed."""
-        options, keeper, outlet, inlets = self._options, None, None, None
+        options = self._options
+        keeper = None
+        outlet = None
+        inlets = None
         viewer = self._viewer = self._show_to_foxglove(world)
         also = None if viewer is None else viewer.keep
         if options.record is not None:
@@ -154,7 +161,7 @@ class ConsoleSupervisor:
 
     def _open(self, option: str, host: str, port: int | None) -> OpenPort | None:
         """Open a port for programs of other makes, if it is wanted."""
-        return None if port is None else open_port(host, port, option, self._options.token)
+        return None if port is None else open_port(host, port, option, not self._options.no_token)
 
     def _show_to_foxglove(self, world: ConsoleWorld) -> FoxgloveServer | None:
         if self._foxglove is None:
@@ -165,7 +172,7 @@ class ConsoleSupervisor:
 
     def _about(self, world: ConsoleWorld) -> dict[str, Any]:
         options = self._options
-        return {"scenario": options.scenario, "seed": world.seed, "links": options.links}
+        return {"scenario": options.played, "seed": world.seed, "links": options.links}
 
     def _run(self, world: ConsoleWorld) -> None:
         with ending_when_asked(world.clock, supervised=False) as ending:
@@ -185,8 +192,8 @@ class ConsoleSupervisor:
                     world.sockets.begin()
                 world.clock.go()
                 world.clock.run()
-            if world.sockets is not None and world.sockets.has_lost_link:
-                raise LinkEnded("the emulated link has ended by itself")
+            if world.sockets is not None:
+                world.sockets.refuse_lost_link()
             if rosbridge is not None:
                 rosbridge.close()
             self._leave(world)

@@ -107,7 +107,8 @@ class Rules:
 
 
 STIRRED = 0.5  # who has moved less has not moved: positions are known that well [m]
-SET_OUT, MOVE = "set out", "move"
+SET_OUT = "set out"
+MOVE = "move"
 
 
 class Promise(NamedTuple):
@@ -132,7 +133,8 @@ class Promises:
 
     def overdue(self, promises: Iterable[Promise], now: float) -> list[Promise]:
         """All that is owed now; what of it has been so for too long."""
-        before, self._owed = self._owed, {}
+        before = self._owed
+        self._owed = {}
         for promise in promises:
             key = promise.device, promise.event.number
             old, since = before.get(key, (promise, now))

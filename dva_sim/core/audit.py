@@ -98,9 +98,9 @@ class Fact:
             author=self.author,
             label=self.label[:64],
             action=self.action,
-            reason=_shortened(self.cause),
+            reason=self.cause[:256],
             code=self.code,
-            text=_shortened(self.outcome),
+            text=self.outcome[:256],
             role=self.role,
             event_id=self.event,
             device=self.device,
@@ -112,11 +112,6 @@ class Fact:
 
 
 LONGEST = 1e6  # no longer time is told [s]
-
-
-def _shortened(text: str) -> str:
-    """So much of a text as a message can hold."""
-    return text[:256]
 
 
 def _span(seconds: float | None) -> float | None:

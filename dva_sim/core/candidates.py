@@ -95,7 +95,8 @@ def _why_not(
     dispatcher: Dispatcher, entry: DeviceEntry, event: Event, way: float, now: float
 ) -> str:
     """The first reason why somebody cannot be sent there now; empty: it can."""
-    orders, device = dispatcher.orders, entry.device
+    orders = dispatcher.orders
+    device = entry.device
     if entry.silent:
         return f"not heard of for {now - entry.last_heard:.0f} s"
     if at := orders.engaged.all(device.id_tag):

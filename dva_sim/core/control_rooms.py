@@ -7,23 +7,22 @@ no time of its own, and nobody acts on a robot without its permission. The polic
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final
 
 from dva_sim.core.audit import Fact
 from dva_sim.core.candidates import proposal
 from dva_sim.core.dispatcher import Advised, Dispatcher
 from dva_sim.core.event_status import by_whom, event_list, status_of
-from dva_sim.core.events import Event, State
-from dva_sim.core.handling import Choice
+from dva_sim.core.events import LOOKING, Cause, Choice, Event, State
 from dva_sim.core.handovers import Handovers
 from dva_sim.core.permissions import Access
 from dva_sim.core.registry import CONTROL_ROOM, DRIVERS, GUARD, ROBOT, DeviceEntry
 from dva_sim.core.roles import ControlRoomRole, Roles
-from dva_sim.core.sessions import Send
+from dva_sim.core.sessions import DvaAnswer, Send
 from dva_sim.core.travel_times import Start
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.control_room import ControlRoomBody, ControlRoomContent
+from dva_sim.protocol.control_room import ControlRoomBody
 
 R = ControlRoomRole
 NEEDS: Final[dict[type, tuple[ControlRoomRole, str]]] = {
@@ -43,16 +42,6 @@ NEEDS: Final[dict[type, tuple[ControlRoomRole, str]]] = {
 """Role that each message needs, and its effect in the words of a `Fact`."""
 LISTED_CLOSED = 50  # events that are over, of the last
 Decision = m.Acknowledge | m.Assign | m.TakeOff | m.FalseAlarm | m.Escalate | m.AddNote
-
-
-@dataclass(frozen=True, slots=True)
-class RoomAnswer:
-    """Answer and its consequences; a code other than OK means that nothing was done."""
-
-    code: int = m.OK
-    text: str = ""
-    content: ControlRoomContent | None = None
-    sends: tuple[Send, ...] = ()
 
 
 class _Refused(Exception):
@@ -76,35 +65,38 @@ class ControlRooms:
     def __init__(
         self, dispatcher: Dispatcher, handovers: Handovers, roles: Roles, access: Access
     ) -> None:
-        self._dispatcher, self._handovers = dispatcher, handovers
-        self._roles, self._access = roles, access
-        self._orders, self._events = dispatcher.orders, dispatcher.orders.events
+        self._dispatcher = dispatcher
+        self._handovers = handovers
+        self._roles = roles
+        self._access = access
+        self._orders = dispatcher.orders
+        self._events = dispatcher.orders.events
         self._doers: dict[type, Callable[[Any, Event, m.Device, float], list[Send] | str]] = {
             m.Acknowledge: self._acknowledge,
             m.Assign: self._assign,
             m.TakeOff: self._take_off,
-            m.FalseAlarm: self._false_alarm,
-            m.Escalate: self._escalate,
+            m.FalseAlarm: self._close,
+            m.Escalate: self._close,
             m.AddNote: self._add_note,
         }
 
     # --- what comes in -----------------------------------------------------------------
 
-    def answer(self, body: ControlRoomBody, sender: m.Device, now: float) -> RoomAnswer:
-        """RoomAnswer what a device has asked, or decided."""
+    def answer(self, body: ControlRoomBody, sender: m.Device, now: float) -> DvaAnswer:
+        """Answer what a control room has asked, or decided."""
         need, action = NEEDS.get(type(body), (R.SUPERVISE, ""))
         if not action:
             name = type(body).__name__
-            return RoomAnswer(m.NOT_SUPPORTED, f"{name} is what the DVA says")
+            return DvaAnswer(m.NOT_SUPPORTED, f"{name} is what the DVA says")
         if sender.device_type != CONTROL_ROOM:
-            return RoomAnswer(m.NOT_PERMITTED, f"{sender.label} is no control room")
+            return DvaAnswer(m.NOT_PERMITTED, f"{sender.label} is no control room")
         if (refusal := self.may(sender, need, action)) is not None:
             return self._refuse(body, sender, action, m.NOT_PERMITTED, refusal, now)
         match body:
             case m.GetEventList():
-                return RoomAnswer(content=self._list(body.event_id or 0, now))
+                return DvaAnswer(content=self._list(body.event_id or 0, now))
             case m.GetDispatch():
-                return RoomAnswer(content=self.status(now, sender))
+                return DvaAnswer(content=self.status(now, sender))
             case m.SetDispatch():
                 return self._set_dispatch(body, sender, now)
             case m.Revoke():
@@ -139,13 +131,13 @@ class ControlRooms:
 
     # --- about one event ---------------------------------------------------------------
 
-    def _about_event(self, body: Any, sender: m.Device, action: str, now: float) -> RoomAnswer:
+    def _about_event(self, body: Any, sender: m.Device, action: str, now: float) -> DvaAnswer:
         event = self._events.get(body.event_id)
         if event is None:
             text = f"no event {body.event_id}"
             return self._refuse(body, sender, action, m.UNKNOWN_EVENT, text, now)
         if isinstance(body, m.GetProposal):
-            return RoomAnswer(content=proposal(self._dispatcher, event, now))
+            return DvaAnswer(content=proposal(self._dispatcher, event, now))
         advised = self._dispatcher.advised(event, now) if action in _ON_HANDS else None
         try:
             self._check(body, event, sender, action, now)
@@ -162,16 +154,17 @@ class ControlRooms:
             )
             return replace(answer, content=self.event_status(event, now))
         if isinstance(done, str):  # it was so already
-            return RoomAnswer(m.OK, done, self.event_status(event, now))
+            return DvaAnswer(m.OK, done, self.event_status(event, now))
         self._decided(body, event, sender, action, advised, now)
         sends = [*done, *self._dispatcher.decide(now)]
-        return RoomAnswer(m.OK, "", self.event_status(event, now), tuple(sends))
+        return DvaAnswer(m.OK, "", self.event_status(event, now), tuple(sends))
 
     def _check(
         self, body: Decision, event: Event, sender: m.Device, action: str, now: float
     ) -> None:
         """Refuse what comes too late: after another decision, or when all is over."""
-        handling, seen = event.handling, getattr(body, "decisions", None)
+        handling = event.handling
+        seen = getattr(body, "decisions", None)
         about = getattr(body, "device", None)
         label = self._orders.label_of(about) if about else ""
         if action not in _ON_HANDS or handling.is_already(sender.id_tag, action, label):
@@ -201,24 +194,19 @@ class ControlRooms:
         event.handling.note = body.text
         return []
 
-    def _false_alarm(
-        self, body: m.FalseAlarm, event: Event, sender: m.Device, now: float
+    def _close(
+        self, body: m.FalseAlarm | m.Escalate, event: Event, sender: m.Device, now: float
     ) -> list[Send] | str:
+        is_false = isinstance(body, m.FalseAlarm)
         if not event.open:
-            return "it is over already"
-        return self._orders.settle(event, State.REFUTED, now)
-
-    def _escalate(
-        self, body: m.Escalate, event: Event, sender: m.Device, now: float
-    ) -> list[Send] | str:
-        if not event.open:
-            return "it is escalated already"
-        return self._orders.settle(event, State.ESCALATED, now)
+            return f"it is {'over' if is_false else 'escalated'} already"
+        cause = Cause.DISMISSED if is_false else Cause.ESCALATED
+        return self._orders.transition(event, cause, now)
 
     def _take_off(
         self, body: m.TakeOff, event: Event, sender: m.Device, now: float
     ) -> list[Send] | str:
-        looks = event.state in (State.ASSIGNED, State.ON_SCENE)
+        looks = event.state in LOOKING
         sent = {event.actor, event.responder if looks else None}
         if body.device not in sent:
             if body.device in event.handling.taken_off:
@@ -233,7 +221,8 @@ class ControlRooms:
     def _assign(
         self, body: m.Assign, event: Event, sender: m.Device, now: float
     ) -> list[Send] | str:
-        task, entry = body.task or "confirm", self._responder(body.device)
+        task = body.task or "confirm"
+        entry = self._responder(body.device)
         device = entry.device
         if self._is_sent(event, device.id_tag, task):
             return "is sent there already"
@@ -259,7 +248,7 @@ class ControlRooms:
     @staticmethod
     def _is_sent(event: Event, device: str, task: str) -> bool:
         if task == "confirm":
-            return event.state in (State.ASSIGNED, State.ON_SCENE) and event.responder == device
+            return event.state in LOOKING and event.responder == device
         stand_by = event.state is not State.CONFIRMED
         return event.actor == device and stand_by == (task == "stand_by")
 
@@ -320,7 +309,8 @@ class ControlRooms:
         self, body: m.Assign, event: Event, entry: DeviceEntry, driver: str | None, now: float
     ) -> list[Send]:
         """Call off who is on the way, if anybody is, and give the order."""
-        orders, device = self._orders, entry.device.id_tag
+        orders = self._orders
+        device = entry.device.id_tag
         looks = (body.task or "confirm") == "confirm"
         before = event.responder if looks and event.state is State.ASSIGNED else None
         before = before if looks else event.actor
@@ -345,25 +335,27 @@ class ControlRooms:
 
     # --- about all events, or none -----------------------------------------------------
 
-    def _set_dispatch(self, body: m.SetDispatch, sender: m.Device, now: float) -> RoomAnswer:
-        questions, asks = self._dispatcher.questions, body.dispatch_mode == "ask_first"
+    def _set_dispatch(self, body: m.SetDispatch, sender: m.Device, now: float) -> DvaAnswer:
+        questions = self._dispatcher.questions
+        asks = body.dispatch_mode == "ask_first"
         if questions.asks == asks:
-            return RoomAnswer(m.OK, "it is so already", self.status(now, sender))
+            return DvaAnswer(m.OK, "it is so already", self.status(now, sender))
         questions.asks = asks
         reason = body.reason or ""
         questions.switched = Choice(sender.id_tag, sender.label, "set_dispatch", now, reason)
         self._note(sender, "set_dispatch", now, mode=body.dispatch_mode, cause=reason)
         sends = self._dispatcher.decide(now)
-        return RoomAnswer(m.OK, "", self.status(now, sender), tuple(sends))
+        return DvaAnswer(m.OK, "", self.status(now, sender), tuple(sends))
 
-    def _revoke(self, body: m.Revoke, sender: m.Device, now: float) -> RoomAnswer:
-        entry, sessions = self._orders.registry.entries.get(body.device), self._orders.sessions
+    def _revoke(self, body: m.Revoke, sender: m.Device, now: float) -> DvaAnswer:
+        entry = self._orders.registry.entries.get(body.device)
+        sessions = self._orders.sessions
         if entry is None or entry.device.device_type != ROBOT:
             text = f"no robot {body.device}"
             return self._refuse(body, sender, "revoke", m.UNKNOWN_DEVICE, text, now)
         grant = sessions.permissions.grants.get(body.device)
         if grant is None or grant.holder == sessions.permissions.own:
-            return RoomAnswer(m.OK, "nobody holds it")
+            return DvaAnswer(m.OK, "nobody holds it")
         holder = self._orders.label_of(grant.holder)
         sends = self._orders.taken_away(body.device, now)
         sessions.revoke(grant)
@@ -371,11 +363,11 @@ class ControlRooms:
         self._note(
             sender, "revoke", now, device=body.device, cause=body.reason or "", outcome=words
         )
-        return RoomAnswer(m.OK, words, None, (*sends, *self._dispatcher.decide(now)))
+        return DvaAnswer(m.OK, words, None, (*sends, *self._dispatcher.decide(now)))
 
     def _release_emergency(
         self, body: m.ReleaseEmergency, sender: m.Device, now: float
-    ) -> RoomAnswer:
+    ) -> DvaAnswer:
         """Release a robot; it asks the DVA itself before it takes orders again."""
         action = "release_emergency"
         robot = self._orders.registry.entries.get(body.device)
@@ -384,7 +376,7 @@ class ControlRooms:
             return self._refuse(body, sender, action, m.UNKNOWN_DEVICE, text, now)
         emergencies = self._orders.emergencies
         if (release := emergencies.who_released(body.device)) is not None:
-            return RoomAnswer(m.OK, f"released by {release.label}, {now - release.time:.1f} s ago")
+            return DvaAnswer(m.OK, f"released by {release.label}, {now - release.time:.1f} s ago")
         if not emergencies.holds(body.device):
             text = f"no emergency of {robot.device.label} is known"
             return self._refuse(body, sender, action, m.WRONG_MODE, text, now)
@@ -400,7 +392,7 @@ class ControlRooms:
         emergencies.release(body.device, choice)
         self._note(sender, action, now, device=body.device, cause=reason)
         notice = Send(body.device, m.ReleaseEmergency(body.device))
-        return RoomAnswer(m.OK, "", None, (notice, *self._dispatcher.decide(now)))
+        return DvaAnswer(m.OK, "", None, (notice, *self._dispatcher.decide(now)))
 
     # --- what is kept of it ------------------------------------------------------------
 
@@ -409,7 +401,7 @@ class ControlRooms:
         self._note(sender, "raise", now, event=event.number, text=event.kind)
 
     def asked_for_robot(
-        self, sender: m.Device, body: m.PermissionRequest, reply: m.Reply, now: float
+        self, sender: m.Device, body: m.PermissionRequest, answer: DvaAnswer, now: float
     ) -> None:
         """A control room has asked for a robot, or a supervisor has taken it from its holder."""
         forced = body.takeover in ("ask", "force")
@@ -421,8 +413,8 @@ class ControlRooms:
             now,
             device=body.device,
             cause=cause,
-            code=reply.code,
-            outcome=reply.text,
+            code=answer.code,
+            outcome=answer.text,
         )
 
     def gave_back(self, sender: m.Device, robot: str, now: float) -> None:
@@ -460,11 +452,11 @@ class ControlRooms:
         text: str,
         now: float,
         advised: Advised | None = None,
-    ) -> RoomAnswer:
+    ) -> DvaAnswer:
         fact = self._fact(body, sender, action, advised, now)
         if not isinstance(body, m.GetEventList | m.GetDispatch | m.GetProposal):
             self._orders.trail.note(replace(fact, code=code, outcome=text))
-        return RoomAnswer(code, text)
+        return DvaAnswer(code, text)
 
     def _fact(
         self, body: Any, sender: m.Device, action: str, advised: Advised | None, now: float

@@ -8,7 +8,7 @@ from __future__ import annotations
 import copy
 import math
 import operator
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,7 +29,7 @@ from dva_sim.core.orders import Orders
 from dva_sim.core.questions import Questions
 from dva_sim.core.registry import CONTROL_ROOM, ROBOT, DeviceEntry, Registry
 from dva_sim.core.roles import ControlRoomRole, Roles
-from dva_sim.core.sessions import Send, Sessions
+from dva_sim.core.sessions import DvaAnswer, Send, Sessions
 from dva_sim.core.situation_builder import PolicyView, SituationBuilder, same_place
 from dva_sim.core.travel_times import SiteKnowledge, Travel
 from dva_sim.kernel.plugins import FAILURES
@@ -82,13 +82,17 @@ class Dispatcher:
         roles: Roles,
         name: str = "",
     ) -> None:
-        self.policy, self.orders, self.roles = policy, orders, roles
+        self.policy = policy
+        self.orders = orders
+        self.roles = roles
         self.name = (name or type(policy).__name__)[:64]
         self.questions = Questions(orders.rules.decide_within)
         self.auctions = Auctions(orders.rules.bid_within)
         self.situations = SituationBuilder(policy, travel, orders, ground, self.auctions)
         self.last_failure = ""
-        self._rng, self._ground, self._default = rng, ground, MinEta()
+        self._rng = rng
+        self._ground = ground
+        self._default = MinEta()
 
     def decide(self, now: float) -> list[Send]:
         """Give the orders that are due now; what finds nobody in time is given up."""
@@ -105,6 +109,13 @@ class Dispatcher:
         sends += self.orders.give_up(now)
         self.auctions.close(self.orders.events, now)
         return sends
+
+    def bid(self, device: str, body: m.TaskBid, now: float) -> DvaAnswer:
+        """Take a bid, and decide if it was the last."""
+        if not self.auctions.bid(body.event_id, device, body.arrival_in, now):
+            text = f"no bid was asked for on event {body.event_id}, or it comes too late"
+            return DvaAnswer(m.UNKNOWN_EVENT, text)
+        return DvaAnswer(sends=self.decide(now))
 
     def next_deadline(self) -> float:
         """Return when the next wait for an answer is too long [s]."""
@@ -133,7 +144,8 @@ class Dispatcher:
         return Advised(device, task, handling.arrival_in(device, now) or 0.0)
 
     def _decide(self, now: float) -> list[Send]:
-        view, sends = self.situations.look(now), list[Send]()
+        view = self.situations.look(now)
+        sends = list[Send]()
         if view is not None:
             sends = self._carry_out(self._advice(view.situation, self._rng), view, now)
         for event in self.questions.settle():
@@ -179,8 +191,10 @@ class Dispatcher:
 
     def _assign(self, choice: Assignment, view: PolicyView, now: float) -> list[Send] | None:
         """The orders that an assignment means."""
-        task, event = view.situation.tasks[choice.task], view.events[choice.task]
-        entry, former = view.team.entries[choice.responder], view.team.engaged[choice.responder]
+        task = view.situation.tasks[choice.task]
+        event = view.events[choice.task]
+        entry = view.team.entries[choice.responder]
+        former = view.team.engaged[choice.responder]
         way = float(view.situation.eta[choice.task, choice.responder])
         if task.engaged is not None or not math.isfinite(way):
             return None
@@ -206,7 +220,8 @@ class Dispatcher:
         """Return True if a person is asked first and still has time."""
         if not self.questions.asks or not self.somebody_decides():
             return False
-        event, device = view.events[choice.task], view.team.entries[choice.responder].device
+        event = view.events[choice.task]
+        device = view.team.entries[choice.responder].device
         way = float(view.situation.eta[choice.task, choice.responder])
         return self.questions.ask(event, _task_of(choice, view), device.id_tag, way, now)
 
@@ -216,10 +231,6 @@ class Dispatcher:
         least = ControlRoomRole.DISPATCH
         return any(self.roles.of(room.device.id_tag).includes(least) for room in rooms)
 
-    def stopped(self, robot: str, now: float) -> list[Send]:
-        """Open what a robot was sent to for others, since an emergency holds it."""
-        return [*self.orders.abandon(robot, now), *self.decide(now)]
-
     def _note(self, event: Event, choice: Assignment, view: PolicyView, now: float) -> None:
         """The policy has decided: a fact, and what people are compared with later."""
         orders = self.orders
@@ -227,7 +238,8 @@ class Dispatcher:
             return
         device = view.team.entries[choice.responder].device.id_tag
         way = float(view.situation.eta[choice.task, choice.responder])
-        event.handling.advised, event.handling.expected[device] = device, (now, way)
+        event.handling.advised = device
+        event.handling.expected[device] = (now, way)
         asked = self.questions.asks and self.somebody_decides()
         why = f"nobody has decided within {self.questions.within:g} s" if asked else ""
         fact = Fact(
@@ -265,7 +277,8 @@ class Dispatcher:
 
     def _relocate(self, move: Relocation, view: PolicyView, now: float) -> list[Send] | None:
         """Let an idle guard wait elsewhere, unless it is there already, or on its way there."""
-        entry, cover = view.team.entries[move.responder], view.situation.cover
+        entry = view.team.entries[move.responder]
+        cover = view.situation.cover
         assert cover is not None, "without stations there is no such advice: see _check_form"
         place = self._ground.stations[move.station].position
         if entry.position is not None and same_place(place, entry.position):
@@ -293,7 +306,8 @@ def _is_to_look(send: Send) -> bool:
 
 def _check_form(advice: Iterable[Advice], situation: Situation) -> None:
     """Refuse what is not advice, or names what is not there."""
-    tasks, responders = len(situation.tasks), len(situation.responders)
+    tasks = len(situation.tasks)
+    responders = len(situation.responders)
     stations = len(situation.cover.stations) if situation.cover else 0
     for piece in advice:
         if not isinstance(piece, Advice):
@@ -334,7 +348,8 @@ class Patrols:
         """Return the messages to robots that have rested long enough."""
         sends: list[Send] = []
         sessions = orders.sessions
-        for entry in self._with_a_beat(orders.registry):
+        robots = orders.registry.of_type(ROBOT) if self.beats else ()
+        for entry in (robot for robot in robots if robot.device.label in self.beats):
             robot = entry.device.id_tag
             busy = robot in orders.engaged or sessions.is_held(robot)
             if entry.mode != "Idle" or busy or orders.emergencies.holds(robot):
@@ -353,7 +368,8 @@ class Patrols:
 
     def held(self, send: Send, registry: Registry, sessions: Sessions) -> list[Send]:
         """A robot has heard who holds it: if that is the DVA, it can be sent now."""
-        entry, body = registry.entries.get(send.to), send.body
+        entry = registry.entries.get(send.to)
+        body = send.body
         own = sessions.permissions.own
         if entry is None or not isinstance(body, m.PermissionGrant) or body.holder != own:
             return []
@@ -365,10 +381,6 @@ class Patrols:
         """A robot is not known any longer."""
         self._idle_since.pop(robot, None)
         self._on_round.discard(robot)
-
-    def _with_a_beat(self, registry: Registry) -> Iterator[DeviceEntry]:
-        if self.beats:
-            yield from (e for e in registry.of_type(ROBOT) if e.device.label in self.beats)
 
     def _round(self, entry: DeviceEntry, session: int) -> Send:
         """Round after round, until somebody else takes the robot."""

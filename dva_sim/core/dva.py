@@ -11,29 +11,24 @@ import numpy as np
 from dva_sim.core.assignments import Rules
 from dva_sim.core.audit import Fact
 from dva_sim.core.control_rooms import ControlRooms
-from dva_sim.core.device_list import DeviceLister
 from dva_sim.core.dispatch import Policy
 from dva_sim.core.dispatcher import Dispatcher, Patrols
 from dva_sim.core.event_status import by_whom
-from dva_sim.core.events import Event, EventTable, State, apart
+from dva_sim.core.events import EventTable
 from dva_sim.core.handovers import Handovers
 from dva_sim.core.orders import Orders
 from dva_sim.core.permissions import Access
-from dva_sim.core.registry import (
-    CONTROL_ROOM,
-    ROBOT,
-    DeviceEntry,
-    Registry,
-)
-from dva_sim.core.roles import ControlRoomRole, Roles
-from dva_sim.core.sensing import CONFIDENCE, SEVERITY, Sensing, is_no_news, only_felt, within_reach
-from dva_sim.core.sessions import Send, Sessions
+from dva_sim.core.registry import ROBOT, Registry
+from dva_sim.core.reports import Reports
+from dva_sim.core.robot_access import RobotAccess
+from dva_sim.core.roles import Roles
+from dva_sim.core.sensing import Sensing
+from dva_sim.core.sessions import DvaAnswer, Send, Sessions
 from dva_sim.core.travel_times import SiteKnowledge, Travel
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.control_room import ControlRoomBody
 
 Reaction = tuple[m.Reply, list[Send]]
-FOUND_WITHIN = 20.0  # of its event a finding has to be [m]
 
 
 class Dva:
@@ -88,10 +83,13 @@ class Dva:
         audit: bool = True,
         release: m.ReleasedBy | None = None,
     ) -> None:
-        self.sessions, self.access = sessions, access or Access()
-        self.registry, self.events = Registry(), EventTable(rules.merge_distance)
+        self.sessions = sessions
+        self.access = access or Access()
+        self.registry = Registry()
+        self.events = EventTable(rules.merge_distance)
         self.orders = Orders(rules, self.registry, self.events, sessions)
-        self.trail, self.roles = self.orders.trail, roles or Roles()
+        self.trail = self.orders.trail
+        self.roles = roles or Roles()
         self.emergencies = self.orders.emergencies
         self._release_rule = release
         self.trail.keeps = audit
@@ -108,42 +106,52 @@ class Dva:
         self.sensing = sensing or Sensing()
         self.handovers = Handovers(self.orders, supervisors)
         self.control_rooms = ControlRooms(self.dispatcher, self.handovers, self.roles, self.access)
+        self._reports = Reports(self.dispatcher, self.events, self.sensing, self.control_rooms)
+        self._robot_access = RobotAccess(
+            self.dispatcher,
+            self.handovers,
+            self.control_rooms,
+            access=self.access,
+            roles=self.roles,
+        )
         self.counters: Counter[str] = self.orders.counters
         self.refused = 0
-        self._rules, self._patrols = rules, patrols or Patrols()
-        self._devices = DeviceLister(self.registry)
-        self._access_ends = self.access.next_end(-1.0)
+        self._patrols = patrols or Patrols()
 
     # --- what comes in -----------------------------------------------------------------
 
     def handle(self, message: m.Message, now: float) -> Reaction:
         """Take a request; the reply goes to the sender, the rest where it says."""
-        reply, sends = self._handle(message, now)
-        return reply, self._and_revocations(sends)
+        answer = self._answer(message, now)
+        self.refused += answer.code != m.OK
+        reply = m.Reply(message.message_id, answer.code, answer.text[:256], answer.content)
+        return reply, self._with_revocations(answer.sends)
 
     def note(self, message: m.Message, now: float) -> list[Send]:
         """Take a published message; nobody waits for an answer, but it may be one to act on."""
-        entry, body = self.registry.heard(message.source, now), message.body
+        entry = self.registry.heard(message.source, now)
+        body = message.body
         if entry is None:
             self.refused += 1
             return []
         self.registry.is_there(entry, now)
+        if isinstance(body, m.RobotStatus | m.PersonStatus):
+            self.registry.locate(entry, body.position)
+            self.orders.moved(message.source, now)
         if isinstance(body, m.RobotStatus):
-            self.registry.locate(entry, body.position)
             entry.mode = body.mode
-            self.orders.moved(message.source, now)
             self.handovers.seen(message.source, body, now)
-        elif isinstance(body, m.PersonStatus):
-            self.registry.locate(entry, body.position)
-            self.orders.moved(message.source, now)
         elif isinstance(body, m.SensorValue) and entry.position is not None:
-            return self._and_revocations(self._felt(message, body, entry.position, now))
+            answer = self._reports.felt(message.source, body, entry.position, now)
+            self.refused += answer.code != m.OK
+            return self._with_revocations(answer.sends)
         return []
 
     def delivered(self, send: Send, now: float, content: object = None) -> list[Send]:
         """Handle the reply OK to a message, with its content."""
         self.sessions.heard(send)
-        body, sends = send.body, self._patrols.held(send, self.registry, self.sessions)
+        body = send.body
+        sends = self._patrols.held(send, self.registry, self.sessions)
         if isinstance(body, m.GetSensorInfo):
             self.sensing.on_reply(send.to, content, now)
             sends = self.sensing.renew(self.registry, self.sessions, now)
@@ -151,7 +159,7 @@ class Dva:
             sends = self.handovers.answered(send, True, now) + self.dispatcher.decide(now)
         elif isinstance(body, m.PermissionGrant) and body.holder == self.sessions.permissions.own:
             sends += self.sensing.permitted(send) if body.level == "sensors" else []
-        return self._and_revocations(sends + self.orders.taken_up(send))
+        return self._with_revocations(sends + self.orders.taken_up(send))
 
     def refused_grant(self, send: Send, reply: m.Reply, now: float) -> list[Send]:
         """A robot did not take a grant; it may have said which session would do."""
@@ -160,12 +168,13 @@ class Dva:
             again = self.sessions.above(send, floor.session)
             if again is not None:
                 self.counters["granted again above"] += 1
-                return self._and_revocations([again])
+                return self._with_revocations([again])
         return self.undelivered(send, now)
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
         """Handle a message that did not arrive, or was declined: take it back."""
-        body, sends = send.body, list[Send]()
+        body = send.body
+        sends = list[Send]()
         if isinstance(body, m.Order | m.TaskAward):
             sends = self.orders.not_taken_up(send, now)
         elif isinstance(body, m.TaskAnnouncement):
@@ -183,14 +192,14 @@ class Dva:
             sends = [send] if self.emergencies.holds(send.to) and self._is_there(send.to) else []
         else:
             self.sessions.undelivered(send)
-        return self._and_revocations(sends)
+        return self._with_revocations(sends)
 
     def tick(self, now: float) -> list[Send]:
         """Handle the passing of time: silent devices, deadlines, newly free responders."""
         sends: list[Send] = []
         for entry in self.registry.fallen_silent(now):
             sends += self._gone(entry.device.id_tag, now)
-        if now >= self._access_ends:
+        if now >= self._robot_access.next_end:
             self.check_access(now)
         sends += self.orders.take_back(now)
         self._forget_the_long_silent(now)
@@ -200,7 +209,7 @@ class Dva:
         sends += self.dispatcher.decide(now)
         sends += self._patrols.set_out(self.orders, now)
         self.emergencies.lapse(now, lambda robot: self.registry.entries[robot].last_heard)
-        return self._and_revocations(sends)
+        return self._with_revocations(sends)
 
     def next_deadline(self) -> float:
         """Return the latest time at which `tick` has work, if nothing else happens [s].
@@ -211,14 +220,14 @@ class Dva:
             self.orders.next_deadline(),
             self.dispatcher.next_deadline(),
             self.registry.next_silence(),
-            self._access_ends,
+            self._robot_access.next_end,
             self.sensing.next_due(),
             self.handovers.next_deadline(),
         )
 
     def go_on(self) -> list[Send]:
         """Return the messages to repeat after a restart."""
-        return self._and_revocations(self.orders.again())
+        return self._with_revocations(self.orders.again())
 
     def dismiss(self, device: str, now: float) -> list[Send]:
         """A device is to be there no more: what it held is free, and it is forgotten at once."""
@@ -226,67 +235,64 @@ class Dva:
             return []
         sends = self._gone(device, now)
         self._forget(device)
-        return self._and_revocations(sends)
+        return self._with_revocations(sends)
 
     def close(self) -> list[Send]:
         """The DVA closes: all sessions are over."""
         self.sessions.take_back_everything()
-        return self._and_revocations([])
+        return self._with_revocations([])
 
-    def _handle(self, message: m.Message, now: float) -> Reaction:
-        body, source = message.body, message.source
+    def check_access(self, now: float) -> None:
+        """Revoke the permissions in use whose rule has ended."""
+        self._robot_access.check(now)
+
+    def _answer(self, message: m.Message, now: float) -> DvaAnswer:
+        body = message.body
+        source = message.source
         if isinstance(body, m.Registration):
             return self._register(message, body, now)
         entry = self.registry.heard(source, now)
         if entry is None:
-            text = f"device {source} is not registered"
-            return self._refuse(message, m.NOT_REGISTERED, text)
+            return DvaAnswer(m.NOT_REGISTERED, f"device {source} is not registered")
         match body:
+            case m.EventReport(event_id=None):
+                return self._reports.sighted(entry, body, now)
             case m.EventReport():
-                return self._report(message, entry, body, now)
+                return self._reports.found(source, body, now)
             case m.OrderProgress():
-                return self._progress(message, body, now)
+                return self._reports.progress(source, body, now)
             case m.TaskBid():
-                return self._bid(message, body, now)
+                return self.dispatcher.bid(source, body, now)
             case m.PermissionRequest():
-                return self._permission(message, entry, body, now)
+                return self._robot_access.request(entry, body, now)
             case m.PermissionRevocation():
-                return self._give_back(message, entry, body, now)
+                return self._robot_access.give_back(entry.device, body, now)
             case m.GetGrant():
-                return self._grant_of(message, entry, body)
+                return self._robot_access.grant_of(entry.device, body)
             case m.RobotEmergency():
-                return self._emergency(message, entry, body, now)
+                return self._emergency(entry.device, body, now)
             case m.GetDeviceList():
-                return self._ok(message, [], self._devices.listed())
+                return DvaAnswer(content=self.registry.device_list())
             case m.GetSensorInfo():
-                return self._sensors(message, body)
+                return self.sensing.answer(self.registry, body.device)
             case _ if isinstance(body, ControlRoomBody):
-                return self._dispatch(message, entry, body, now)
+                return self.control_rooms.answer(body, entry.device, now)
             case _:
                 name = type(body).__name__
-                return self._refuse(message, m.NOT_SUPPORTED, f"{name} is not for the DVA")
+                return DvaAnswer(m.NOT_SUPPORTED, f"{name} is not for the DVA")
 
-    def _dispatch(
-        self, message: m.Message, entry: DeviceEntry, body: ControlRoomBody, now: float
-    ) -> Reaction:
-        """Handle a request or decision of a control room."""
-        answer = self.control_rooms.answer(body, entry.device, now)
-        self.refused += answer.code != m.OK
-        text = answer.text[:256]
-        return m.Reply(message.message_id, answer.code, text, answer.content), list(answer.sends)
-
-    def _and_revocations(self, sends: list[Send]) -> list[Send]:
+    def _with_revocations(self, sends: Iterable[Send]) -> list[Send]:
         """Return the messages, preceded by revocations of ended sessions."""
-        return self.sessions.to_tell() + sends
+        return [*self.sessions.to_tell(), *sends]
 
     # --- who is there ------------------------------------------------------------------
 
-    def _register(self, message: m.Message, body: m.Registration, now: float) -> Reaction:
+    def _register(self, message: m.Message, body: m.Registration, now: float) -> DvaAnswer:
         known = self.registry.entries.get(message.source)
         sends: list[Send] = []
         if known is not None and known.device.device_type != body.device_type:
             text = f"{message.source} is registered as {known.device.device_type}"
-            return self._refuse(message, m.NOT_PERMITTED, text)
+            return DvaAnswer(m.NOT_PERMITTED, text)
         if known is not None and self.registry.is_elsewhere(message.source, body.address, now):
             self.counters["registration of an id in use"] += 1
             text = (
@@ -294,7 +300,7 @@ class Dva:
                 "another id, or wait until that device has been silent for "
                 f"{self.registry.silent_after:g} s"
             )
-            return self._refuse(message, m.BUSY, text)
+            return DvaAnswer(m.BUSY, text)
         if known is not None and known.is_new_life(message.message_id, message.timestamp):
             sends = self._gone(message.source, now)  # it knows nothing of what it held
             if self.emergencies.holds(message.source):
@@ -306,11 +312,11 @@ class Dva:
             sends = self._make_room(now)
         entry = self.registry.register(message.source, body, now)
         if entry is None:
-            return self._refuse(message, m.BUSY, "the registry is full")
+            return DvaAnswer(m.BUSY, "the registry is full")
         entry.registrations.append((message.message_id, message.timestamp))
         if body.device_type == ROBOT:
-            sends = sends + self.sensing.met(message.source)
-        return self._ok(message, sends)
+            sends += self.sensing.met(message.source)
+        return DvaAnswer(sends=sends)
 
     def _gone(self, device: str, now: float) -> list[Send]:
         """A device is there no more: what it held is free, what it did is open to others."""
@@ -342,7 +348,8 @@ class Dva:
         return sends
 
     def _with_nothing_open(self, devices: Iterable[str]) -> Iterator[str]:
-        kept, engaged = self.with_something_open(), self.orders.engaged
+        kept = self.with_something_open()
+        engaged = self.orders.engaged
         return (d for d in devices if d not in kept and d not in engaged)
 
     def with_something_open(self) -> set[str]:
@@ -355,116 +362,14 @@ class Dva:
         self.emergencies.forget(device)
         self.registry.forget(device)
 
-    # --- who may do what ---------------------------------------------------------------
+    # --- emergencies -------------------------------------------------------------------
 
-    def _permission(
-        self, message: m.Message, asker: DeviceEntry, body: m.PermissionRequest, now: float
-    ) -> Reaction:
-        reply, sends = self._permitted(message, asker, body, now)
-        in_use = body.takeover == "force" or asker.device.device_type == CONTROL_ROOM
-        if in_use and body.level != "sensors":
-            self.control_rooms.asked_for_robot(asker.device, body, reply, now)
-        return reply, sends
-
-    def _permitted(
-        self, message: m.Message, asker: DeviceEntry, body: m.PermissionRequest, now: float
-    ) -> Reaction:
-        robot = self.registry.entries.get(body.device)
-        if robot is None or robot.device.device_type != ROBOT:
-            return self._refuse(message, m.UNKNOWN_DEVICE, f"no robot {body.device}")
-        if asker.device.device_type == CONTROL_ROOM and body.level != "sensors":
-            need = ControlRoomRole.DRIVE
-            if (text := self.control_rooms.may(asker.device, need, "take a robot")) is not None:
-                return self._refuse(message, m.NOT_PERMITTED, text)
-        if not self.access.allows(asker.device, robot.device, body.level, now):
-            text = f"{asker.device.label} may not have {body.level} of {robot.device.label}"
-            return self._refuse(message, m.NOT_PERMITTED, text)
-        sensors = self.access.sensors(asker.device, robot.device, body.sensors, now)
-        if body.level == "sensors" and body.sensors and not sensors:
-            text = f"{asker.device.label} may read none of these of {robot.device.label}"
-            return self._refuse(message, m.NOT_PERMITTED, text)
-        if body.level != "sensors":
-            holder = self.handovers.holder(body.device, message.source, now)
-            if holder is not None:
-                return self._held(message, asker.device, body, holder, now)
-            if wait := self.handovers.waits(body.device, message.source):
-                return self._refuse(message, m.BUSY, wait)
-        wish = m.PermissionRequest(body.device, body.level, sensors)
-        granted = self.sessions.grant(robot.device, asker.device, wish)
-        if granted is None:
-            return self._refuse(message, m.BUSY, f"robot {body.device} is held by another")
-        content, sends = granted
-        if body.level != "sensors":
-            self.handovers.granted(body.device, content.session, now)
-        return self._ok(message, sends, content)
-
-    def _held(
-        self,
-        message: m.Message,
-        asker: m.Device,
-        body: m.PermissionRequest,
-        holder: m.Holder,
-        now: float,
-    ) -> Reaction:
-        """Refuse a robot that is taken: name its driver, and accept a request for handover."""
-        if body.takeover == "force" and not self._may_force(asker):
-            text = f"{asker.label} is no supervisor"
-            return self._refuse(message, m.NOT_PERMITTED, text)
-        step, sends = self.handovers.wish(body, asker, holder, now)
-        text = f"held by {holder.label} for {holder.held_for:.0f} s" + (step and f"; {step}")
-        content = holder if body.takeover is not None else None  # 1.3 does not know it
-        sends = sends + self.dispatcher.decide(now) if body.takeover == "force" else sends
-        self.refused += 1
-        return m.Reply(message.message_id, m.BUSY, text, content), sends
-
-    def _may_force(self, asker: m.Device) -> bool:
-        """Return True if a device may take a robot from its holder."""
-        if asker.device_type == CONTROL_ROOM:
-            return self.roles.of(asker.id_tag).includes(ControlRoomRole.SUPERVISE)
-        return asker.id_tag in self.handovers.supervisors
-
-    def _sensors(self, message: m.Message, body: m.GetSensorInfo) -> Reaction:
-        """List the sensors of one or all robots; the robots are asked on the first request."""
-        robot = self.registry.entries.get(body.device or "")
-        if body.device and (robot is None or robot.device.device_type != ROBOT or robot.silent):
-            return self._refuse(message, m.UNKNOWN_DEVICE, f"no robot {body.device}")
-        sends = self.sensing.ask_all(self.registry, body.device)
-        content = self.sensing.listed(self.registry, body.device)
-        if content is None:
-            text = "the robots are being asked; ask again"
-            return m.Reply(message.message_id, m.BUSY, text), sends
-        return self._ok(message, sends, content)
-
-    def _give_back(
-        self, message: m.Message, entry: DeviceEntry, body: m.PermissionRevocation, now: float
-    ) -> Reaction:
-        """A holder needs its permission no longer; only its own."""
-        if body.holder != message.source or not self.sessions.give_back(body):
-            return self._refuse(message, m.BAD_SESSION, "that session is not yours, or is over")
-        if entry.device.device_type == CONTROL_ROOM:
-            self.control_rooms.gave_back(entry.device, body.device, now)
-        return self._ok(message, [])
-
-    def _grant_of(self, message: m.Message, asker: DeviceEntry, body: m.GetGrant) -> Reaction:
-        """Tell a robot who may act on it: its holder, or what another device may read."""
-        grant = self.sessions.held(message.source, body.holder, body.level == "sensors")
-        if asker.device.device_type != ROBOT or grant is None:
-            text = "nobody holds the robot now"
-            if body.holder:
-                text = f"{body.holder} holds no such robot"
-            return self._refuse(message, m.NOT_PERMITTED, text)
-        permission = m.Permission(
-            grant.holder, grant.level, grant.session, grant.address, grant.sensors
-        )
-        return self._ok(message, [], permission)
-
-    def _emergency(
-        self, message: m.Message, robot: DeviceEntry, body: m.RobotEmergency, now: float
-    ) -> Reaction:
+    def _emergency(self, robot: m.Device, body: m.RobotEmergency, now: float) -> DvaAnswer:
         """Tell a robot how its emergency ends, and send others where it was going."""
-        if robot.device.device_type != ROBOT:
-            return self._refuse(message, m.NOT_SUPPORTED, "only a robot reports its emergency")
-        source, sends = message.source, list[Send]()
+        if robot.device_type != ROBOT:
+            return DvaAnswer(m.NOT_SUPPORTED, "only a robot reports its emergency")
+        source = robot.id_tag
+        sends = list[Send]()
         was_stopped = self.emergencies.holds(source)
         stop = self.emergencies.hear(source, body, now)
         if not was_stopped and stop.released is None:
@@ -472,164 +377,9 @@ class Dva:
             label = self.orders.label_of(stopped_by)
             fact = Fact(time=now, author=stopped_by, label=label, action="emergency", device=source)
             self.trail.note(fact)
-            sends = self.dispatcher.stopped(source, now)
+            sends = [*self.orders.abandon(source, now), *self.dispatcher.decide(now)]
         rule = self._release_rule
         if rule is None:
             rule = "person" if self.dispatcher.somebody_decides() else "drive"
         content = m.EmergencyRelease(body.tick, rule, by_whom(stop.released, now))
-        return self._ok(message, sends, content)
-
-    def check_access(self, now: float) -> None:
-        """Permissions in use end with the rule that allowed them."""
-        entries = self.registry.entries
-        for grant in self.sessions.permissions.all():
-            holder, robot = entries.get(grant.holder), entries.get(grant.robot)
-            if holder is None or robot is None:
-                continue
-            kept = self.access.sensors(holder.device, robot.device, grant.sensors, now)
-            allowed = self.access.allows(holder.device, robot.device, grant.level, now)
-            if not allowed or kept != grant.sensors:
-                self.counters["permission revoked"] += 1
-                self.sessions.revoke(grant)
-        self._access_ends = self.access.next_end(now)
-
-    # --- what happens ------------------------------------------------------------------
-
-    def _report(
-        self, message: m.Message, entry: DeviceEntry, body: m.EventReport, now: float
-    ) -> Reaction:
-        if body.event_id is None:
-            return self._raised(message, entry, body, now)
-        event = self.events.get(body.event_id)
-        if event is None:
-            return self._refuse(message, m.UNKNOWN_EVENT, f"no event {body.event_id}")
-        if message.source not in event.sent:
-            return self._refuse(message, m.NOT_PERMITTED, f"was not sent to event {event.number}")
-        if body.kind != event.kind or apart(body.position, event.position) > FOUND_WITHIN:
-            # A life of the DVA that could keep nothing may have given its number to another event.
-            text = f"event {event.number} is another one, a {event.kind} elsewhere"
-            return self._refuse(message, m.UNKNOWN_EVENT, text)
-        sends = self.orders.found(event, message.source, body.finding, now)
-        if event.waits_for is not None:
-            sends = sends + self.dispatcher.decide(now)
-        return self._ok(message, sends)
-
-    def _raised(
-        self, message: m.Message, entry: DeviceEntry, body: m.EventReport, now: float
-    ) -> Reaction:
-        """Somebody reports what has no number yet; a control room as its role allows."""
-        if entry.device.device_type != CONTROL_ROOM:
-            return self._sighting(message, body, now)
-        need = ControlRoomRole.DRIVE
-        if (text := self.control_rooms.may(entry.device, need, "report an event")) is not None:
-            return self._refuse(message, m.NOT_PERMITTED, text)
-        reply, sends = self._sighting(message, body, now)
-        if (event := self.events.near(body.kind, body.position)) is not None:
-            self.control_rooms.raised(event, entry.device, now)
-        return reply, sends
-
-    def _sighting(self, message: m.Message, body: m.EventReport, now: float) -> Reaction:
-        """Somebody who was not sent sees something, or sees it no longer."""
-        if body.finding == "refuted":
-            return self._withdrawal(message, body, now)
-        event = self.events.near(body.kind, body.position)
-        sends: list[Send] = []
-        if event is None:
-            event, sends = self._corrected(message.source, body, now)
-        if event is None and self.events.full:
-            return self._refuse(message, m.BUSY, "too many events are open; no more are accepted")
-        if event is None:
-            contain = self._rules.containment
-            event = self.events.add(body.kind, body.position, body.severity, now, contain)
-        else:
-            self.events.merge(event, body.severity)
-        self.events.note_source(event, message.source, body.confidence)
-        return self._ok(message, sends + self.dispatcher.decide(now))
-
-    def _felt(
-        self, message: m.Message, body: m.SensorValue, place: m.Position, now: float
-    ) -> list[Send]:
-        """Handle a sensor value of a robot: it may be a new event, or support a known one."""
-        alarm, robot = self.sensing.crossed(message.source, body), message.source
-        if alarm is None:
-            return []
-        event = within_reach(self.events.open.values(), alarm.kind, place)
-        if event is None:
-            if is_no_news(self.events, alarm.kind, place, now):
-                return []
-            self.counters["event raised by a sensor"] += 1
-            report = m.EventReport(None, alarm.kind, place, SEVERITY, CONFIDENCE, "detected")
-            return self._sighting(message._replace(body=report), report, now)[1]
-        others = event.sources.keys() - {robot}
-        self.events.merge(event, 0.0)
-        self.events.note_source(event, robot, CONFIDENCE)
-        there = apart(event.position, place) < self._rules.merge_distance
-        if not (there and others) or event.state is State.CONFIRMED:
-            return []
-        self.counters["event confirmed by a sensor"] += 1
-        return self.orders.confirmed_by_another(event, now) + self.dispatcher.decide(now)
-
-    def _corrected(
-        self, source: str, body: m.EventReport, now: float
-    ) -> tuple[Event | None, list[Send]]:
-        """Correct the position of an event that only sensors felt, by a report of somebody on site.
-
-        The event is moved there, or ends, if somebody is on the way to where it was felt.
-        """
-        if not self.sensing.alarms:
-            return None, []
-        felt = (e for e in self.events.open.values() if only_felt(e, self.registry))
-        event = within_reach(felt, body.kind, body.position)
-        if event is None or source in event.sources:
-            return None, []
-        if event.state is State.PENDING:
-            event.position = body.position
-            return event, []
-        if event.state is State.CONFIRMED:
-            return None, []  # people are at it: what was reported may be something else
-        return None, self.orders.supersede(event, now)
-
-    def _withdrawal(self, message: m.Message, body: m.EventReport, now: float) -> Reaction:
-        """Close an event that all its reporters have withdrawn before anybody was sent."""
-        source, sends = message.source, list[Send]()
-        for event in self.events.reported_by(source, body.kind, body.position):
-            self.events.take_back(event, source)
-            if event.state is State.PENDING and not event.sources:
-                sends += self.orders.expire(event, now)
-        return self._ok(message, sends)
-
-    def _progress(self, message: m.Message, body: m.OrderProgress, now: float) -> Reaction:
-        event = self.orders.engaged.find(message.source, body.event_id)
-        if event is None or not self.orders.has_order(event, message.source):
-            text = f"device {message.source} has no order for event {body.event_id}"
-            return self._refuse(message, m.UNKNOWN_EVENT, text)
-        sends: list[Send] = []
-        if body.state == "departed":
-            self.orders.departed(event, message.source, now)
-        elif body.state == "arrived":
-            self.orders.arrived(event, message.source, now)
-        elif body.state in ("done", "failed", "declined"):
-            sends = self.orders.ends(event, message.source, body.state, now)
-            sends += self.dispatcher.decide(now)
-        return self._ok(message, sends)
-
-    def _bid(self, message: m.Message, body: m.TaskBid, now: float) -> Reaction:
-        auctions = self.dispatcher.auctions
-        if not auctions.bid(body.event_id, message.source, body.arrival_in, now):
-            text = f"no bid was asked for on event {body.event_id}, or it comes too late"
-            return self._refuse(message, m.UNKNOWN_EVENT, text)
-        return self._ok(message, self.dispatcher.decide(now))
-
-    # --- answers -----------------------------------------------------------------------
-
-    @staticmethod
-    def _ok(
-        message: m.Message,
-        sends: list[Send],
-        content: m.DeviceList | m.Permission | m.SensorList | m.EmergencyRelease | None = None,
-    ) -> Reaction:
-        return m.Reply(message.message_id, m.OK, "", content), sends
-
-    def _refuse(self, message: m.Message, code: int, text: str) -> Reaction:
-        self.refused += 1
-        return m.Reply(message.message_id, code, text), []
+        return DvaAnswer(content=content, sends=sends)

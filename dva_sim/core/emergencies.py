@@ -6,10 +6,10 @@ again whose program was replaced by one that knows nothing of its latch.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from dva_sim.core.handling import Choice
+from dva_sim.core.events import Choice
 from dva_sim.protocol import messages as m
 
 UNCONFIRMED_AFTER = 30.0  # a robot says each second that it is stopped, if it is [s]
@@ -90,10 +90,6 @@ class Emergencies:
 
     def lapse(self, now: float, last_heard: Callable[[str], float]) -> None:
         """Forget emergencies of robots that are heard and no longer say that they are stopped."""
-        for robot in list(self._unconfirmed(now, last_heard)):
-            self.forget(robot)
-
-    def _unconfirmed(self, now: float, last_heard: Callable[[str], float]) -> Iterator[str]:
         for robot, stop in self.stopped().items():
             if now - stop.heard > UNCONFIRMED_AFTER and last_heard(robot) > stop.heard:
-                yield robot
+                self.forget(robot)

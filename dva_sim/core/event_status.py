@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from dva_sim.core.events import Event, State
-from dva_sim.core.handling import Choice
+from dva_sim.core.events import LOOKING, Choice, Event, State
 from dva_sim.core.questions import Question, Questions
 from dva_sim.core.wire_size import LIST_BYTES, xml_size
 from dva_sim.protocol import messages as m
@@ -29,8 +28,9 @@ def state_since(event: Event) -> float:
 
 def status_of(event: Event, question: Question | None, now: float) -> m.EventStatus:
     """Return the status of an event."""
-    handling, times = event.handling, event.times
-    looks = event.state in (State.ASSIGNED, State.ON_SCENE)
+    handling = event.handling
+    times = event.times
+    looks = event.state in LOOKING
     acts = event.open and event.actor is not None
     return m.EventStatus(
         event_id=event.number,
@@ -39,10 +39,10 @@ def status_of(event: Event, question: Question | None, now: float) -> m.EventSta
         severity=event.severity,
         confidence=round(max(0.0, min(event.confidence, 1.0)), 6),
         event_state=event.state.value.replace(" ", "_"),
-        age=_ago(times.get("detected", now), now),
-        state_for=_ago(state_since(event), now),
+        age=_span(times.get("detected", now), now),
+        state_for=_span(state_since(event), now),
         decisions=handling.decisions,
-        closed_for=None if event.open else _ago(times.get("closed", now), now),
+        closed_for=None if event.open else _span(times.get("closed", now), now),
         waits_for=event.waits_for if event.open else None,
         responder=event.responder if looks else None,
         operator=event.operator if looks else None,
@@ -71,34 +71,33 @@ def by_whom(choice: Choice | None, now: float) -> m.ByWhom | None:
     """Return the author of a choice; None if nobody chose."""
     if choice is None:
         return None
-    return m.ByWhom(choice.author, choice.label[:64], _ago(choice.time, now))
+    return m.ByWhom(choice.author, choice.label[:64], _span(choice.time, now))
 
 
 def _last(choice: Choice | None, now: float) -> m.LastDecision | None:
     if choice is None:
         return None
-    ago, reason = _ago(choice.time, now), choice.reason[:256] or None
-    return m.LastDecision(choice.author, choice.label[:64], choice.action, ago, reason)
+    ago = _span(choice.time, now)
+    return m.LastDecision(
+        choice.author, choice.label[:64], choice.action, ago, choice.reason[:256] or None
+    )
 
 
 def _proposed(question: Question | None, now: float) -> m.Proposed | None:
     if question is None:
         return None
-    arrival, left = _ahead(question.expected, now), _ahead(question.until, now)
-    return m.Proposed(question.device, question.task, arrival, left)
+    arrival = _span(now, question.expected)
+    return m.Proposed(question.device, question.task, arrival, _span(now, question.until))
 
 
-def _ago(then: float, now: float) -> float:
-    return max(0.0, min(now - then, LONGEST))
-
-
-def _ahead(then: float, now: float) -> float:
-    return max(0.0, min(then - now, LONGEST))
+def _span(start: float, end: float) -> float:
+    return max(0.0, min(end - start, LONGEST))
 
 
 def _written(status: m.EventStatus) -> int:
     """Room for what people have written [B]."""
-    last, seen = status.last_decision, status.acknowledged
+    last = status.last_decision
+    seen = status.acknowledged
     texts = [status.note or "", seen.label if seen else ""]
     texts += [last.label, last.reason or ""] if last else []
     return sum(map(xml_size, texts))

@@ -1,15 +1,18 @@
-"""The event table: each event in exactly one state, its times in order, none ever lost."""
+"""Events: the states of an event, the table of its transitions, and all events that are known.
+
+An event is in exactly one state, its times are in order, and none is ever lost (S6, S7). What ends
+a state is a `Cause`; `TRANSITIONS` says what follows, and `Orders.transition` carries it out.
+"""
 
 from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Literal
+from typing import Literal, NamedTuple
 
-from dva_sim.core.handling import Handling
 from dva_sim.protocol.messages import Position
 
 
@@ -30,19 +33,85 @@ S = State
 STEPS = ("detected", "assigned", "departed", "arrived", "confirmed", "contained", "closed")
 ACT_STEPS = ("act_assigned", "act_departed", "act_arrived", "contained", "closed")
 FINAL = frozenset({S.CONTAINED, S.REFUTED, S.ESCALATED, S.EXPIRED})  # and CONFIRMED, mostly
-_GIVEN_UP = frozenset({S.ESCALATED, S.EXPIRED})
-NEXT: dict[State, frozenset[State]] = {
-    S.PENDING: frozenset({S.ASSIGNED, S.CONFIRMED, S.REFUTED}) | _GIVEN_UP,
-    S.ASSIGNED: frozenset({S.PENDING, S.ON_SCENE, S.CONFIRMED, S.REFUTED}) | _GIVEN_UP,
-    S.ON_SCENE: frozenset({S.PENDING, S.CONFIRMED, S.REFUTED}) | _GIVEN_UP,
-    S.CONFIRMED: frozenset({S.CONTAINED, S.REFUTED, S.ESCALATED}),
-}
+LOOKING = (S.ASSIGNED, S.ON_SCENE)
+"""States with an active order to look."""
 
 MOST_OPEN = 10_000  # events at the same time; a report of one more is refused
 KEPT_CLOSED = 1000  # who comes late with word of one of the last is still understood
 MOST_SOURCES = 64  # whose reports of one event are told apart
 DEGREE = 111_000.0  # of latitude [m]
 SAME_SPOT = 0.001  # where reports are not merged, what is taken back was reported just here [m]
+
+
+class Choice(NamedTuple):
+    """Decision, its author, and when it was made.
+
+    Attributes:
+        author: Id of the device; the DVA's for its policy and its rules.
+        label: Label of the author.
+        action: Kind of decision, as in `audit.Fact`.
+        time: Time [s].
+        reason: Reason in words; may be empty.
+        device: About whom; empty: about nobody.
+    """
+
+    author: str
+    label: str
+    action: str
+    time: float
+    reason: str = ""
+    device: str = ""
+
+    def described(self, now: float) -> str:
+        """Describe the choice in words, as of now."""
+        about = self.device and f" of {self.device}"
+        why = self.reason and f": {self.reason}"
+        did = self.action.replace("_", " ")
+        ago = now - self.time
+        return f"{did}{about} by {self.label}, {ago:.1f} s ago{why}"
+
+
+@dataclass(slots=True)
+class Handling:
+    """Decisions on one event.
+
+    Attributes:
+        decisions: Number of decisions; a decision made on an older number is too late.
+        last: The last of it.
+        acknowledged: First acknowledgement.
+        note: The newest.
+        taken_off: Devices that the policy may no longer send there.
+        expected: Time of the order [s] and expected travel time [s], by device.
+        advised: Id of whom the policy has sent or would have sent last; empty: nobody.
+    """
+
+    decisions: int = 0
+    last: Choice | None = None
+    acknowledged: Choice | None = None
+    note: str = ""
+    taken_off: set[str] = field(default_factory=set)
+    expected: dict[str, tuple[float, float]] = field(default_factory=dict)
+    advised: str = ""
+
+    def decide(self, choice: Choice) -> None:
+        """Count a decision, and keep it as the last one."""
+        self.decisions += 1
+        self.last = choice
+
+    def is_already(self, author: str, action: str, device: str = "") -> bool:
+        """Return True if the last decision was exactly this, by the same author."""
+        return self.last is not None and (author, action, device) == (
+            self.last.author,
+            self.last.action,
+            self.last.device,
+        )
+
+    def arrival_in(self, device: str, now: float) -> float | None:
+        """Return when a device that was sent is expected to arrive [s from now]."""
+        if device not in self.expected:
+            return None
+        sent, way = self.expected[device]
+        return max(0.0, sent + way - now)
 
 
 @dataclass(slots=True)
@@ -117,6 +186,163 @@ class Event:
             return "confirm"
         lacks_actor = self.state is State.CONFIRMED and self.open and self.actor is None
         return "contain" if lacks_actor else None
+
+
+# --- the life of an event ------------------------------------------------------------------
+
+
+class Cause(StrEnum):
+    """Cause of a transition, in words."""
+
+    ORDERED = "a responder is ordered to look"
+    ARRIVED = "the responder is there"
+    CONFIRMED = "a device that was sent there confirms it"
+    SENSED = "a robot's sensor confirms it"
+    REFUTED = "a device that was sent there finds nothing"
+    CONTAINED = "a person who was sent there has contained it"
+    DECLINED = "the order to look is declined, or not delivered"
+    GIVEN_BACK = "the responder gives the order back"
+    ABANDONED = "the responder or its operator is gone, or stopped by an emergency"
+    OVERDUE = "the order to look is not carried out in time"
+    TAKEN_AWAY = "the robot is taken from its driver"
+    REDIRECTED = "the policy sends the responder to another event"
+    RECALLED = "a control room recalls the responder"
+    EXHAUSTED = "an order has failed and no other may follow"
+    WAITED = "it has waited too long"
+    WITHDRAWN = "its last reporter withdraws it"
+    SUPERSEDED = "a person on site reports the same event elsewhere"
+    DISMISSED = "a control room calls it a false alarm"
+    ESCALATED = "a control room escalates it"
+
+
+class OrderEnd(StrEnum):
+    """Fate of the active order to look, in words."""
+
+    LEFT = "stays"  # until its responder reports `done`
+    FREED = "ends"  # no session to end: not taken up yet, or needed for the next order
+    RELEASED = "ends with its session"
+    RECALLED = "ends with its session; the responder is told"
+
+
+class Transition(NamedTuple):
+    """Row of the transition table.
+
+    The changed event is always told to control rooms, recorders and the memory. An actor hears that
+    a confirmed event is to be contained, and that one that is over or waits again needs nobody.
+
+    Attributes:
+        starts: States in which the cause applies; in all others it is refused.
+        end: Next state.
+        order: Fate of an active order to look, and who hears of it.
+        retries: True if the event is `EXHAUSTED` instead when no further order may follow.
+        log: Reason that the audit log states for a decision of the DVA's own rules; empty: somebody
+            else has decided, and logs it, or nobody has.
+    """
+
+    starts: tuple[State, ...]
+    end: State
+    order: OrderEnd = OrderEnd.LEFT
+    retries: bool = False
+    log: str = ""
+
+
+def _transition_pending_assigned(event: Event, now: float) -> None:
+    event.times["assigned"] = now
+
+
+def _transition_assigned_on_scene(event: Event, now: float) -> None:
+    event.times["arrived"] = now
+
+
+def _transition_looking_pending(event: Event, now: float) -> None:
+    # The start of the wait stays: an order that nobody takes up must not prolong it.
+    event.responder = None
+    event.operator = None
+    event.taken_up = False
+    for step in ("assigned", "departed", "arrived"):
+        event.times.pop(step, None)
+
+
+def _transition_unconfirmed_confirmed(event: Event, now: float) -> None:
+    # Responder and operator stay: they may not have reported `done` yet.
+    event.times["confirmed"] = now
+    event.waiting_since = now  # for somebody to contain it, from the beginning
+    if not event.open:
+        event.times["closed"] = now
+
+
+def _transition_confirmed_contained(event: Event, now: float) -> None:
+    event.times["contained"] = now
+    event.times["closed"] = now
+
+
+def _transition_open_closed(event: Event, now: float) -> None:
+    event.times["closed"] = now
+
+
+_TRANSITION_TO: dict[State, Callable[[Event, float], None]] = {
+    S.PENDING: _transition_looking_pending,
+    S.ASSIGNED: _transition_pending_assigned,
+    S.ON_SCENE: _transition_assigned_on_scene,
+    S.CONFIRMED: _transition_unconfirmed_confirmed,
+    S.CONTAINED: _transition_confirmed_contained,
+    S.REFUTED: _transition_open_closed,
+    S.ESCALATED: _transition_open_closed,
+    S.EXPIRED: _transition_open_closed,
+}
+_UNCONFIRMED = (S.PENDING, *LOOKING)
+_OPEN = (*_UNCONFIRMED, S.CONFIRMED)
+
+TRANSITIONS: dict[Cause, Transition] = {
+    Cause.ORDERED: Transition((S.PENDING,), S.ASSIGNED),
+    Cause.ARRIVED: Transition((S.ASSIGNED,), S.ON_SCENE),
+    # A finding may come late, from a device that is no longer sent: the event may be pending.
+    Cause.CONFIRMED: Transition(_UNCONFIRMED, S.CONFIRMED),
+    Cause.SENSED: Transition(_UNCONFIRMED, S.CONFIRMED, OrderEnd.RECALLED),
+    Cause.REFUTED: Transition(_OPEN, S.REFUTED),
+    Cause.CONTAINED: Transition((S.CONFIRMED,), S.CONTAINED),
+    # An order has failed.
+    Cause.DECLINED: Transition(LOOKING, S.PENDING, OrderEnd.FREED, retries=True),
+    Cause.GIVEN_BACK: Transition(LOOKING, S.PENDING, OrderEnd.RELEASED, retries=True),
+    Cause.ABANDONED: Transition(LOOKING, S.PENDING, OrderEnd.RELEASED, retries=True),
+    Cause.OVERDUE: Transition(LOOKING, S.PENDING, OrderEnd.RECALLED, retries=True),
+    Cause.TAKEN_AWAY: Transition(LOOKING, S.PENDING, OrderEnd.RECALLED, retries=True),
+    # The responder is needed elsewhere: no failure. Policies call nobody away from a scene.
+    Cause.REDIRECTED: Transition((S.ASSIGNED,), S.PENDING, OrderEnd.FREED),
+    Cause.RECALLED: Transition(LOOKING, S.PENDING, OrderEnd.RECALLED),
+    # The DVA gives up.
+    Cause.EXHAUSTED: Transition(
+        (*LOOKING, S.CONFIRMED), S.ESCALATED, OrderEnd.RELEASED, log="orders came to nothing"
+    ),
+    Cause.WAITED: Transition((S.PENDING, S.CONFIRMED), S.ESCALATED, log="it has waited too long"),
+    Cause.WITHDRAWN: Transition((S.PENDING,), S.EXPIRED, log="nobody reports it any longer"),
+    Cause.SUPERSEDED: Transition(
+        LOOKING, S.EXPIRED, OrderEnd.RECALLED, log="nobody reports it any longer"
+    ),
+    # A control room decides.
+    Cause.DISMISSED: Transition(_OPEN, S.REFUTED, OrderEnd.RECALLED),
+    Cause.ESCALATED: Transition(_OPEN, S.ESCALATED, OrderEnd.RECALLED),
+}
+"""The life of an event: what each cause makes of it."""
+
+
+def applies(cause: Cause, event: Event) -> bool:
+    """Return True if the table has a transition of the event for a cause."""
+    return event.open and event.state in TRANSITIONS[cause].starts
+
+
+def transition_of(event: Event, cause: Cause) -> Transition:
+    """Return the transition of an event for a cause.
+
+    Raises:
+        ValueError: there is none in its state.
+    """
+    if not applies(cause, event):
+        raise ValueError(f"event {event.number} is {event.state}: no transition for: {cause}")
+    return TRANSITIONS[cause]
+
+
+# --- all events ----------------------------------------------------------------------------
 
 
 @dataclass
@@ -198,19 +424,22 @@ class EventTable:
         (self.open if event.open else self.closed)[event.number] = event
         self.touch(event)
 
-    def move(self, event: Event, state: State, now: float) -> None:
-        """Change the state of an event by the rules.
+    def move(self, event: Event, cause: Cause, now: float) -> None:
+        """Change the state of an event, and count it there.
 
         Raises:
-            ValueError: that step does not exist.
+            ValueError: the table has no such transition.
         """
-        if state not in NEXT.get(event.state, ()) or not event.open:
-            raise ValueError(f"event {event.number} cannot go from {event.state} to {state}")
+        transition = transition_of(event, cause)
         self.counts[event.state] -= 1
-        self.counts[state] += 1
-        event.state = state
-        _note_time(event, state, now)
-        self._close_if_over(event, now)
+        self.counts[transition.end] += 1
+        event.state = transition.end
+        _TRANSITION_TO[transition.end](event, now)
+        if not event.open:
+            del self.open[event.number]
+            self.closed[event.number] = event
+        if len(self.closed) > KEPT_CLOSED:
+            self.closed.popitem(last=False)
         self.touch(event)
 
     def touch(self, event: Event) -> None:
@@ -224,21 +453,13 @@ class EventTable:
 
     def changes(self) -> list[Event]:
         """The events that have changed since this was last asked."""
-        changed, self._changed = self._changed, {}
+        changed = self._changed
+        self._changed = {}
         return list(changed.values())
 
     def in_state(self, *states: State) -> Iterator[Event]:
         """Open events in one of these states, oldest first."""
         return (e for e in self.open.values() if e.state in states)
-
-    def _close_if_over(self, event: Event, now: float) -> None:
-        if event.open:
-            return
-        event.times["closed"] = now
-        del self.open[event.number]
-        self.closed[event.number] = event
-        if len(self.closed) > KEPT_CLOSED:
-            self.closed.popitem(last=False)
 
 
 def apart(a: Position, b: Position) -> float:
@@ -246,17 +467,3 @@ def apart(a: Position, b: Position) -> float:
     north = (a.latitude - b.latitude) * DEGREE
     east = (a.longitude - b.longitude) * DEGREE * math.cos(math.radians(a.latitude))
     return math.hypot(north, east)
-
-
-def _note_time(event: Event, state: State, now: float) -> None:
-    if state is State.PENDING:
-        event.responder = event.operator = None
-        event.taken_up = False
-        for step in STEPS[1:4]:
-            event.times.pop(step, None)
-    elif state is State.ASSIGNED:
-        event.times["assigned"] = now
-    elif state in (State.CONFIRMED, State.CONTAINED):
-        event.times[state.value] = now
-        if state is State.CONFIRMED:
-            event.waiting_since = now

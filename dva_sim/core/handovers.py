@@ -79,8 +79,7 @@ class Handovers:
         return None
 
     def _named(self, device: str, held_for: float) -> m.Holder:
-        entry = self.orders.registry.entries.get(device)
-        label = entry.device.label if entry else device
+        label = self.orders.label_of(device)
         return m.Holder(device, label, max(0.0, min(held_for, LONGEST)))
 
     def _noted(self, robot: str, session: int, now: float) -> float:
@@ -134,7 +133,8 @@ class Handovers:
         holder = self.holder(body.device, known.asker, now)
         if gives and holder is not None and holder.holder == send.to:
             return self._stop(body.device, known.asker, now)
-        known.step, known.until = Step.DECLINED, now + DECLINED_FOR
+        known.step = Step.DECLINED
+        known.until = now + DECLINED_FOR
         return []
 
     def _stop(self, robot: str, asker: str, now: float) -> list[Send]:
@@ -158,7 +158,8 @@ class Handovers:
             return
         still = max(abs(status.speed), abs(status.turn_rate)) <= STANDING
         if still and status.mode == "Idle":
-            known.step, known.until = Step.READY, now + FETCH_WITHIN
+            known.step = Step.READY
+            known.until = now + FETCH_WITHIN
 
     def next_deadline(self) -> float:
         """Return when the next handover has taken too long [s]."""

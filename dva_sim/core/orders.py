@@ -1,4 +1,4 @@
-"""Orders: who has to do what. Given, taken up, given back, taken back; the events keep the rest."""
+"""Orders: who has to do what, and what their course makes of the events."""
 
 from __future__ import annotations
 
@@ -10,8 +10,19 @@ from dataclasses import dataclass, field
 from dva_sim.core.assignments import MOVE, SET_OUT, Assignments, Promise, Promises, Rules
 from dva_sim.core.audit import AuditTrail, Fact
 from dva_sim.core.emergencies import Emergencies
-from dva_sim.core.events import NEXT, Event, EventTable, State, apart
-from dva_sim.core.handling import Choice
+from dva_sim.core.events import (
+    LOOKING,
+    TRANSITIONS,
+    Cause,
+    Choice,
+    Event,
+    EventTable,
+    OrderEnd,
+    State,
+    apart,
+    applies,
+    transition_of,
+)
 from dva_sim.core.registry import Registry
 from dva_sim.core.sessions import Send, Sessions
 from dva_sim.protocol import messages as m
@@ -51,8 +62,9 @@ class Orders:
         self, event: Event, responder: str, operator: str | None, now: float, award: bool = False
     ) -> Send:
         """Send somebody to look; an award goes to who has bid, its operator hears later."""
-        self.events.move(event, State.ASSIGNED, now)
-        event.responder, event.operator = responder, operator
+        self.events.move(event, Cause.ORDERED, now)
+        event.responder = responder
+        event.operator = operator
         for name in (responder, operator):
             if name is not None:
                 self.engaged.begin(name, event)
@@ -69,7 +81,8 @@ class Orders:
 
     def act(self, event: Event, guard: str, now: float) -> Send:
         """Send a person to deal with an event, or to stand by until it is confirmed."""
-        event.actor, event.act_taken_up = guard, False
+        event.actor = guard
+        event.act_taken_up = False
         for step in ("act_departed", "act_arrived"):
             event.times.pop(step, None)
         event.times["act_assigned"] = now
@@ -85,18 +98,16 @@ class Orders:
 
     def redirect(self, event: Event, now: float) -> list[Send]:
         """Withdraw an order whose responder is needed elsewhere; does not count as an attempt."""
-        self._free(event, event.responder, event.operator)
         event.preemptions += 1
         event.attempts -= event.taken_up
         self.counters["preempted"] += 1
-        self.events.move(event, State.PENDING, now)
-        return self._stand_down(event)
+        return self.transition(event, Cause.REDIRECTED, now)
 
     def again(self) -> list[Send]:
         """All current orders, repeated by a DVA that was restarted."""
         sends = []
         for event in self.events.open.values():
-            if event.state in (State.ASSIGNED, State.ON_SCENE) and event.responder is not None:
+            if event.state in LOOKING and event.responder is not None:
                 sends.append(self._order_to_confirm(event))
             if event.actor is not None:
                 sends.append(self._order_to_act(event))
@@ -110,13 +121,13 @@ class Orders:
         if event is None:
             return []
         if isinstance(send.body, m.TaskAward) and send.to == event.responder and event.operator:
-            if _somebody_looks(event):
+            if event.state in LOOKING:
                 return [self._order_to_confirm(event)]
             self._release(event)  # settled meanwhile, and its operator has not heard of it
         elif _is_to_act(send.body):
             event.act_taken_up |= send.to == event.actor
             self.events.touch(event)
-        elif send.to == event.holder and _somebody_looks(event):
+        elif send.to == event.holder and event.state in LOOKING:
             self._noted_as_taken_up(event)
         return []
 
@@ -134,7 +145,8 @@ class Orders:
     def not_taken_up(self, send: Send, now: float) -> list[Send]:
         """Handle an order declined or undelivered; does not count as an attempt."""
         event = self._meant(send)
-        to_act, looks = _is_to_act(send.body), event is not None and _somebody_looks(event)
+        to_act = _is_to_act(send.body)
+        looks = event is not None and event.state in LOOKING
         if event is not None and looks and not to_act and "departed" in event.times:
             return []  # only the answer was lost
         self._pause(send.to, now)
@@ -142,8 +154,10 @@ class Orders:
             return []  # the order is another's by now
         if to_act:
             return self._actor_gone(event, now)
+        if looks:
+            return self.transition(event, Cause.DECLINED, now)
         self._free(event, event.responder, event.operator)
-        return self._reopen(event, now) if looks else []
+        return []
 
     # --- what those who have them say ---------------------------------------------------
 
@@ -186,7 +200,8 @@ class Orders:
         return there in event.times or self._is_near(event, device)
 
     def _is_near(self, event: Event, device: str) -> bool:
-        within, entry = self.rules.arrived_within, self.registry.entries.get(device)
+        within = self.rules.arrived_within
+        entry = self.registry.entries.get(device)
         at = None if entry is None else entry.position
         return math.isinf(within) or (at is not None and apart(at, event.position) <= within)
 
@@ -194,8 +209,7 @@ class Orders:
         if device is not None and device == event.actor:
             event.times.setdefault("act_arrived", now)
         elif event.state is State.ASSIGNED:
-            event.times["arrived"] = now
-            self.events.move(event, State.ON_SCENE, now)
+            self.transition(event, Cause.ARRIVED, now)
         if device is not None:
             self._from_afar.discard((device, event.number))
             self.events.touch(event)
@@ -209,18 +223,10 @@ class Orders:
         if self.has_order(event, device) and (goes is None or self._was_near(event, goes)):
             self.departed(event, device, now)
             self._is_there(event, goes, now)
-        if finding == "contained" and event.state is State.CONFIRMED:
-            self.events.move(event, State.CONTAINED, now)
-            return self._stand_down(event, but=device)
-        if finding == "confirmed" and event.state is not State.CONFIRMED:
-            self.events.move(event, State.CONFIRMED, now)
-            if event.open and event.actor is not None:
-                return [self._order_to_act(event)]
-            return self._stand_down(event)
-        if finding == "refuted" and State.REFUTED in NEXT[event.state]:
-            self.events.move(event, State.REFUTED, now)
-            return self._stand_down(event, but=device)
-        return []
+        cause = _FINDINGS.get(finding)
+        if cause is None or not applies(cause, event):
+            return []  # too late, or too early
+        return self.transition(event, cause, now, device)
 
     def ends(self, event: Event, device: str, state: str, now: float) -> list[Send]:
         """Somebody is free again; an event it could not settle is open to others."""
@@ -228,13 +234,13 @@ class Orders:
             self._pause(device, now)
         if device == event.actor:
             return self._act_ends(event, device, state != "declined", now)
-        self._release(event)
-        if not _somebody_looks(event):
+        if event.state not in LOOKING:
+            self._release(event)
             return []
         if event.responder is not None and state != "declined":
             self._noted_as_taken_up(event)
             event.failed.add(event.responder)
-        return self._reopen(event, now)
+        return self.transition(event, Cause.GIVEN_BACK, now)
 
     def _act_ends(self, event: Event, device: str, tried: bool, now: float) -> list[Send]:
         if not event.open:
@@ -254,20 +260,28 @@ class Orders:
     def _abandon(self, event: Event, device: str, now: float) -> list[Send]:
         if device == event.actor and event.open:
             return self._actor_gone(event, now)
+        if event.state in LOOKING:
+            return self.transition(event, Cause.ABANDONED, now)
+        self._finished(event, device)
+        return []
+
+    def _finished(self, event: Event, device: str) -> None:
+        """Free a device whose event was settled before it reported `done`."""
         self._free(event, device)
-        if device not in (event.responder, event.operator):
-            return []
-        self._release(event)
-        return self._reopen(event, now) if _somebody_looks(event) else []
+        if device in (event.responder, event.operator):
+            self._release(event)
 
     def give_up(self, now: float) -> list[Send]:
         """Escalate what has waited too long, and the newest of more than may wait."""
-        most, waiting = self.rules.most_waiting, self.events.waiting
+        most = self.rules.most_waiting
+        waiting = self.events.waiting
         late = {n: e for n, e in waiting.items() if self._wait_ends(e) <= now}
         if most is not None and len(waiting) - len(late) > most:
             left = sorted(waiting.keys() - late.keys())
             late |= {number: waiting[number] for number in left[most:]}
-        return [send for event in late.values() for send in self.escalate(event, now)]
+        return [
+            send for event in late.values() for send in self.transition(event, Cause.WAITED, now)
+        ]
 
     def take_back(self, now: float) -> list[Send]:
         """Orders that were not carried out in time are open to others."""
@@ -312,9 +326,13 @@ class Orders:
     def _owes(device: str, event: Event) -> str:
         """Nothing if it is there, or stands by, or an order has not been answered yet."""
         if device == event.actor and event.open:
-            taken_up, step, goes = event.act_taken_up, "act_", event.state is State.CONFIRMED
+            taken_up = event.act_taken_up
+            step = "act_"
+            goes = event.state is State.CONFIRMED
         elif device == event.holder and event.state is State.ASSIGNED:
-            taken_up, step, goes = event.taken_up, "", True
+            taken_up = event.taken_up
+            step = ""
+            goes = True
         else:
             return ""
         if not taken_up or f"{step}arrived" in event.times:
@@ -324,7 +342,8 @@ class Orders:
 
     def next_deadline(self) -> float:
         """Return when the next order waits, or takes, too long [s]."""
-        rules, waiting = self.rules, self.events.waiting
+        rules = self.rules
+        waiting = self.events.waiting
         ends = [min(self._pauses, default=math.inf) if waiting else math.inf]
         if math.isfinite(rules.escalate_after):
             ends += (self._wait_ends(e) for e in waiting.values())
@@ -346,62 +365,35 @@ class Orders:
         elif device == event.actor:
             begun = max(times["act_assigned"], times.get("confirmed", math.inf))
         else:
-            begun = times.get("assigned" if _somebody_looks(event) else "confirmed", math.inf)
+            begun = times.get("assigned" if event.state in LOOKING else "confirmed", math.inf)
         return begun + self.rules.order_limit
 
     def _take_back(self, device: str, event: Event, now: float) -> list[Send]:
         over = m.OrderProgress(event.number, OVER)
         if event.open and device == event.actor:
             return [Send(device, over), *self._act_ends(event, device, True, now)]
-        self._free(event, device)
-        if device in (event.responder, event.operator):
-            self._release(event)
-        if not _somebody_looks(event):
-            return []  # its last word must have been lost
+        if event.state not in LOOKING:
+            self._finished(event, device)  # its last word must have been lost
+            return []
         assert event.responder is not None
         event.failed.add(event.responder)
-        return [Send(event.operator or event.responder, over), *self._reopen(event, now)]
+        return self.transition(event, Cause.OVERDUE, now)
 
     def may_preempt(self, event: Event, now: float) -> bool:
         """Return True if a responder may be recalled: not from a scene, nor past the deadline."""
-        within = now - event.waiting_since < self.rules.escalate_after
-        return event.state is State.ASSIGNED and within
+        return applies(Cause.REDIRECTED, event) and (
+            now - event.waiting_since < self.rules.escalate_after
+        )
 
     def taken_away(self, robot: str, now: float) -> list[Send]:
         """A robot is another's from now on: others have to look at what it was sent to."""
         sends: list[Send] = []
         for event in self.engaged.all(robot):
-            sends += self._called_off(event)
-            if _somebody_looks(event):
-                sends += self._reopen(event, now)
+            looks = event.state in LOOKING
+            sends += (
+                self.transition(event, Cause.TAKEN_AWAY, now) if looks else self._call_off(event)
+            )
         return sends
-
-    def confirmed_by_another(self, event: Event, now: float) -> list[Send]:
-        """Somebody who was not sent has confirmed it: nobody need look any more."""
-        sends = self._called_off(event) if _somebody_looks(event) else []
-        return sends + self.found(event, "", "confirmed", now)
-
-    def supersede(self, event: Event, now: float) -> list[Send]:
-        """It is known better as another event: nobody need look there."""
-        return [*self._called_off(event), *self.expire(event, now)]
-
-    def _called_off(self, event: Event) -> list[Send]:
-        """Recall the devices that look at an event, or are still finishing that."""
-        holder = event.holder
-        self._release(event)
-        return [Send(holder, m.OrderProgress(event.number, OVER))] if holder else []
-
-    def escalate(self, event: Event, now: float) -> list[Send]:
-        """Nobody has come in time: others than the DVA's own have to."""
-        self._ruled(event, "escalate", "it has waited too long", now)
-        self.events.move(event, State.ESCALATED, now)
-        return self._stand_down(event)
-
-    def expire(self, event: Event, now: float) -> list[Send]:
-        """Nobody says any longer that there is something."""
-        self._ruled(event, "expire", "nobody reports it any longer", now)
-        self.events.move(event, State.EXPIRED, now)
-        return self._stand_down(event)
 
     # --- decided by people -------------------------------------------------------------
 
@@ -413,23 +405,57 @@ class Orders:
         if device == event.actor:
             over = Send(device, m.OrderProgress(event.number, OVER))
             if event.act_taken_up:
-                event.act_taken_up, event.waiting_since = False, now
+                event.act_taken_up = False
+                event.waiting_since = now
             if replaced:
                 self._free_actor(event)
                 return [over]
             return [over, *self._actor_gone(event, now)]
-        taken_up, event.attempts = event.taken_up, event.attempts - event.taken_up
-        sends = self._called_off(event)
-        if taken_up:
+        event.attempts -= event.taken_up
+        if event.taken_up:
             event.waiting_since = now
-        self.events.move(event, State.PENDING, now)
-        return sends + self._stand_down(event)
+        return self.transition(event, Cause.RECALLED, now)
 
-    def settle(self, event: Event, state: State, now: float) -> list[Send]:
-        """Close an event by a person's decision and free its responders."""
-        sends = self._called_off(event) if _somebody_looks(event) else []
-        self.events.move(event, state, now)
-        return sends + self._stand_down(event)
+    # --- what becomes of the event -----------------------------------------------------
+
+    def transition(self, event: Event, cause: Cause, now: float, device: str = "") -> list[Send]:
+        """Change the state of an event as `TRANSITIONS` says; return whom to tell what.
+
+        Args:
+            event: The event.
+            cause: Cause of the change.
+            now: Time [s].
+            device: Device that reported the cause; it need not be told.
+
+        Raises:
+            ValueError: the table has no such transition.
+        """
+        transition = transition_of(event, cause)
+        sends = self._end_order(event, transition.order) if event.state in LOOKING else []
+        if transition.retries and not self._goes_on(event, event.taken_up, now):
+            cause = Cause.EXHAUSTED
+        self._log_rule(event, cause, now)
+        self.events.move(event, cause, now)
+        if event.state is State.CONFIRMED and event.open and event.actor is not None:
+            return [*sends, self._order_to_act(event)]
+        return sends + self._stand_down(event, device)
+
+    def _end_order(self, event: Event, end: OrderEnd) -> list[Send]:
+        """End the active order to look."""
+        match end:
+            case OrderEnd.FREED:
+                self._free(event, event.responder, event.operator)
+            case OrderEnd.RELEASED:
+                self._release(event)
+            case OrderEnd.RECALLED:
+                return self._call_off(event)
+        return []
+
+    def _call_off(self, event: Event) -> list[Send]:
+        """Recall the devices that look at an event, or are still finishing that."""
+        holder = event.holder
+        self._release(event)
+        return [Send(holder, m.OrderProgress(event.number, OVER))] if holder else []
 
     def decided(self, event: Event, fact: Fact) -> None:
         """Something was decided on an event, by whomever."""
@@ -450,28 +476,27 @@ class Orders:
         entry = self.registry.entries.get(device)
         return entry.device.label if entry else device
 
-    def _ruled(self, event: Event, action: str, cause: str, now: float) -> None:
-        """A rule has decided on an event."""
-        if self.trail.keeps:
-            own, waited = self.sessions.permissions.own, now - event.times["detected"]
-            self.decided(
-                event,
-                Fact(
-                    time=now,
-                    author=own,
-                    label="rule",
-                    action=action,
-                    event=event.number,
-                    cause=cause,
-                    waited=waited,
-                ),
+    def _log_rule(self, event: Event, cause: Cause, now: float) -> None:
+        """Log a decision of the DVA's own rules."""
+        transition = TRANSITIONS[cause]
+        if transition.log and self.trail.keeps:
+            fact = Fact(
+                time=now,
+                author=self.sessions.permissions.own,
+                label="rule",
+                action="expire" if transition.end is State.EXPIRED else "escalate",
+                event=event.number,
+                cause=transition.log,
+                waited=now - event.times["detected"],
             )
+            self.decided(event, fact)
 
     # --- the small print ---------------------------------------------------------------
 
     def _pause(self, device: str, now: float) -> None:
         """Bar a device that did not take up an order from new orders for a while."""
-        entry, until = self.registry.entries.get(device), now + self.rules.declined_pause
+        entry = self.registry.entries.get(device)
+        until = now + self.rules.declined_pause
         if entry is not None:
             entry.free_from = until
             self._pauses.append(until)
@@ -487,14 +512,6 @@ class Orders:
             if name is not None and self.engaged.end(name, event):
                 self._from_afar.discard((name, event.number))
                 self.events.touch(event)
-
-    def _reopen(self, event: Event, now: float) -> list[Send]:
-        """Somebody else has to look, if that is not given up."""
-        state = State.PENDING if self._goes_on(event, event.taken_up, now) else State.ESCALATED
-        if state is State.ESCALATED:
-            self._ruled(event, "escalate", "orders came to nothing", now)
-        self.events.move(event, state, now)
-        return self._stand_down(event)
 
     def _goes_on(self, event: Event, taken_up: bool, now: float) -> bool:
         """Return True if an event may wait for another responder after an order failed.
@@ -515,8 +532,7 @@ class Orders:
         if event.state is State.CONFIRMED and event.open:
             event.attempts += taken_up
             if not self._goes_on(event, taken_up, now):
-                self._ruled(event, "escalate", "orders came to nothing", now)
-                self.events.move(event, State.ESCALATED, now)
+                return self.transition(event, Cause.EXHAUSTED, now)
         return []
 
     def _free_actor(self, event: Event) -> None:
@@ -525,12 +541,13 @@ class Orders:
         event.actor = None
         self.events.touch(event)
 
-    def _stand_down(self, event: Event, but: str | None = None) -> list[Send]:
+    def _stand_down(self, event: Event, but: str) -> list[Send]:
         """Release devices that stood by at, or were to contain, an event that no longer needs them.
 
         So it is where nobody looks any longer: who stands by may be the one to look.
         """
-        actor, needed = event.actor, event.open and event.state is not State.PENDING
+        actor = event.actor
+        needed = event.open and event.state is not State.PENDING
         if actor is None or needed or actor == but:
             return []
         self._free(event, actor)
@@ -539,13 +556,13 @@ class Orders:
 
 
 _ORDERS = (m.Order, m.TaskAward)
+_FINDINGS = {
+    "confirmed": Cause.CONFIRMED,
+    "refuted": Cause.REFUTED,
+    "contained": Cause.CONTAINED,
+}
 
 
 def _is_to_act(body: m.Body) -> bool:
     """Return True for an order to contain an event, or to stand by."""
     return isinstance(body, m.Order) and body.task != "confirm"
-
-
-def _somebody_looks(event: Event) -> bool:
-    """Return True if an order to confirm the event is active."""
-    return event.state in (State.ASSIGNED, State.ON_SCENE)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from dva_sim.core.events import Event
-from dva_sim.core.handling import Choice
+from dva_sim.core.events import Choice, Event
 
 
 @dataclass(slots=True)
@@ -57,7 +56,9 @@ class Questions:
 
     def settle(self) -> list[Event]:
         """Drop questions that were not asked again; return the events of which that changed."""
-        before, self._open, self._now = self._open, self._now, {}
+        before = self._open
+        self._open = self._now
+        self._now = {}
         gone = [q.event for key, q in before.items() if key not in self._open]
         new = (q for key, q in self._open.items() if not _same(before.get(key), q))
         return gone + [q.event for q in new]

@@ -6,16 +6,24 @@ import math
 from collections import OrderedDict, defaultdict, deque
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from itertools import takewhile
+from itertools import chain, islice, takewhile
+from typing import Final, NamedTuple
 
+from dva_sim.core.wire_size import LIST_BYTES, xml_size
 from dva_sim.kernel.labels import distinct, look_of, with_id
-from dva_sim.protocol.messages import Device, Position, Registration
+from dva_sim.protocol.messages import Device, DeviceList, Position, Registration
 
-ROBOT, GUARD, OPERATOR, DETECTOR = "Robot", "Guard", "TeleOp", "Sensor"
+ROBOT = "Robot"
+GUARD = "Guard"
+OPERATOR = "TeleOp"
+DETECTOR = "Sensor"
 REMOTE = "Remote Control"  # may drive robots, and is sent no orders
 CONTROL_ROOM = "ControlRoom"  # sees and decides; may drive as its role allows
 SAME_AS = {"Teleoperation": OPERATOR}  # other names of a type
 DRIVERS = frozenset({OPERATOR, REMOTE, CONTROL_ROOM, *SAME_AS})
+LISTED = (ROBOT, OPERATOR, REMOTE, GUARD, CONTROL_ROOM)  # for devices, in this order
+DEVICE_BYTES = 175  # of one listed device without its label, at most [B]
+MOST_LISTED = 64
 MAX_DEVICES = 20_000
 FORGET_AFTER = 60.0  # without a word of it [s]
 
@@ -89,6 +97,7 @@ class Registry:
     _silent: OrderedDict[str, DeviceEntry] = field(default_factory=OrderedDict)  # likewise
     _changed: dict[str, DeviceEntry | None] = field(default_factory=dict)
     _moved: dict[str, DeviceEntry | None] = field(default_factory=dict)
+    _listed: tuple[int, DeviceList] = (-1, DeviceList(()))  # version, list
     _places: int = 0
     _looks: dict[str, str] = field(default_factory=dict)  # of each label as it was given, by id
     _alike: dict[str, set[str]] = field(default_factory=dict)  # ids, by look
@@ -137,7 +146,8 @@ class Registry:
     def add(self, entry: DeviceEntry) -> DeviceEntry:
         """Enter a device that was not known."""
         self.is_there(entry, entry.last_heard)
-        device, entry.place = entry.device, self._places
+        device = entry.device
+        entry.place = self._places
         self._places += 1
         self.entries[device.id_tag] = self._of_type[entry.kind][device.id_tag] = entry
         self._heard[device.id_tag] = entry
@@ -230,20 +240,64 @@ class Registry:
         """Registered devices of a type that are not silent, in order of registration."""
         return (e for e in self._of_type[device_type].values() if not e.silent)
 
+    def device_list(self) -> DeviceList:
+        """Return the devices that others can do something with, as many as fit into a message."""
+        if self._listed[0] != self.version:
+            self._listed = self.version, DeviceList(tuple(self._as_many_as_fit()))
+        return self._listed[1]
+
+    def _as_many_as_fit(self) -> Iterator[Device]:
+        room = LIST_BYTES
+        for entry in islice(chain.from_iterable(map(self.of_type, LISTED)), MOST_LISTED):
+            room -= DEVICE_BYTES + xml_size(entry.device.label)
+            if room < 0:
+                return
+            yield entry.device
+
     def located(self, device_type: str) -> Collection[DeviceEntry]:
         """Devices of a type of which is known where they are, in any order, silent ones too."""
         return self._located[device_type].values()
 
     def changes(self) -> dict[str, DeviceEntry | None]:
         """Return the devices that changed since the last call, for the store."""
-        changed, self._changed = self._changed, {}
+        changed = self._changed
+        self._changed = {}
         return changed
 
     def moves(self) -> dict[str, DeviceEntry | None]:
         """Return the devices that changed since the last call, for listeners."""
-        moved, self._moved = self._moved, {}
+        moved = self._moved
+        self._moved = {}
         return moved
 
     def _note(self, id_tag: str, entry: DeviceEntry | None) -> None:
         self._moved[id_tag] = self._changed[id_tag] = entry
         self.version += 1
+
+
+RATE: Final = 500.0  # design: on average; 5000 devices renew as often [1/s]
+BURST: Final = 2000  # design: at once, so that a whole fleet comes back in seconds
+MOST_PEERS: Final = 10_000  # of which that is remembered
+
+
+class RegistrationAllowance(NamedTuple):
+    """Number of registrations that a peer may send at a time [s]."""
+
+    number: float
+    time: float
+
+
+class RegistrationLimit:
+    """Counts the registrations of each peer; the peers that were quiet longest are forgotten."""
+
+    def __init__(self) -> None:
+        self._left: OrderedDict[str, RegistrationAllowance] = OrderedDict()
+
+    def takes(self, peer: str, now: float) -> bool:
+        """Return True if a peer may register once more at a time [s]."""
+        before = self._left.pop(peer, RegistrationAllowance(BURST, now))
+        number = min(BURST, before.number + (now - before.time) * RATE)
+        self._left[peer] = RegistrationAllowance(max(number - 1.0, 0.0), now)
+        if len(self._left) > MOST_PEERS:
+            self._left.popitem(last=False)
+        return number >= 1.0

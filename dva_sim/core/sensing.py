@@ -8,21 +8,16 @@ that stand above a threshold several times in a row.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from dva_sim.core.events import Event, EventTable, State, apart
 from dva_sim.core.registry import ROBOT, Registry
-from dva_sim.core.sessions import Send, Sessions
+from dva_sim.core.sessions import DvaAnswer, Send, Sessions
 from dva_sim.core.wire_size import LIST_BYTES, xml_size
 from dva_sim.protocol import messages as m
 
 RENEW = 20.0  # a subscription ends at the robot after 60 s unless it is renewed [s]
 IN_A_ROW = 3  # values above a threshold: one alone may be noise; assumed
-REACH = 20.0  # what a robot feels has its source within so many metres [m]; assumed
-CONFIDENCE = 0.6  # of what a robot's sensor says alone; assumed
-SEVERITY = 0.5  # as of what a person reports who has not seen the source
-NO_NEWS = 600.0  # what was settled there so lately is not reported again [s]; assumed
 
 LINE_BYTES, SENSOR_BYTES = 80, 55  # markup of a device and of a sensor, at most [B]
 MOST_LISTED = 64
@@ -98,20 +93,24 @@ class Sensing:
         robots = (entry.device.id_tag for entry in registry.of_type(ROBOT))
         return [send for one in robots if one not in self._mute for send in self.met(one)]
 
-    def listed(self, registry: Registry, robot: str | None) -> m.SensorList | None:
-        """The list, as much of it as fits into a message; None while a robot is being asked."""
-        robots = [entry.device.id_tag for entry in registry.of_type(ROBOT)]
-        wanted = [one for one in robots if robot in (None, one)]
-        if not self._asked.isdisjoint(wanted):
-            return None
-        lines, room = list[m.DeviceSensors](), LIST_BYTES
-        for one in (one for one in wanted if one in self.known):
+    def answer(self, registry: Registry, robot: str | None) -> DvaAnswer:
+        """List the sensors of one or all robots; the robots are asked on the first request."""
+        entry = registry.entries.get(robot or "")
+        if robot and (entry is None or entry.device.device_type != ROBOT or entry.silent):
+            return DvaAnswer(m.UNKNOWN_DEVICE, f"no robot {robot}")
+        sends = self.ask_all(registry, robot)
+        robots = (robot,) if robot else [entry.device.id_tag for entry in registry.of_type(ROBOT)]
+        if not self._asked.isdisjoint(robots):
+            return DvaAnswer(m.BUSY, "the robots are being asked; ask again", sends=sends)
+        lines = list[m.DeviceSensors]()
+        room = LIST_BYTES
+        for one in (one for one in robots if one in self.known):
             line, taken = _line(one, self.known[one], room)
             if line is None or len(lines) == MOST_LISTED:
                 break
             lines.append(line)
             room -= taken
-        return m.SensorList(tuple(lines))
+        return DvaAnswer(content=m.SensorList(tuple(lines)), sends=sends)
 
     # --- reading them ------------------------------------------------------------------
 
@@ -167,30 +166,3 @@ def _line(robot: str, info: m.SensorInfo, room: int) -> tuple[m.DeviceSensors | 
             break
         sensors.append(sensor)
     return m.DeviceSensors(robot, info.camera_url, tuple(sensors)), taken
-
-
-# --- which event it is ---------------------------------------------------------------------
-
-
-def within_reach(events: Iterable[Event], kind: str, place: m.Position) -> Event | None:
-    """The nearest event that can be felt at a place."""
-    near = [(apart(e.position, place), e.number, e) for e in events if e.kind == kind]
-    found = min((entry for entry in near if entry[0] < REACH), default=None)
-    return found[2] if found else None
-
-
-def is_no_news(events: EventTable, kind: str, place: m.Position, now: float) -> bool:
-    """Return True if people recently found such an event nearby, or were called to one."""
-    lately = (
-        e for e in events.closed.values() if e.state in _FOUND and now - e.times["closed"] < NO_NEWS
-    )
-    return within_reach(lately, kind, place) is not None
-
-
-_FOUND = frozenset({State.CONFIRMED, State.CONTAINED, State.ESCALATED})
-
-
-def only_felt(event: Event, registry: Registry) -> bool:
-    """Return True if only robots' sensors support an event, so that its position is uncertain."""
-    types = {e.device.device_type for s in event.sources if (e := registry.entries.get(s))}
-    return types == {ROBOT}

@@ -5,7 +5,7 @@ There is one holder at a time, whose session is a fencing token (`Permissions`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import TypeVar
 
@@ -20,6 +20,23 @@ class Send:
     to: str
     body: m.Body
     session: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class DvaAnswer:
+    """Answer to a request, and what else to send because of it.
+
+    Attributes:
+        code: `messages.OK`, or why nothing was done.
+        text: Reason for people; may be empty.
+        content: Requested content.
+        sends: Messages to other devices.
+    """
+
+    code: int = m.OK
+    text: str = ""
+    content: m.Content | None = None
+    sends: Sequence[Send] = ()
 
 
 MOST_UNACKNOWLEDGED = 1000
@@ -55,7 +72,9 @@ class Sessions:
         )
         if grant is None:
             return None
-        level, session, sensors = grant.level, grant.session, grant.sensors
+        level = grant.level
+        session = grant.session
+        sensors = grant.sensors
         notice = m.PermissionGrant(holder.id_tag, level, session, holder.address, sensors)
         content = m.Permission(robot.id_tag, level, session, robot.address, sensors)
         return content, [Send(robot.id_tag, notice, session)] if is_news else []
@@ -152,7 +171,8 @@ class Sessions:
         Its holder hears that the first is over, and asks for the new one. None: that grant holds
         no longer, or no session can be so high; then it is as if it had not arrived.
         """
-        body, known = send.body, self.permissions
+        body = send.body
+        known = self.permissions
         grant = known.grants.get(send.to)
         if not isinstance(body, m.PermissionGrant) or grant is None:
             return None
@@ -200,7 +220,8 @@ class Sessions:
 
     def to_tell(self) -> list[Send]:
         """Return the ends of sessions to send now; each is returned once."""
-        over, self._over = self._over, []
+        over = self._over
+        self._over = []
         return over
 
     def _tell(self, grant: Grant, holder_too: bool) -> None:

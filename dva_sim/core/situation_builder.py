@@ -103,7 +103,8 @@ class SituationBuilder:
 
     def _tasks(self) -> list[Event]:
         """Events that somebody could do something about, detected longest ago first."""
-        events, rules = self.orders.events, self.orders.rules
+        events = self.orders.events
+        rules = self.orders.rules
         if not (rules.containment or self.policy.preempts):
             found = list(events.waiting.values())
         else:
@@ -147,7 +148,8 @@ class SituationBuilder:
 
     def _free(self, entries: Iterable[DeviceEntry], now: float) -> list[DeviceEntry]:
         """Those who may be given an order, in order of registration."""
-        is_held, engaged = self.orders.sessions.is_held, self.orders.engaged
+        is_held = self.orders.sessions.is_held
+        engaged = self.orders.engaged
         is_stopped = self.orders.emergencies.holds
         free = [
             e
@@ -164,7 +166,8 @@ class SituationBuilder:
 
     def _hands(self, operators: Iterable[DeviceEntry], now: float) -> list[DeviceEntry]:
         """Operators who may be given a robot, each as often as it may; the least busy first."""
-        span, count = self.orders.rules.operator_span, self.orders.engaged.count
+        span = self.orders.rules.operator_span
+        count = self.orders.engaged.count
         hands = [
             (in_hand, e.place, e)
             for e in operators
@@ -245,7 +248,8 @@ class SituationBuilder:
         eta[~np.array(idle_guard)] = np.inf
         bound_for = tuple(self._station_ahead(start, now) for start in starts)
         names = tuple(s.name for s in ground.stations)
-        reach, demand = _sealed(ground.reach), _sealed(ground.demand)
+        reach = _sealed(ground.reach)
+        demand = _sealed(ground.demand)
         return Cover(names, _sealed(eta), reach, demand, bound_for)
 
     def _station_ahead(self, start: Start, now: float) -> int | None:

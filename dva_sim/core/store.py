@@ -26,8 +26,7 @@ from typing import Any
 
 from dva_sim.core.dva import Dva
 from dva_sim.core.emergencies import RobotStop
-from dva_sim.core.events import KEPT_CLOSED, Event, State
-from dva_sim.core.handling import Choice, Handling
+from dva_sim.core.events import KEPT_CLOSED, Choice, Event, Handling, State
 from dva_sim.core.registry import DeviceEntry
 from dva_sim.core.sessions import Grant
 from dva_sim.kernel.errors import ConfigError
@@ -76,11 +75,13 @@ class Store:
     """
 
     def __init__(self, file: Path | str) -> None:
-        self.past, self.keeps_time = 0.0, KEEPS_TIME
+        self.past = 0.0
+        self.keeps_time = KEEPS_TIME
         self.between_writes: Callable[[], object] = lambda: None
         self._time_kept_at = -math.inf  # by the DVA's time
         self._sessions: dict[str, dict[str, str]] = {table: {} for table in _KEYS}
-        self._session_changes, self._asks = 0, False
+        self._session_changes = 0
+        self._asks = False
         self._held: dict[int, Grant] = {}  # by session, as the DVA was last seen
         self._events: dict[int, Event] = {}
         self._devices: dict[str, DeviceEntry | None] = {}
@@ -108,7 +109,8 @@ class Store:
         except (sqlite3.OperationalError, ValueError) as error:
             if "no such" not in str(error):
                 raise self._useless(error) from None
-            found, is_ours = None, False
+            found = None
+            is_ours = False
         except sqlite3.Error as error:
             raise self._useless(error) from None
         if not is_ours:
@@ -142,7 +144,8 @@ class Store:
         """
         self._events |= {event.number: event for event in changed}
         self._devices |= dva.registry.changes()
-        changes, asks = _session_changes(dva), dva.dispatcher.questions.asks
+        changes = _session_changes(dva)
+        asks = dva.dispatcher.questions.asks
         changed_sessions = changes != self._session_changes or asks != self._asks
         if not (self._events or self._devices or changed_sessions or self._time_is_due(dva, now)):
             return None
@@ -161,8 +164,12 @@ class Store:
                 self._file.execute("ROLLBACK")
             self._withdraw(dva)
             return f"cannot keep its memory: {error}"
-        self._events, self._devices, self._sessions = {}, {}, sessions
-        self._session_changes, self._lasting, self._asks = changes, lasting, asks
+        self._events = {}
+        self._devices = {}
+        self._sessions = sessions
+        self._session_changes = changes
+        self._lasting = lasting
+        self._asks = asks
         self._time_kept_at = now
         if changed_sessions:
             self._held = _held(dva)
@@ -434,7 +441,8 @@ def _grant(kept: list[Any]) -> Grant:
 
 
 def _of_entry(entry: DeviceEntry, lasts: bool) -> dict[str, Any]:
-    registrations, silent = list(entry.registrations), entry.silent and not lasts
+    registrations = list(entry.registrations)
+    silent = entry.silent and not lasts
     return {"device": _plain(entry.device), "registrations": registrations, "silent": silent}
 
 

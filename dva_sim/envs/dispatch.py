@@ -139,14 +139,16 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         self.close()
         drawn = int(self.np_random.integers(2**31)) if seed is None else seed
         self._shift = SteppedShift(self.scenario, drawn, **self._flags)
-        self._waiting, self._since = [], 0.0
+        self._waiting = []
+        self._since = 0.0
         self._begin_decision()
         self._reward()
         return self._seen()
 
     @override
     def step(self, action: int) -> tuple[Observations, float, bool, bool, Info]:
-        shift, number = self._running(), self._number(action)
+        shift = self._running()
+        number = self._number(action)
         piece = self._piece(number) if self._mask[number] else None
         if piece is not None:
             self._take(piece)
@@ -188,7 +190,8 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         Raises:
             ValueError: it is none of this environment.
         """
-        given, count = np.asarray(action), len(self._mask)
+        given = np.asarray(action)
+        count = len(self._mask)
         is_whole = given.ndim == 0 and np.issubdtype(given.dtype, np.integer)
         if not is_whole or not 0 <= given < count:
             raise ValueError(f"an action is a whole number from 0 to {count - 1}, not {action!r}")
@@ -228,7 +231,8 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         if isinstance(piece, Announcement):
             self._mask[self._announcements + piece.task] = 0
             return
-        who, unit = situation.responders[piece.responder], self._places[piece.responder]
+        who = situation.responders[piece.responder]
+        unit = self._places[piece.responder]
         self._bar(unit)
         if isinstance(piece, Assignment):
             self._mask[1 + piece.task * self._units :][: self._units] = 0
@@ -258,7 +262,8 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
 
     def _look(self) -> None:
         """Find the responders of the situation among the units, and the actions that there are."""
-        self._pieces, situation = [], self.situation
+        self._pieces = []
+        situation = self.situation
         self._mask = np.zeros(self._moves + self._units * self._stations, dtype=np.int8)
         self._mask[DONE] = 1
         self._places: list[int] = []
@@ -325,7 +330,8 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         return seen, {"action_mask": seen["action_mask"]}
 
     def _show(self, seen: Observations, situation: Situation) -> None:
-        now, tasks = situation.now, situation.tasks[: self._tasks]
+        now = situation.now
+        tasks = situation.tasks[: self._tasks]
         for row, task in enumerate(tasks):
             seen["tasks"][row] = (
                 *(task.kind == kind for kind in EVENT_KINDS),
@@ -356,7 +362,9 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
 
     def _reward(self) -> float:
         """Minus the minutes that events have waited since this was asked last."""
-        shift, since, waited = self._running(), self._since, 0.0
+        shift = self._running()
+        since = self._since
+        waited = 0.0
         now = self._since = shift.now
         going_on = []
         for event in [*self._waiting, *shift.new_events()]:
@@ -385,11 +393,13 @@ def play(env: gymnasium.Env[Observations, int], policy: Policy, seed: int) -> In
     """
     inner = cast("DispatchEnv", env.unwrapped)
     _, info = env.reset(seed=seed)
-    total, over = 0.0, inner.situation is None
+    total = 0.0
+    over = inner.situation is None
     while not over:
         assert inner.situation is not None
         advice = policy.advise(inner.situation, inner.policy_rng)
-        asked, actions = inner.situation, inner.actions_of(advice)
+        asked = inner.situation
+        actions = inner.actions_of(advice)
         for action in actions:
             if over or inner.situation is not asked:
                 break  # nothing was left to decide

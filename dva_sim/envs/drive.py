@@ -70,8 +70,10 @@ class DriveEnv(gymnasium.Env[Vector, Vector]):
     ) -> None:
         if not 0.0 < dt <= 10.0:
             raise ConfigError(f"dt is {dt} s; should be above 0, up to 10")
-        self.scenario, self.dt = scenario_of(scenario, changes, Scenario, "full"), dt
-        low, high = np.array([0, -1], np.float32), np.array([1, 1], np.float32)
+        self.scenario = scenario_of(scenario, changes, Scenario, "full")
+        self.dt = dt
+        low = np.array([0, -1], np.float32)
+        high = np.array([1, 1], np.float32)
         self.action_space = cast("spaces.Space[Vector]", spaces.Box(low, high))
         box = spaces.Box(-MOST, MOST, (len(COLUMNS),), np.float32)
         self.observation_space = cast("spaces.Space[Vector]", box)
@@ -105,7 +107,8 @@ class DriveEnv(gymnasium.Env[Vector, Vector]):
             raise RuntimeError("no drive has begun: call reset first")
         self._asked = _shares(action)
         outcome = drive.step(*self._asked, self.dt)
-        before, seen = self._left, self._seen()
+        before = self._left
+        seen = self._seen()
         reward = (before - self._left) / drive.limits[0] - self.dt
         cut = not outcome and drive.now >= self.scenario.horizon_s
         return seen, reward, bool(outcome), cut, {"outcome": outcome, "time_s": drive.now}

@@ -83,7 +83,8 @@ def assumptions_in(model: type[BaseModel], above: str = "", depth: int = 4) -> I
         for note in (note for note in info.metadata if isinstance(note, Assumed)):
             default = info.get_default(call_default_factory=True)
             whole = isinstance(default, int)
-            value, is_trait = getattr(default, "median", default), hasattr(default, "median")
+            value = getattr(default, "median", default)
+            is_trait = hasattr(default, "median")
             own = f"{key}.median" if is_trait and depth > 1 else key
             yield Assumption(own, float(value), note.low, note.high, note.why, whole)
 

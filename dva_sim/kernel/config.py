@@ -18,6 +18,7 @@ from pydantic_core import CoreSchema
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.quantities import as_number
+from dva_sim.kernel.retired import use_now
 from dva_sim.kernel.suggestions import either, guess, listed, plain_name, unknown
 from dva_sim.kernel.yaml_files import KeyPath
 
@@ -55,25 +56,17 @@ class Key:
         title: Name as a factor of a study.
         stated: In the table of what was the same for all that is compared: whether it is there,
             or the words for it there.
-        zero: Name of what is absent at a level of zero: `delay` gives `without delay`; True if it
-            equals the title.
         inner: Names of keys below it that depend on this place.
     """
 
     title: str = ""
     stated: bool | str = True
-    zero: bool | str = False
     inner: Mapping[str, Key] = field(default_factory=dict)
 
     @property
     def condition(self) -> str:
         """Its words in a table of conditions; empty if it has no place there."""
         return self.stated if isinstance(self.stated, str) else self.title if self.stated else ""
-
-    @property
-    def absent(self) -> str:
-        """Name of what is absent at a level of zero; empty if the key has none."""
-        return self.zero if isinstance(self.zero, str) else self.title if self.zero else ""
 
 
 def titled_keys(model: Any) -> dict[str, Key]:
@@ -103,7 +96,8 @@ def meant(path: KeyPath, value: Any, *models: Any) -> str:
 
 def keys_meant(path: KeyPath, value: Any, *models: Any) -> list[str]:
     """Return the keys that an unknown key may mean, for the same arguments as `meant`."""
-    given, here = str(path[-1]), fields_at(models[0], path[:-1])
+    given = str(path[-1])
+    here = fields_at(models[0], path[:-1])
     known = {} if isinstance(value, Mapping) else _every_name(models)
     exact = [key for name, key in known.items() if plain_name(name) == plain_name(_dotted(path))]
     if exact:
@@ -168,7 +162,8 @@ def _dotted(path: KeyPath) -> str:
 
 def _ask(given: str, keys: list[str]) -> str:
     """The keys that may be meant, with their unit where another one was given."""
-    unit, other = keys[0].rpartition("_")[2], given.rpartition("_")[2]
+    unit = keys[0].rpartition("_")[2]
+    other = given.rpartition("_")[2]
     text = f" (in {_UNITS[unit]})" if unit in _UNITS and other != unit else ""
     return f"did you mean {either(map(repr, keys))}?{text}"
 
@@ -231,8 +226,20 @@ def first_mistake(
         found: The errors of pydantic, at least one.
     """
     paths = [_path(e, data) for e in found]
+    if found[0]["type"] == "missing" and isinstance(paths[0][-1], str):
+        beside = [
+            _dotted(path)
+            for each, path in zip(found, paths, strict=True)
+            if each["type"] == "missing" and each["loc"][:-1] == found[0]["loc"][:-1]
+        ]
+        return _missing(beside), paths[0]
     reports = [e for e, path in zip(found, paths, strict=True) if path == paths[0]]
     return _explain(model, reports, paths[0]), paths[0]
+
+
+def _missing(keys: Sequence[str]) -> str:
+    *others, last = map(repr, keys)
+    return f"missing keys {', '.join(others)} and {last}" if others else f"missing key {last}"
 
 
 def _path(problem: Any, data: Mapping[str, Any]) -> KeyPath:
@@ -259,9 +266,12 @@ def _is_tag(part: str | int, data: Any, loc: Sequence[str | int]) -> bool:
 
 def _explain(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> str:
     """One mistake in words, from all that was found at its place: one for each kind allowed."""
-    key, first = _dotted(path), problems[0]
+    key = _dotted(path)
+    first = problems[0]
     if first["type"] == "extra_forbidden":
         hint = meant(path, first["input"], model)
+        if instead := use_now("key", key):
+            return instead
         return f"unknown key {key!r}; {hint}" if hint else f"unknown key {key!r}"
     if first["type"] == "union_tag_not_found":
         return f"missing key '{key}.{_tag(first)}'"
@@ -269,10 +279,8 @@ def _explain(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> 
         tag = first["ctx"]["tag"]
         return f"{key}: {unknown(_tag(first), tag, _quoted(first['ctx']['expected_tags']))}"
     if first["type"] == "missing":
-        item = path[-1]
-        if isinstance(item, int):
-            return f"{key.removesuffix(f'.{item}')}: should have at least {item + 1} items"
-        return f"missing key {key!r}"
+        *_, item = path
+        return f"{key.removesuffix(f'.{item}')}: should have at least {int(item) + 1} items"
     message = _in_words(problems)
     if first["type"] in _BOUNDS:
         message += _measure(fields_at(model, path[:-1]).get(str(path[-1])), str(path[-1]), first)
@@ -305,7 +313,8 @@ def _given(problem: Any, message: str) -> str:
 
 def _instead(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> str:
     """Suggest what to write instead, where that can be guessed."""
-    given, kinds = problems[0]["input"], {problem["type"] for problem in problems}
+    given = problems[0]["input"]
+    kinds = {problem["type"] for problem in problems}
     if isinstance(given, str) and "float_type" in kinds:
         number = as_number(str(path[-1]) if path else "", given)
         return f"; write {number}" if number else ""

@@ -122,7 +122,8 @@ def set_key(data: dict[str, Any], key: str, value: Any) -> None:
         ConfigError: a part of the key names something that is not there, or holds no keys.
     """
     node: Any = data
-    above, names = "", key.split(".")
+    above = ""
+    names = key.split(".")
     for depth, name in enumerate(names, 1):
         place: Any = _place_in(node, name, above, key)
         if depth == len(names):

@@ -18,7 +18,7 @@ from typing import Any, Final, Generic, TypeVar
 
 from dva_sim.kernel import resources
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.moved import name_now
+from dva_sim.kernel.retired import import_now
 from dva_sim.kernel.suggestions import hint, unknown
 
 T = TypeVar("T")
@@ -87,7 +87,9 @@ class Plugins(Generic[T]):
         Raises:
             ConfigError: as `find`; a bad option is reported when it is made, as by `make`.
         """
-        factory, own, word = self.find(name, base), dict(options or {}), word_of(name)
+        factory = self.find(name, base)
+        own = dict(options or {})
+        word = word_of(name)
         finish = None if factory in self.shipped.values() else self.finish
 
         def made(*given: Any) -> T:
@@ -262,8 +264,7 @@ def word_of(name: object) -> str:
 def error_text(error: BaseException) -> str:
     """An error in one line."""
     text = " ".join(str(error).split())
-    now = name_now(error.name) if isinstance(error, ModuleNotFoundError) else ""
-    return f"{type(error).__name__}: {text}{now}" if text else type(error).__name__
+    return f"{type(error).__name__}: {text}{import_now(error)}" if text else type(error).__name__
 
 
 def _run(path: Path, kind: str) -> ModuleType:

@@ -34,7 +34,8 @@ def as_number(key: str, text: str) -> str:
     found = _QUANTITY.fullmatch(text.strip())
     if found is None:
         return ""
-    value, unit = float(found[1].replace(",", ".")), found[2].casefold()
+    value = float(found[1].replace(",", "."))
+    unit = found[2].casefold()
     ending = key.rpartition("_")[2]
     factors = _UNITS.get(ending, _UNITS[""]) if "_" in key else _UNITS[""]
     factor = 1.0 if not unit else factors.get(unit)

@@ -96,7 +96,8 @@ def find(
 def _missing(name: str, folder: str, known: list[str], is_asked: bool) -> str:
     """Describe a missing file: what else has its name, what was meant, or what there is."""
     kind = KINDS.get(folder, FolderKind(Path(folder).name.removesuffix("s"))).word
-    path, others = Path(name), {where: k for where, k in KINDS.items() if where != folder}
+    path = Path(name)
+    others = {where: k for where, k in KINDS.items() if where != folder}
     if name and _is_there(path.is_dir):
         if is_file(path / _RESULTS):
             return f"{name!r} is a results folder, not a {kind}; try: dva-sim show {path}"

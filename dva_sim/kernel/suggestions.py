@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 from typing import Final
 
+from dva_sim.kernel.retired import use_now
 from dva_sim.kernel.wording import listing
 
 _LETTERS: Final = 3  # at least, for the beginning of a name to tell which is meant
@@ -19,7 +20,8 @@ def guess(given: str, known: Iterable[str]) -> str | None:
     A good guess differs by few slips, has the name as half of it or more, or is the only one that
     begins with it.
     """
-    wanted, names = plain_name(given), list(known)
+    wanted = plain_name(given)
+    names = list(known)
     if not wanted:
         return None
     slips = {name: _slips(wanted, plain_name(name)) for name in names}
@@ -46,9 +48,12 @@ def _slips(one: str, other: str) -> int:
     """Letters left out, put in, changed, or exchanged with the next; many for another number."""
     if abs(len(one) - len(other)) > len(one) // _A_SLIP + 1 or _is_numbered(one, other):
         return len(one) + len(other)
-    before, row = list[int](), list(range(len(other) + 1))
+    before = list[int]()
+    row = list(range(len(other) + 1))
     for i, a in enumerate(one, 1):
-        above, before, row = before, row, [i]
+        above = before
+        before = row
+        row = [i]
         for j, b in enumerate(other, 1):
             least = min(before[j] + 1, row[j - 1] + 1, before[j - 1] + (a != b))
             if i > 1 and j > 1 and (a, one[i - 2]) == (other[j - 2], b):
@@ -71,8 +76,12 @@ def hint(given: str, known: Iterable[str], there: str = "known") -> str:
 
 
 def unknown(what: str, given: object, known: Iterable[str], there: str = "known") -> str:
-    """Say that a name is unknown, and suggest the closest one or list the known ones."""
-    return f"{what} {given!r} is unknown; {hint(str(given), known, there)}"
+    """Say that a name is unknown, and suggest the closest one or list the known ones.
+
+    Of a retired name, say what to use instead.
+    """
+    instead = use_now(what, str(given))
+    return instead or f"{what} {given!r} is unknown; {hint(str(given), known, there)}"
 
 
 def listed(names: Iterable[object], most: int = _LISTED) -> str:

@@ -121,7 +121,8 @@ def read_table(path: str) -> CsvTable:
     head = next((line for line in text.split("\n") if line.strip()), "")
     delimiter = max(",;\t", key=head.count)
     reader = csv.reader(text.split("\n"), delimiter=delimiter)
-    rows, line = list[tuple[int, list[str]]](), 1
+    rows = list[tuple[int, list[str]]]()
+    line = 1
     try:
         for row in reader:
             if any(cell.strip() for cell in row):

@@ -25,6 +25,11 @@ def number(value: float) -> str:
     return text.replace("-", "\N{MINUS SIGN}") if float(text) else "0"
 
 
+def as_number(text: str) -> float:
+    """Read what `number` has printed; nan for its dash."""
+    return float(text.replace("\N{MINUS SIGN}", "-").replace("–", "nan"))
+
+
 def capital(text: str) -> str:
     """A capital letter first, unless that is of a name such as `min_eta`; others as they are."""
     return text if "_" in text.partition(" ")[0] else text[:1].upper() + text[1:]

@@ -7,8 +7,9 @@ import sys
 from pathlib import Path
 
 from dva_sim.kernel.errors import DvaSimError, error_line
-from dva_sim.live.options import PATHS, LiveOptions
+from dva_sim.live.options import PATHS
 from dva_sim.live.process import run_part
+from dva_sim.options.runs import LiveOptions
 from dva_sim.serving.open_port import OpenPort
 from dva_sim.serving.pipes import PipeEnd
 
@@ -17,8 +18,6 @@ def main(argument: str) -> int:
     """Run the part that the supervisor asks for; its exit code."""
     arguments = json.loads(argument)
     options = arguments["options"]
-    for key in ("changes", "transport"):
-        options[key] = tuple(options[key])
     for key in PATHS:
         options[key] = None if options[key] is None else Path(options[key])
     reports = PipeEnd(sys.stdout.fileno())  # a supervisor that does not read must not stop robots

@@ -36,7 +36,8 @@ from dva_sim.simulation.scenario import Scenario
 LAYOUT: Final = Path(channels.__file__).with_name("foxglove_layout.json")  # panels of a run
 PROGRAMS: Final = "https://app.foxglove.dev", "file://"  # Foxglove in a browser, and its program
 MOST_REQUEST: Final = 100_000  # design: of a viewer [B]
-MOST_CONNECTIONS, MOST_VIEWERS = 64, 16
+MOST_CONNECTIONS = 64
+MOST_VIEWERS = 16
 PING: Final = 2.0  # design: between two pings [s]
 PONG_WITHIN: Final = 3.0  # design: then a viewer is cut [s]
 ENDS_WITHIN: Final = 5.0  # design: [s]
@@ -63,15 +64,21 @@ class FoxgloveServer:
     """
 
     def __init__(self, scenario: Scenario, seed: int, port: OpenPort) -> None:
-        self._port, self._running = port, RunningChannels(scenario, seed)
-        self._lock, self._is_over = threading.Lock(), threading.Event()
+        self._port = port
+        self._running = RunningChannels(scenario, seed)
+        self._lock = threading.Lock()
+        self._is_over = threading.Event()
         self._channels: dict[str, ViewedChannel] = {}
         self._by_number: dict[int, ViewedChannel] = {}
         self._viewers: set[FoxgloveViewer] = set()
-        self._session, self._announced = secrets.token_hex(8), 0
+        self._session = secrets.token_hex(8)
+        self._announced = 0
         self._read_by: dict[str, threading.Thread] = {}
-        self.camera_base, self.camera_token, self.failures = "", "", 0
-        self._loop, self._ended = asyncio.new_event_loop(), asyncio.Event()
+        self.camera_base = ""
+        self.camera_token = ""
+        self.failures = 0
+        self._loop = asyncio.new_event_loop()
+        self._ended = asyncio.Event()
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
         threading.Thread(target=self._look_at_cameras, daemon=True).start()
@@ -147,7 +154,8 @@ class FoxgloveServer:
     def keep(self, lines: bytes) -> None:
         """Take whole lines of the run's parts; any thread may."""
         with self._lock:
-            before, messages = self._running.now, []
+            before = self._running.now
+            messages = []
             for line in lines.splitlines():
                 # These lines are judged by the safety rules as well, by the thread that calls.
                 try:
@@ -229,7 +237,8 @@ def _head(stream: Any) -> tuple[int, float]:
     Raises:
         ValueError: there is none, or it is too large.
     """
-    length, captured = 0, 0.0
+    length = 0
+    captured = 0.0
     while line := stream.readline(1000):
         name, _, value = line.strip().lower().partition(b": ")
         if name == b"content-length":

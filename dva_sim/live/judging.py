@@ -24,7 +24,10 @@ from dva_sim.simulation.full.verdicts import Judge, Verdict
 
 WAITS = 10.0  # for the lines of a part that is silent or behind [s]
 # First words of the lines that count.
-HERE, SEEN, SENT_LINE, FRAME = "here", "seen", "sent", "frame"
+HERE = "here"
+SEEN = "seen"
+SENT_LINE = "sent"
+FRAME = "frame"
 JUDGED: Final = HERE, SEEN, SENT_LINE, FRAME
 _STARTS: Final = tuple(f'["{word}"'.encode() for word in JUDGED)
 
@@ -80,10 +83,13 @@ class LiveJudge:
     """
 
     def __init__(self, terms: SafetyTerms) -> None:
-        self._judge, self._facts = Judge(terms), Facts()
+        self._judge = Judge(terms)
+        self._facts = Facts()
         self._waiting: list[tuple[float, int, Line]] = []
         self._heard: dict[int, float] = {}  # up to when each part that goes on has told [s]
-        self._count, self._latest, self._up_to = 0, 0.0, 0.0
+        self._count = 0
+        self._latest = 0.0
+        self._up_to = 0.0
         self._is_judging = False
         self._lock = threading.Lock()
 
@@ -104,7 +110,8 @@ class LiveJudge:
         time = float(line[1])
         self._facts.note(line)
         self._heard[part] = max(self._heard[part], time)
-        self._latest, self._count = max(self._latest, time), self._count + 1
+        self._latest = max(self._latest, time)
+        self._count += 1
         heapq.heappush(self._waiting, (time, self._count, line))
 
     def leaves(self, part: int) -> None:
@@ -125,7 +132,8 @@ class LiveJudge:
     def news(self) -> list[Moment]:
         """Return what was found since the last call, for the timeline; of each rule the first."""
         with self._lock:
-            found, self._judge.recorder.timeline = self._judge.recorder.timeline, []
+            found = self._judge.recorder.timeline
+            self._judge.recorder.timeline = []
             return found
 
     def verdicts(self) -> list[Verdict]:

@@ -23,7 +23,8 @@ def check_room_for(devices: int) -> None:
     Raises:
         DvaSimError: how many files may be open, and how many it takes.
     """
-    usable, wanted = _usable(), APART + devices * PER_DEVICE
+    usable = _usable()
+    wanted = APART + devices * PER_DEVICE
     if usable < wanted:
         raise DvaSimError(
             f"a process may open {usable} files here, and {devices} devices take {wanted}; "

@@ -26,10 +26,11 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either
 from dva_sim.live.open_files import devices_that_fit
-from dva_sim.live.options import PARTS, ROSBRIDGE, LiveOptions, trace_of
+from dva_sim.live.options import ROSBRIDGE, trace_of
 from dva_sim.live.recording import LiveRecorder, TraceFile, TraceLines, event_facts
 from dva_sim.network.messaging import Transport
 from dva_sim.network.realtime import LiveClock
+from dva_sim.options.runs import PARTS, LiveOptions
 from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.ros.gateway import RosGateway
 from dva_sim.ros.server import RosbridgeServer
@@ -126,7 +127,8 @@ class DvaPart:
 
     def _observe(self, recorder: LiveRecorder, stage: Stage) -> None:
         """Let the recorder have what is decided, and what the book shows, twice a second."""
-        agent, clock = self._agent, stage.clock
+        agent = self._agent
+        clock = stage.clock
         agent.on_fact = lambda fact: recorder.put("fact", fact.row())
         page = partial(page_of, agent)
         log = FactLog(recorder.observe, (), lambda _: STATIONARY, page, keeps_sent=False)
@@ -146,7 +148,8 @@ class DvaPart:
         return [self._row(i, known[i], rate) for i, rate in self._beats.items()]
 
     def _row(self, id_tag: str, entry: DeviceEntry, beats: Rate) -> Row:
-        now, engaged = self._stage.clock.now, self._agent.core.orders.engaged
+        now = self._stage.clock.now
+        engaged = self._agent.core.orders.engaged
         return {
             "label": entry.device.label,
             "type": entry.device.device_type,
@@ -212,7 +215,9 @@ class WorldPart:
         log = FactLog(
             recorder.observe, robots, lambda robot: motion_of(robots[robot]), keeps_sent=False
         )
-        recorder.log, recorder.on_accepted, recorder.on_hand = log, log.accepted, log.by_hand
+        recorder.log = log
+        recorder.on_accepted = log.accepted
+        recorder.on_hand = log.by_hand
         clock = self._stage.clock
         clock.every(FILM_PERIOD, partial(self._sample, recorder, log))
         clock.every(WATCH_PERIOD, lambda: log.places(clock.now, self._field.places()))
@@ -226,7 +231,8 @@ class WorldPart:
             stage.recorder.put("cameras", service.base)
 
     def _sample(self, recorder: LiveRecorder, log: FactLog) -> None:
-        now, field = self._stage.clock.now, self._field
+        now = self._stage.clock.now
+        field = self._field
         places = [(name, *point[1:]) for name, point in field.whereabouts(now)]
         recorder.put("at", now, places)
         log.moves(now, {name: motion_of(robot) for name, robot in field.robots.items()})
@@ -251,7 +257,8 @@ class WorldPart:
         return robots + guards
 
     def _robot_row(self, robot: RobotAgent, now: float) -> Row:
-        pose, label = robot.body.pose(), robot.device.label
+        pose = robot.body.pose()
+        label = robot.device.label
         rate = self._commands.setdefault(label, Rate()).of(robot.applied, now)
         return {
             "label": label,
@@ -287,7 +294,8 @@ class OperatorPart:
     """One operator: a simulated person, or one who follows a script."""
 
     def __init__(self, stage: Stage, options: LiveOptions, number: int) -> None:
-        self._stage, self._sent = stage, Rate()
+        self._stage = stage
+        self._sent = Rate()
         if options.operators == "scripted":
             self._agent: OperatorAgent | ScriptedOperator = ScriptedOperator(
                 stage.device("operator", number), drill
@@ -298,7 +306,8 @@ class OperatorPart:
 
     def rows(self) -> list[Row]:
         """See `LivePart`: what the operator does, and how the phone finds the link."""
-        now, agent = self._stage.clock.now, self._agent
+        now = self._stage.clock.now
+        agent = self._agent
         row: Row = {"label": agent.device.label, "doing": agent.activity}
         sent = agent.asked if isinstance(agent, ScriptedOperator) else self._commands_sent()
         row["commands_hz"] = self._sent.of(sent, now)
@@ -335,7 +344,10 @@ class RosbridgePart:
         self._gateway = RosGateway(stage)
         recorder = stage.recorder
         self._server = RosbridgeServer(
-            *(clock, door, self._gateway, stage.site),
+            clock,
+            port=door,
+            gateway=self._gateway,
+            site=stage.site,
             tell=lambda what: recorder.tell(clock.now, ROSBRIDGE, what, "link"),
         )
 

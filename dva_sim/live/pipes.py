@@ -28,7 +28,8 @@ class Inlets:
         judge: LiveJudge | None = None,
         also: Callable[[bytes], object] | None = None,
     ) -> None:
-        self._takers, self._also = (keep, judge), also
+        self._takers = (keep, judge)
+        self._also = also
         self._threads: list[threading.Thread] = []
 
     def inlet(self) -> int:
@@ -46,7 +47,8 @@ class Inlets:
 
     def _take(self, number: int, reads: int) -> None:
         """Take whole lines until the part has ended, however it did."""
-        rest, (keep, judge) = b"", self._takers
+        rest = b""
+        (keep, judge) = self._takers
         while data := os.read(reads, 1 << 18):
             whole, _, rest = (rest + data).rpartition(b"\n")
             if whole and keep is not None:

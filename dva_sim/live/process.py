@@ -4,30 +4,28 @@ from __future__ import annotations
 
 import gc
 import math
-import signal
-import socket
 import sys
 import time
-from collections.abc import Callable
-from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 from dva_sim.agents.observation import OVER_ZMQ, Cameras, topic_in
 from dva_sim.cameras.screens import topic_of
 from dva_sim.cameras.service import CameraService
 from dva_sim.kernel.errors import DvaSimError, RunsFailed
-from dva_sim.live.options import CAMERA_PORT, LiveOptions
+from dva_sim.live.options import CAMERA_PORT, scenario_of
 from dva_sim.live.parts import DvaPart, LivePart, WorldPart, make_part
 from dva_sim.live.recording import LiveRecorder, RunKeeping
-from dva_sim.network.carriers import free_port
 from dva_sim.network.keys import KeyRing
-from dva_sim.network.mqtt import open_broker
 from dva_sim.network.real_network import RealNetwork
 from dva_sim.network.realtime import LiveClock
-from dva_sim.network.sockets import split_address
+from dva_sim.network.sockets import SocketNetwork, split_address
+from dva_sim.options.runs import LiveOptions
 from dva_sim.serving.open_port import OpenPort
 from dva_sim.serving.pipes import PipeEnd
+from dva_sim.serving.signals import caught_signals
 from dva_sim.simulation.full.stage import DVA, Stage, id_of, team_of
 from dva_sim.simulation.full.verdicts import Verdict
 
@@ -79,7 +77,7 @@ def run_part(
     outlet: int | None = None,
     door: OpenPort | None = None,
 ) -> list[Verdict]:
-    """Be one part until the end of the run, Ctrl-C, SIGTERM, or the end of standard input.
+    """Be one part until the end of the run, Ctrl-C, SIGTERM, SIGHUP, or the end of standard input.
 
     One that is alone gives up if it has heard of nobody for `PATIENCE`. A DVA that is alone serves
     others, and lasts until it is ended, or for as long as the options say.
@@ -104,7 +102,7 @@ def run_part(
         NetworkError: a port is taken.
         NobodyThere: this part stayed alone.
     """
-    alone = RunKeeping(options, options.read()) if outlet is None else None
+    alone = RunKeeping(options, scenario_of(options)) if outlet is None else None
     out = PipeEnd(alone.inlet() if alone is not None else outlet or 0)
     try:
         _run_part(
@@ -135,7 +133,7 @@ def _run_part(
     out: PipeEnd,
     door: OpenPort | None,
 ) -> None:
-    scenario = options.read()
+    scenario = scenario_of(options)
     ring = None if options.keys is None else KeyRing(options.keys)
     clock = LiveClock(epoch)
     recorder = LiveRecorder(clock, out, keeps=options.records_run or options.shows_run)
@@ -143,15 +141,8 @@ def _run_part(
     def tell(line: str) -> None:
         recorder.tell(clock.now, name, line, "link")
 
-    carrier, broker = options.carrier, options.dva or ""
     with ExitStack() as at_end:
-        if carrier.is_mqtt:
-            broker = broker or f"{options.host}:{options.port or free_port(options.host)}"
-            options = replace(options, dva=broker)
-            if name == carrier.ends[0]:
-                at_end.callback(open_broker(*split_address(broker)).close)
-        tells_loss = not supervised or name == carrier.ends[1]  # one line is enough
-        network = carrier.open(clock, ring, tell, scenario.zeromq, broker, tells_loss)
+        network = SocketNetwork(clock, ring, tell, scenario.zeromq)
         at_end.callback(network.close)
         team = frozenset(team_of(scenario))
         recorder.team = team
@@ -166,7 +157,12 @@ def _run_part(
         url = OVER_ZMQ.url if service is None else service.url
         cameras = Cameras(url, lambda url: topic_in(url) or topic_of(url))
         stage = Stage(
-            *(scenario, options.seed, network, recorder, joining, _time_of_day(clock)),
+            scenario,
+            seed=options.seed,
+            network=network,
+            recorder=recorder,
+            address=joining,
+            time_of_day=_time_of_day(clock),
             cameras=cameras,
             attended=True,
         )
@@ -195,7 +191,7 @@ def _run_part(
 
 
 def _refuse_to_be_alone(
-    name: str, part: LivePart, dva: str | None, waited: float, ending: ending_when_asked
+    name: str, part: LivePart, dva: str | None, waited: float, ending: EndRequest
 ) -> None:
     if ending.is_asked or part.has_company():
         return
@@ -221,7 +217,8 @@ def _joining(network: RealNetwork, options: LiveOptions, name: str) -> Callable[
 
     def join(kind: str, number: int) -> str:
         nonlocal given
-        host, port = options.host, given
+        host = options.host
+        port = given
         if name == "dva" and options.dva is not None:
             host, port = split_address(options.dva)
         elif given:
@@ -237,16 +234,21 @@ class _Reporter:
     def __init__(
         self, name: str, number: int, stage: Stage, part: LivePart, network: RealNetwork
     ) -> None:
-        self._name, self._number, self._stage = name, number, stage
-        self._part, self._network = part, network
+        self._name = name
+        self._number = number
+        self._stage = stage
+        self._part = part
+        self._network = network
 
     def report(self) -> Report:
         """Return the present report."""
-        recorder, part = self._stage.recorder, self._part
+        recorder = self._stage.recorder
+        part = self._part
         if isinstance(recorder, LiveRecorder):
             part.keep(recorder)
             recorder.is_alive()
-        story, recorder.timeline = recorder.timeline, []
+        story = recorder.timeline
+        recorder.timeline = []
         clock = self._network.clock
         return Report(
             part=self._name,
@@ -262,40 +264,41 @@ class _Reporter:
         )
 
 
-class ending_when_asked:  # noqa: N801 - reads as a statement
-    """Stop the clock on SIGINT, SIGTERM, or the end of standard input.
+@dataclass
+class EndRequest:
+    """A request for the end of a program.
 
-    A signal interrupts no poll by itself; it writes to a socket that the poller watches.
+    Attributes:
+        is_asked: True once a signal, or the end of standard input, has asked for it.
     """
 
-    def __init__(self, clock: LiveClock, supervised: bool) -> None:
-        self._clock, self._supervised = clock, supervised
-        self.is_asked = False
-        self._reader, self._writer = socket.socketpair()
+    is_asked: bool = False
 
-    def __enter__(self) -> ending_when_asked:
-        self._writer.setblocking(False)
-        self._before = signal.set_wakeup_fd(self._writer.fileno())
-        self._handlers = {
-            number: signal.signal(number, lambda *_: None)
-            for number in (signal.SIGINT, signal.SIGTERM)
-        }
-        self._clock.watch(self._reader.fileno(), self._stop)
-        if self._supervised:
-            self._clock.watch(sys.stdin.fileno(), self._stop)
-        return self
 
-    def _stop(self) -> None:
-        self.is_asked = True
-        self._clock.unwatch(self._reader.fileno())
-        if self._supervised:
-            self._clock.unwatch(sys.stdin.fileno())
-        self._clock.stop()
+@contextmanager
+def ending_when_asked(clock: LiveClock, supervised: bool) -> Iterator[EndRequest]:
+    """Stop the clock on SIGINT, SIGTERM, SIGHUP, or the end of standard input.
 
-    def __exit__(self, *_: object) -> None:
-        self._clock.unwatch(self._reader.fileno())
-        signal.set_wakeup_fd(self._before)
-        for number, handler in self._handlers.items():
-            signal.signal(number, handler)
-        self._reader.close()
-        self._writer.close()
+    Args:
+        clock: Clock of what runs.
+        supervised: True to end when standard input does.
+    """
+    ending = EndRequest()
+
+    def stop() -> None:
+        ending.is_asked = True
+        unwatch()
+        clock.stop()
+
+    def unwatch() -> None:
+        for number in watched:
+            clock.unwatch(number)
+
+    with caught_signals() as signals:
+        watched = [signals.fileno(), *([sys.stdin.fileno()] if supervised else [])]
+        for number in watched:
+            clock.watch(number, stop)
+        try:
+            yield ending
+        finally:
+            unwatch()

@@ -140,8 +140,10 @@ class RunLines:
         self.recorder = Recorder(keep_traffic=True)
         self.traces: dict[str, list[tuple[float, str]]] = defaultdict(list)
         self.audit: list[tuple[float, dict[str, Any]]] = []
-        self.duration, self.radii = 0.0, dict[str, float]()
-        self._labels, self._contained = {DVA: "dva"}, dict[int, float]()
+        self.duration = 0.0
+        self.radii = dict[str, float]()
+        self._labels = {DVA: "dva"}
+        self._contained = dict[int, float]()
         self._events: dict[int, Event] = {}
         self._facts: list[Fact] = []
         self._drives: dict[tuple[str, int], DriveLog] = {}
@@ -163,8 +165,10 @@ class RunLines:
 
     def playback(self) -> Playback:
         """Return the run for telling and drawing."""
-        scenario, seed = Scenario.model_validate(self.start["scenario"]), self.start["seed"]
-        site, recorder = site_of(scenario, seed), self.recorder
+        scenario = Scenario.model_validate(self.start["scenario"])
+        seed = self.start["seed"]
+        site = site_of(scenario, seed)
+        recorder = self.recorder
         incidents = draw_incidents(scenario.events, site, Streams(seed))
         real = [number for number, incident in enumerate(incidents) if not incident.false_alarm]
         surroundings = Surroundings(site, [incidents[number].hazard for number in real])
@@ -251,7 +255,9 @@ class RunLines:
     def _drive(self, operator: str, number: int, facts: list[Any]) -> None:
         robot, who, event, ordered, started, ended, outcome = facts
         known = self._drives.setdefault((operator, number), DriveLog(robot, who, event, ordered))
-        known.started, known.ended, known.outcome = started, ended, outcome
+        known.started = started
+        known.ended = ended
+        known.outcome = outcome
 
     def _drove(self, operator: str, number: int, seen: Line, made: Line) -> None:
         drive = self._drives[operator, number]

@@ -28,9 +28,9 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.recorder import Moment, Recorder
 from dva_sim.live.judging import FRAME, HERE, JUDGED, SEEN, SENT_LINE, LiveJudge
-from dva_sim.live.options import LiveOptions
 from dva_sim.live.pipes import Inlets
 from dva_sim.live.recorded_lines import FORMAT, MOST_BYTES, RunLines, lines_of_part, make_recording
+from dva_sim.options.runs import LiveOptions
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.recordings.writing import (
@@ -79,7 +79,9 @@ class LiveRecorder(Recorder):
 
     def __init__(self, clock: Clock, outlet: PipeEnd, keeps: bool = True) -> None:
         super().__init__()
-        self._clock, self._outlet, self.keeps = clock, outlet, keeps
+        self._clock = clock
+        self._outlet = outlet
+        self.keeps = keeps
         self.log: FactLog | None = None
         self._filmed = set[str]()
         self._gaps: dict[bool, FactGap] = {}  # not written yet, by whether they are strangers'
@@ -89,7 +91,8 @@ class LiveRecorder(Recorder):
         self._of_strangers = False  # the fact that is observed now
         self._asked: OrderedDict[tuple[str, bytes], None] = OrderedDict()
         self._foreign: set[str] = set()
-        self._second, self._room = 0, BYTES_PER_SECOND
+        self._second = 0
+        self._room = BYTES_PER_SECOND
         self._drawn: dict[int, tuple[int, int]] = {}
         self._facts: dict[str, Any] = {}
 
@@ -109,7 +112,8 @@ class LiveRecorder(Recorder):
 
     def _lose(self, of_strangers: bool) -> None:
         """Note that a fact could not be kept."""
-        now, log = self._clock.now, self.log
+        now = self._clock.now
+        log = self.log
         sees_dva = log is not None and log.sees_dva
         rules = rules_on(log is not None and log.sees_robots, sees_dva, of_strangers)
         before = self._gaps.get(of_strangers, FactGap(now, 0, now, rules))
@@ -129,7 +133,8 @@ class LiveRecorder(Recorder):
     def _left(self) -> int:
         """Return the room that is left in this second [B]."""
         if (second := int(time.monotonic())) != self._second:
-            self._second, self._room = second, BYTES_PER_SECOND
+            self._second = second
+            self._room = BYTES_PER_SECOND
         return self._room
 
     def _put(self, line: Sequence[Any], spare: bool = False) -> bool:
@@ -184,7 +189,8 @@ class LiveRecorder(Recorder):
         ends = _ENDS.search(payload, 0, 400)
         if ends is None:
             return
-        destination, source = ends[1].decode(), ends[2].decode()
+        destination = ends[1].decode()
+        source = ends[2].decode()
         if sent:
             self._note_sent(node, destination, payload)
         else:
@@ -204,7 +210,8 @@ class LiveRecorder(Recorder):
         self._put_as(line, is_fact, to_stranger)
 
     def _note_arrival(self, node: str, source: str, destination: str, payload: bytes) -> None:
-        now, is_stranger = self._clock.now, self._is_stranger(source)
+        now = self._clock.now
+        is_stranger = self._is_stranger(source)
         if self.keeps and self._is_news(source, payload):
             line = SENT_LINE, now, source, destination, payload.decode()
             self._put_as(line, is_fact=False, of_strangers=True)
@@ -282,7 +289,9 @@ class TraceLines:
     """The trace of one who decides, into the recording; after a gap nothing could be replayed."""
 
     def __init__(self, recorder: LiveRecorder, who: str) -> None:
-        self._recorder, self._who, self._whole = recorder, who, True
+        self._recorder = recorder
+        self._who = who
+        self._whole = True
 
     def __call__(self, line: str) -> None:
         """Keep a line, unless one was dropped."""
@@ -374,7 +383,8 @@ class Keeper:
         judge: LiveJudge | None = None,
         also: Callable[[bytes], object] | None = None,
     ) -> None:
-        self._target, self.path = target, target.with_name(target.name + PART)
+        self._target = target
+        self.path = target.with_name(target.name + PART)
         start = {"format": FORMAT, "scenario": scenario.model_dump(mode="json"), "seed": seed}
         start[HELD_TO] = terms_of(scenario, attended=True).about_robots()
         self.problem: str | None = None
@@ -420,7 +430,8 @@ class Keeper:
             lasted = make_recording(lines, self._target)
             self.path.unlink(missing_ok=True)
         except (DvaSimError, OSError) as error:
-            why, left = self.problem or error, ""
+            why = self.problem or error
+            left = ""
             if self.path.exists():
                 left = f"; {self.path} is left; dva-sim replay reads it"
             return f"{self._target} was not recorded: {why}{left}"

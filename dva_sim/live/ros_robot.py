@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import queue
 import re
+import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
+from contextlib import suppress
 from typing import Final
 
 from dva_sim.agents.observation import Cameras
@@ -14,12 +15,12 @@ from dva_sim.cameras.screens import topic_of
 from dva_sim.cameras.service import PictureService
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Recorder
-from dva_sim.live.line_writer import LineWriter
 from dva_sim.live.process import ending_when_asked
 from dva_sim.network.addresses import check_address
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
+from dva_sim.options.runs import RobotOptions
 from dva_sim.ros.profile import DEFAULT, RosProfile, load_ros_profile
 from dva_sim.ros.robot import RosRobot
 from dva_sim.ros.websocket import WebSocketUrl
@@ -27,61 +28,56 @@ from dva_sim.simulation.full.stage import DVA, Stage, id_of
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.simulation.scenario.lone_robot import lone_robot
 
+MOST_WAITING: Final = 1000  # lines; what is more is not told
+LAST_LINES: Final = 0.5  # for what waits when all is over [s]
+
+
+class LineWriter:
+    """Says lines in a thread of its own, in their order.
+
+    Args:
+        say: Called with each line; it may wait, as a terminal does that was told to, and fail.
+    """
+
+    def __init__(self, say: Callable[[str], object]) -> None:
+        self._lines: queue.Queue[str | None] = queue.Queue(MOST_WAITING)
+        self._thread = threading.Thread(target=self._say, args=(say,), daemon=True)
+        self._thread.start()
+
+    def __call__(self, line: str) -> None:
+        """Say a line soon, or never if too many wait."""
+        with suppress(queue.Full):
+            self._lines.put_nowait(line)
+
+    def _say(self, say: Callable[[str], object]) -> None:
+        with suppress(OSError):  # the reader has gone
+            while (line := self._lines.get()) is not None:
+                say(line)
+
+    def close(self) -> None:
+        """Give what waits a moment."""
+        with suppress(queue.Full):
+            self._lines.put_nowait(None)
+            self._thread.join(LAST_LINES)
+
+
 LAST_WORDS: Final = 0.3  # for the last command to stand [s]
 TELL_PERIOD: Final = 0.1  # between two looks at what there is to be told [s]
-NAMESPACE: Final = "robot_1"
 _NAMESPACE = re.compile(r"/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*/?")
 EVERYWHERE: Final = "0.0.0.0", "::"
 
 Say = Callable[[str], object]
 
 
-@dataclass(frozen=True, kw_only=True)
-class RosRobotOptions:
-    """Options of a ROS robot: its name, its bridge, and its DVA.
-
-    Attributes:
-        ros: Address of the rosbridge server, `ws://HOST:PORT`.
-        namespace: Namespace of the robot's topics.
-        profile: Name or path.
-        number: Number of the robot at the DVA, from 1.
-        dva: Address of the DVA, `HOST:PORT`.
-        host: Address of this machine to listen on.
-        listen: Port of its requests; its publications have the next one. 0: any two that are free.
-        keys: Folder with the keys of the devices; None to run without.
-        seed: Random seed.
-        changes: Changes of the scenario, `KEY=VALUE`, such as the messaging pattern.
-    """
-
-    ros: str
-    namespace: str = NAMESPACE
-    profile: str = DEFAULT
-    number: int = 1
-    dva: str = ""
-    host: str = "127.0.0.1"
-    listen: int = 0
-    keys: Path | None = None
-    seed: int = 1
-    changes: tuple[str, ...] = ()
-
-    def scenario(self, profile: RosProfile) -> Scenario:
-        """Return what the robot is to the DVA's devices: site, pattern and limits.
-
-        Raises:
-            ConfigError: there is no such site, or a change makes no sense.
-        """
-        site = profile.site.model_dump(exclude_defaults=True)
-        return lone_robot({"site": site, "robot": {"count": self.number}}, self.changes)
-
-
-def run_ros_robot(options: RosRobotOptions, say: Say) -> None:
+def run_ros_robot(options: RobotOptions, say: Say) -> None:
     """Run the device until Ctrl-C or SIGTERM, then stop the robot.
 
     Raises:
         ConfigError: profile, address, site or keys are not as they should be.
         NetworkError: no port can be had.
     """
-    profile, url = load_ros_profile(options.profile), WebSocketUrl(options.ros, "--ros")
+    profile = load_ros_profile(options.profile or DEFAULT)
+    url = WebSocketUrl(str(options.ros), "--ros")
     if not options.dva:
         raise ConfigError("--ros needs --dva HOST:PORT: the DVA that the robot registers with")
     check_address(options.dva, "--dva ")
@@ -91,9 +87,11 @@ def run_ros_robot(options: RosRobotOptions, say: Say) -> None:
         )
     if not _NAMESPACE.fullmatch(options.namespace):
         raise ConfigError(f"--namespace {options.namespace!r} should be a name, as in robot_1")
-    scenario = options.scenario(profile)
+    scenario = scenario_of(options, profile)
     ring = None if options.keys is None else KeyRing(options.keys)
-    clock, recorder, writer = LiveClock(), Recorder(), LineWriter(say)
+    clock = LiveClock()
+    recorder = Recorder()
+    writer = LineWriter(say)
 
     def tell(line: str) -> None:
         recorder.tell(clock.now, "network", line, "link")
@@ -127,8 +125,18 @@ def run_ros_robot(options: RosRobotOptions, say: Say) -> None:
         network.close()
 
 
+def scenario_of(options: RobotOptions, profile: RosProfile) -> Scenario:
+    """Return what the robot is to the DVA's devices: site, pattern and limits.
+
+    Raises:
+        ConfigError: there is no such site, or a change makes no sense.
+    """
+    site = profile.site.model_dump(exclude_defaults=True)
+    return lone_robot({"site": site, "robot": {"count": options.number}}, options.set)
+
+
 def stage_of(
-    options: RosRobotOptions,
+    options: RobotOptions,
     scenario: Scenario,
     network: SocketNetwork,
     recorder: Recorder,
@@ -145,13 +153,19 @@ def stage_of(
     url = (lambda *_: "") if pictures is None else pictures.url
     cameras = Cameras(url, topic_of)
     return Stage(
-        *(scenario, options.seed, network, recorder, join, (since_midnight, True)),
+        scenario,
+        seed=options.seed,
+        network=network,
+        recorder=recorder,
+        address=join,
+        time_of_day=(since_midnight, True),
         cameras=cameras,
         attended=True,
     )
 
 
 def _say_news(recorder: Recorder, say: Say) -> None:
-    news, recorder.timeline = recorder.timeline, []
+    news = recorder.timeline
+    recorder.timeline = []
     for moment in news:
         say(f"{moment.time:8.1f} s  {moment.who}  {moment.what}")

@@ -39,9 +39,12 @@ class RunningChannels:
         self._frame_bytes = scenario.camera.frame_bytes
         incidents = draw_incidents(scenario.events, self.site, Streams(seed))
         self._real = {n: i for n, i in enumerate(incidents) if not i.false_alarm}
-        self._labels, self._radii = {DVA: "dva"}, dict[str, float]()
-        self._contained, self._looked_at = set[int](), -HAZARD_S
-        self._bodies, self._modes = dict[str, TrackPoint](), dict[str, str]()
+        self._labels = {DVA: "dva"}
+        self._radii = dict[str, float]()
+        self._contained = set[int]()
+        self._looked_at = -HAZARD_S
+        self._bodies = dict[str, TrackPoint]()
+        self._modes = dict[str, str]()
         self._sent: OrderedDict[tuple[str, int], float] = OrderedDict()
         self._drives: dict[tuple[str, int], tuple[str, str]] = {}
         self.now = 0.0

@@ -5,24 +5,27 @@ from __future__ import annotations
 import json
 import os
 import selectors
-import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
-from dva_sim.kernel.errors import ERROR, DvaSimError, ExitCode, RunsFailed
-from dva_sim.live.options import PATHS, ROSBRIDGE, LiveOptions
+from dva_sim.kernel.errors import DvaSimError
+from dva_sim.live.options import PATHS, ROSBRIDGE, changes_of, check
 from dva_sim.live.process import Report
 from dva_sim.live.recording import RunKeeping
-from dva_sim.network.carriers import DEFAULT_PORT, free_port
 from dva_sim.network.emulator.forwarder import FAR, NEAR
 from dva_sim.network.emulator.process import ADDRESSES, LinkEnded, LinkProcess
 from dva_sim.network.emulator.report import LinkReport
+from dva_sim.options.runs import LiveOptions
 from dva_sim.serving.open_port import OpenPort
+from dva_sim.serving.pipes import PipeEnd
+from dva_sim.serving.processes import Child, ChildFailed, end_all
+from dva_sim.serving.signals import caught_signals
 from dva_sim.simulation.full.verdicts import Verdict, broken_rules
 from dva_sim.simulation.scenario import Scenario
 
@@ -30,23 +33,16 @@ if TYPE_CHECKING:
     from dva_sim.live.foxglove_server import FoxgloveServer
 
 SPEAK_WITHIN = 60.0  # for a part to speak, from its start and after each time [s]
-END_WITHIN = 5.0  # for a part to end by itself once it is asked to [s]
 SETTLED_FOR = 3.0  # all parts settled for so long: the run is over [s]
 LOOK = 0.5  # between looks at whether all parts are still there [s]
 
 
-class PartFailed(RunsFailed):
-    """A part ended before it was asked to."""
-
-
 @dataclass
-class _Child:
+class _Part:
     """A part that runs: its process, and what it said last."""
 
-    name: str
-    process: subprocess.Popen[bytes]
-    buffer: bytes = b""
-    errors: bytes = b""
+    child: Child
+    reports: PipeEnd
     latest: Report | None = None
     heard: float = field(default_factory=time.monotonic)
 
@@ -88,8 +84,10 @@ class Supervisor:
         foxglove: FoxgloveServer | None = None,
     ) -> None:
         self._foxglove = foxglove
-        self._options, self._hear, self._rosbridge = options, hear, rosbridge
-        self._children: list[_Child] = []
+        self._options = options
+        self._hear = hear
+        self._rosbridge = rosbridge
+        self._parts: list[_Part] = []
         self._selector = selectors.DefaultSelector()
         self._epoch = time.monotonic()
         self._interrupted = False
@@ -102,10 +100,10 @@ class Supervisor:
         """Start everything, wait for the end, end everything.
 
         Raises:
-            PartFailed: a part could not start, or ended by itself.
+            ChildFailed: a part could not start, or ended by itself.
             ConfigError: the scenario cannot be run live.
         """
-        scenario = self._options.check()
+        scenario = check(self._options)
         keeping = self._keeping = RunKeeping(
             self._options, scenario, None if self._foxglove is None else self._foxglove.keep
         )
@@ -114,41 +112,37 @@ class Supervisor:
         except DvaSimError as error:
             reports = [str(error), keeping.finish() or "", broken_rules(keeping.verdicts())]
             raise type(error)("; ".join(filter(None, reports))) from None
-        latest = {c.name: c.latest for c in self._children if c.latest}
+        latest = {p.child.name: p.latest for p in self._parts if p.latest}
         lost = keeping.finish()
         return Summary(why, latest, lost, keeping.verdicts(), self._packets)
 
     def _run(self, scenario: Scenario) -> str:
         limit = scenario.horizon_s if self._options.duration is None else self._options.duration
-        before = {
-            number: signal.signal(number, self._interrupt)
-            for number in (signal.SIGINT, signal.SIGTERM)
-        }
-        try:
-            if self._options.emulated:
-                self._link = LinkProcess(scenario.link, self._options.seed)
-                self._link.begin()
-            first, dva = self._options.port, self._options.dva
-            if self._options.carrier.is_mqtt:
-                first, dva = 0, dva or self._address_of_broker()
-            self._start("dva", "dva", dva, port=first)
-            address = self._address_of_dva()
-            if address is not None:
-                ports = _ports(first, scenario)
-                self._start("world", "world", address, port=next(ports))
-                for number in range(1, scenario.operator.count + 1):
-                    self._start(f"operator-{number}", "operator", address, number, next(ports))
-                if self._rosbridge is not None:
-                    self._start(ROSBRIDGE, ROSBRIDGE, address)
-            return self._watch(limit)
-        finally:
-            self._end_all()
-            self._end_link()
-            for number, handler in before.items():
-                signal.signal(number, handler)
+        with caught_signals() as signals:
+            self._selector.register(signals, selectors.EVENT_READ)
+            try:
+                self._start_all(scenario)
+                return self._watch(limit)
+            finally:
+                self._end_all()
+                self._end_link()
 
-    def _interrupt(self, *_: object) -> None:
-        self._interrupted = True
+    def _start_all(self, scenario: Scenario) -> None:
+        """Start all parts, each of which needs the address of the one before: the DVA's."""
+        if self._options.link:
+            self._link = LinkProcess(scenario.link, self._options.seed)
+            self._link.begin()
+        first = self._options.port
+        dva = self._options.dva
+        self._start("dva", "dva", dva, port=first)
+        address = self._address_of_dva()
+        if address is not None:
+            ports = _ports(first, scenario)
+            self._start("world", "world", address, port=next(ports))
+            for number in range(1, scenario.operator.count + 1):
+                self._start(f"operator-{number}", "operator", address, number, next(ports))
+            if self._rosbridge is not None:
+                self._start(ROSBRIDGE, ROSBRIDGE, address)
 
     def _start(self, name: str, part: str, dva: str | None, number: int = 1, port: int = 0) -> None:
         """Start a part; it ends when its standard input does, whatever happens to us."""
@@ -157,21 +151,18 @@ class Supervisor:
         door = self._rosbridge.passed() if self._rosbridge and part == ROSBRIDGE else ()
         arguments = self._arguments(part, dva, number, port, outlet, door)
         words = [sys.executable, "-m", "dva_sim.live", arguments]
-        passed = outlet, *door
-        pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+        reads, writes = os.pipe()
+        pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": writes}
+        pipes["pass_fds"] = outlet, *door
         if self._link is None:
-            # In a new session Ctrl-C reaches us alone; we end the parts in good order.
-            process = subprocess.Popen(words, start_new_session=True, pass_fds=passed, **pipes)
+            child = Child(name, words, **pipes)
         else:
-            process = self._link.start(_end_of(part), words, pass_fds=passed, **pipes)
-        for file in (outlet, *door[1:]):
+            child = self._link.start(_end_of(part), words, name, keeps_errors=True, **pipes)
+        for file in (outlet, writes, *door[1:]):
             os.close(file)
-        child = _Child(name, process)
-        self._children.append(child)
-        for stream, take in ((process.stdout, self._take_line), (process.stderr, self._take_error)):
-            assert stream is not None
-            os.set_blocking(stream.fileno(), False)
-            self._selector.register(stream, selectors.EVENT_READ, (child, take))
+        started = _Part(child, PipeEnd(reads))
+        self._parts.append(started)
+        self._selector.register(reads, selectors.EVENT_READ, started)
 
     def _arguments(
         self,
@@ -183,6 +174,7 @@ class Supervisor:
         door: tuple[int, ...],
     ) -> str:
         values = {**vars(self._options), "dva": dva, "port": port}
+        values |= {"set": changes_of(self._options), "link": ()}  # files are read here alone
         values["shows_run"] = self._foxglove is not None
         if self._link is not None:
             values["host"] = ADDRESSES[_end_of(part)]
@@ -197,23 +189,13 @@ class Supervisor:
         }
         return json.dumps(about | {"options": values})
 
-    def _address_of_broker(self) -> str:
-        """Return where the broker of MQTT, and so every device, will be found."""
-        host, port = self._options.host, self._options.port
-        if self._link is not None:
-            return f"{ADDRESSES[self._options.carrier.mqtt.broker]}:{port or DEFAULT_PORT}"
-        return f"{host}:{port or free_port(host)}"
-
     def _address_of_dva(self) -> str | None:
         """Return the DVA's address once it listens; None if the user ends the run before."""
-        deadline = time.monotonic() + SPEAK_WITHIN
         while not self._interrupted:
             self._listen()
-            latest = self._children[0].latest
+            latest = self._parts[0].latest
             if latest is not None and latest.dva is not None:
                 return latest.dva
-            if time.monotonic() > deadline:
-                raise PartFailed(f"the DVA said nothing within {SPEAK_WITHIN:g} s")
         return None
 
     def _watch(self, limit: float) -> str:
@@ -227,10 +209,10 @@ class Supervisor:
 
     def _some_are_done(self) -> bool:
         """Return True if a part has ended normally: its time is up, and so is that of the run."""
-        return any(child.process.poll() == 0 for child in self._children)
+        return any(part.child.poll() == 0 for part in self._parts)
 
     def _all_settled(self) -> bool:
-        reports = [child.latest for child in self._children]
+        reports = [part.latest for part in self._parts]
         if not all(report is not None and report.settled for report in reports):
             self._settled_since = None
             return False
@@ -242,7 +224,7 @@ class Supervisor:
         """Read what the parts say, for a moment at most.
 
         Raises:
-            PartFailed: one of them is gone.
+            ChildFailed: one of them is gone.
             LinkEnded: the emulated link is gone.
             DvaSimError: what one of them was given is not as it should be.
         """
@@ -250,16 +232,12 @@ class Supervisor:
         self._tell_broken_rules()
         if self._link is not None and self._link.has_ended:
             raise self._link.ended()
-        for child in self._children:
-            code = child.process.poll()
-            if code is not None and code != 0 and not self._interrupted:
-                self._read(0.0)
-                errors = child.errors.decode(errors="replace").strip().splitlines()
-                why = errors[-1].removeprefix(ERROR) if errors else f"exit code {code}"
-                kind = DvaSimError if code == ExitCode.MISTAKE else PartFailed
-                raise kind(f"{child.name} has ended by itself: {why}")
-            if code is None and time.monotonic() - child.heard > SPEAK_WITHIN:
-                raise PartFailed(f"{child.name} has said nothing for {SPEAK_WITHIN:g} s")
+        for part in self._parts:
+            code = part.child.poll()
+            if code and not self._interrupted:
+                raise part.child.failure()
+            if code is None and time.monotonic() - part.heard > SPEAK_WITHIN:
+                raise ChildFailed(f"{part.child.name} has said nothing for {SPEAK_WITHIN:g} s")
 
     def _tell_broken_rules(self) -> None:
         """Report the rules that were found broken since the last look."""
@@ -282,45 +260,32 @@ class Supervisor:
                 ),
             )
 
-    def _read(self, wait: float) -> None:
-        for key, _ in self._selector.select(wait):
-            child, take = key.data
-            stream: IO[bytes] = key.fileobj  # type: ignore[assignment]
-            data = stream.read(65_536)
-            if data:
-                take(child, data)
-            elif data == b"":
-                self._selector.unregister(stream)
+    def _read(self, wait: float) -> bool:
+        """Take what is there within a moment [s]; whether there was anything."""
+        ready = self._selector.select(wait)
+        for key, _ in ready:
+            if isinstance(key.fileobj, socket.socket):
+                key.fileobj.recv(64)
+                self._interrupted = True
+            else:
+                self._take_reports(key.data)
+        return bool(ready)
 
-    def _take_line(self, child: _Child, data: bytes) -> None:
-        *lines, child.buffer = (child.buffer + data).split(b"\n")
-        for line in lines:
-            child.latest, child.heard = Report(**json.loads(line)), time.monotonic()
-            self._hear(child.name, child.latest)
-
-    @staticmethod
-    def _take_error(child: _Child, data: bytes) -> None:
-        child.errors = (child.errors + data)[-10_000:]
+    def _take_reports(self, part: _Part) -> None:
+        for line in part.reports.lines():
+            part.latest, part.heard = Report(**line), time.monotonic()
+            self._hear(part.child.name, part.latest)
+        if not part.reports.is_open:
+            self._selector.unregister(part.reports)
 
     def _end_all(self) -> None:
         """Ask all parts to end, operators first, and make sure that they have."""
-        for child in reversed(self._children):
-            if child.process.stdin is not None:
-                with suppress(OSError):
-                    child.process.stdin.close()
-        deadline = time.monotonic() + END_WITHIN
-        while any(c.process.poll() is None for c in self._children):
-            if time.monotonic() > deadline:
-                for child in self._children:
-                    child.process.kill()
-            self._read(0.05)
-        self._read(0.0)
-        for child in self._children:
-            child.process.wait()
-            for stream in (child.process.stdout, child.process.stderr):
-                if stream is not None:
-                    stream.close()
+        end_all([part.child for part in reversed(self._parts)], meanwhile=self._read)
+        while self._read(0.0):
+            pass
         self._selector.close()
+        for part in self._parts:
+            part.reports.close()
 
     def _end_link(self) -> None:
         if self._link is not None:

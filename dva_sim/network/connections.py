@@ -15,7 +15,7 @@ References:
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
@@ -28,7 +28,9 @@ from dva_sim.network.zmtp import HIGH_WATER_MARK, ZmtpConnection, ZmtpOptions
 
 MSS = 1448  # payload of a full Ethernet segment with TCP time stamps [B]
 HEADERS = 52  # IPv4 + TCP with time stamps [B]
-MIN_RTO, FIRST_RTO, MAX_RTO = 0.2, 1.0, 60.0
+MIN_RTO = 0.2
+FIRST_RTO = 1.0
+MAX_RTO = 60.0
 MAX_IN_FLIGHT = 1000  # ZeroMQ's default high-water mark, in messages
 
 Deliver = Callable[[Any], object]
@@ -36,7 +38,8 @@ Deliver = Callable[[Any], object]
 
 def _offer_each(link: Link, now: float, size: int, largest: int, header: int) -> tuple[float, int]:
     """Send packet by packet [B]: when the last that arrives is there [s], and what is lost [B]."""
-    arrival, missing = 0.0, 0
+    arrival = 0.0
+    missing = 0
     while size > 0:
         part = min(size, largest)
         size -= part
@@ -62,7 +65,9 @@ class Stream:
     """
 
     def __init__(self, clock: Clock, forward: Link, backward: Link, deliver: Deliver) -> None:
-        self._clock, self._forward, self._backward = clock, forward, backward
+        self._clock = clock
+        self._forward = forward
+        self._backward = backward
         self.deliver = deliver
         self._next_seq = self._next_delivered = 0
         self._waiting: dict[int, Any] = {}
@@ -83,7 +88,8 @@ class Stream:
             return False
         self._next_seq = seq + 1
         clock = self._clock
-        now, packets = clock.now, -(-size // MSS)
+        now = clock.now
+        packets = -(-size // MSS)
         arrival = self._forward.carry_train(now, packets, size + packets * HEADERS)
         if arrival is None:
             self._transmit(seq, payload, size, 0)
@@ -135,7 +141,8 @@ class Stream:
         """RFC 6298, equations 2.2 and 2.3."""
         srtt = self._srtt
         if srtt is None:
-            self._srtt, self._rttvar = rtt, rtt / 2
+            self._srtt = rtt
+            self._rttvar = rtt / 2
             return
         self._rttvar += (abs(srtt - rtt) - self._rttvar) / 4
         self._srtt = srtt + (rtt - srtt) / 8
@@ -178,7 +185,8 @@ class StreamEnd(_PlainEnd):
     """
 
     def __init__(self, out: Stream, link: Link) -> None:
-        self._out, self._link = out, link
+        self._out = out
+        self._link = link
         self.send = out.send
 
     @property
@@ -214,13 +222,15 @@ class Connection:
         self._hops_left = 2 * self.HANDSHAKE_ROUND_TRIPS
         self._to_peer = Stream(clock, out, back, self._greets_back)
         self._to_opener = Stream(clock, back, out, self._greets_on)
-        self.opener, self.peer = StreamEnd(self._to_peer, out), StreamEnd(self._to_opener, back)
+        self.opener = StreamEnd(self._to_peer, out)
+        self.peer = StreamEnd(self._to_opener, back)
 
     def open(
         self, then: Callable[[], object], accepted: Callable[[], object] | None = None
     ) -> None:
         """Shake hands; `then()` when the opener is ready, `accepted()` when the peer is."""
-        self._then, self._accepted = then, accepted
+        self._then = then
+        self._accepted = accepted
         self._to_peer.send(None, self.HANDSHAKE_BYTES)
 
     def close(self) -> None:
@@ -270,14 +280,17 @@ class DatagramEnd(_PlainEnd):
     other: DatagramEnd
 
     def __init__(self, clock: Clock, link: Link, deliver: Deliver) -> None:
-        self._clock, self._link, self._deliver = clock, link, deliver
+        self._clock = clock
+        self._link = link
+        self._deliver = deliver
         self.closed = False
 
     def send(self, payload: Any, size: int) -> bool:
         """Send a message of `size` bytes [B]; False if the socket is closed."""
         if self.closed:
             return False
-        now, total = self._clock.now, size + UDP_HEADER
+        now = self._clock.now
+        total = size + UDP_HEADER
         packets = -(-total // FRAGMENT)
         arrival = self._link.carry_train(now, packets, total + packets * IP_HEADER)
         if arrival is None:
@@ -312,7 +325,8 @@ class DatagramConnection:
     ) -> None:
         self.opener = DatagramEnd(clock, out, at_opener)
         self.peer = DatagramEnd(clock, back, at_peer)
-        self.opener.other, self.peer.other = self.peer, self.opener
+        self.opener.other = self.peer
+        self.peer.other = self.opener
 
     def open(
         self, then: Callable[[], object], accepted: Callable[[], object] | None = None
@@ -402,10 +416,12 @@ class Connector:
         depth: `message`, `segment`, or `auto`; datagrams have but one.
         zeromq: Options of the sockets.
         load: Load offered to a link.
+        tcp: Further options of TCP at both ends.
 
     Attributes:
         deepest: The depth of the connections so far: `message`, `segment` as soon as one needed
             it, or `datagram`.
+        conflates_receiver: True if subscribers keep only the newest message.
     """
 
     def __init__(
@@ -414,9 +430,14 @@ class Connector:
         depth: Depth = "auto",
         zeromq: ZeromqConfig | None = None,
         load: Load | None = None,
+        tcp: TcpOptions | None = None,
     ) -> None:
-        self._transport, self._depth = transport, depth
-        self._zeromq, self._load = zeromq or ZeromqConfig(), load or Load()
+        self._transport = transport
+        self._depth = depth
+        self._tcp = tcp or TcpOptions()
+        self._zeromq = zeromq or ZeromqConfig()
+        self._load = load or Load()
+        self.conflates_receiver = self._zeromq.conflates_receiver
         self.deepest = "datagram" if transport == "datagrams" else "message"
 
     def connect(
@@ -457,7 +478,11 @@ class Connector:
 
     def _options(self, conflate: bool = False) -> ZmtpOptions:
         zeromq = self._zeromq
-        tcp = TcpOptions(zeromq.send_buffer_bytes, zeromq.receive_buffer_bytes)
+        tcp = replace(
+            self._tcp,
+            send_buffer=zeromq.send_buffer_bytes or self._tcp.send_buffer,
+            receive_buffer=zeromq.receive_buffer_bytes or self._tcp.receive_buffer,
+        )
         return ZmtpOptions(zeromq.high_water_mark, conflate, tcp)
 
 

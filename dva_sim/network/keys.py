@@ -71,7 +71,8 @@ class KeyRing:
             return set()
         if seen == self._seen:
             return set()
-        before, files = self._public, dict[Path, tuple[str, bytes]]()
+        before = self._public
+        files = dict[Path, tuple[str, bytes]]()
         for file in sorted(seen):
             known = self._files.get(file)
             if known is None or seen[file] != self._seen.get(file):
@@ -81,7 +82,10 @@ class KeyRing:
                     del seen[file]
             if known is not None:
                 files[file] = known
-        self._files, self._seen, self._public, self._owners = files, seen, {}, {}
+        self._files = files
+        self._seen = seen
+        self._public = {}
+        self._owners = {}
         for file in files:
             with suppress(ConfigError):
                 self._add(file)
@@ -90,7 +94,8 @@ class KeyRing:
 
     def _look(self) -> dict[Path, tuple[int, int]]:
         """Return the time of change and the size of each public file."""
-        folder, found = self.folder / "public", dict[Path, tuple[int, int]]()
+        folder = self.folder / "public"
+        found = dict[Path, tuple[int, int]]()
         try:
             for entry in os.scandir(folder):
                 if entry.name.endswith(".key"):
@@ -168,7 +173,8 @@ def create_keys(folder: str | Path, ids: Iterable[str]) -> list[str]:
     Raises:
         ConfigError: an id cannot be one, the folder cannot be written, or a file is broken.
     """
-    folder, ids = Path(folder), list(ids)
+    folder = Path(folder)
+    ids = list(ids)
     _require_curve()
     for device in ids:
         _check_id(device)
@@ -182,7 +188,8 @@ def create_keys(folder: str | Path, ids: Iterable[str]) -> list[str]:
 
 def _create(folder: Path, device: str) -> bool:
     """Make what is missing; whether a new pair was needed."""
-    public_file, secret_file = _public_file(folder, device), _secret_file(folder, device)
+    public_file = _public_file(folder, device)
+    secret_file = _secret_file(folder, device)
     if public_file.exists():
         _check_owner(public_file, device, _read_public(public_file)[0])
         return False
@@ -221,7 +228,8 @@ def _read_public(file: Path) -> tuple[str, bytes]:
 
 def _read_secret(file: Path) -> tuple[str, bytes, bytes]:
     fields = _fields(file)
-    public, secret = _key(fields, "public-key", file), _key(fields, "secret-key", file)
+    public = _key(fields, "public-key", file)
+    secret = _key(fields, "secret-key", file)
     if zmq.curve_public(secret) != public:
         raise ConfigError("is broken: its public-key and secret-key do not match", file)
     return _field(fields, "id", file), public, secret

@@ -97,7 +97,8 @@ def _refuse_mixture(labels: Mapping[str, str], row: Mapping[str, str], path: Pat
 
 
 def _command(row: Mapping[str, str], path: Path) -> SentCommand:
-    made, arrived = float(row["made_s"]), float(row["arrived_s"] or math.nan)
+    made = float(row["made_s"])
+    arrived = float(row["arrived_s"] or math.nan)
     if not math.isfinite(made) or math.isinf(arrived):
         raise ConfigError("times should be finite; leave the cell of a lost command empty", path)
     if arrived < made:

@@ -148,6 +148,9 @@ class Requester:
         timeout: Time to wait for a reply [s].
         attempts: Number of times a request is sent before it fails.
         window: Maximum number of unanswered requests.
+
+    Attributes:
+        on_timeout: Callback for each attempt that was not answered in time.
     """
 
     def __init__(
@@ -159,14 +162,19 @@ class Requester:
         attempts: int = 3,
         window: int = 1,
     ) -> None:
-        self._transport, self._clock = transport, transport.clock
-        self.node, self.peer = node, peer
-        self.timeout, self._attempts, self._window = timeout, attempts, window
+        self._transport = transport
+        self._clock = transport.clock
+        self.node = node
+        self.peer = peer
+        self.timeout = timeout
+        self._attempts = attempts
+        self._window = window
         self._queue: deque[_Asked] = deque()
         self._open: dict[int, _Asked] = {}
         self._deadlines: deque[tuple[float, int, int]] = deque()  # when [s], tag, attempt
         self._wire: Wire | None = None
         self._last_tag = 0
+        self.on_timeout: Callable[[], object] = lambda: None
         self.timeouts = self.failures = self.overflows = 0
         self.round_trips: deque[float] = deque(maxlen=ROUND_TRIPS_KEPT)
 
@@ -271,6 +279,7 @@ class Requester:
         if asked is None or asked.attempts != attempt:
             return
         self.timeouts += 1
+        self.on_timeout()
         if self._window == 1:
             self._disconnect()
         if attempt < self._attempts:

@@ -310,7 +310,8 @@ def measure_log(log: RunLog, warm_s: float, dur_s: float) -> Measures:
     numbers = np.array([number for number, _ in log.applied], dtype=int)
     applied = np.array([when for _, when in log.applied]) - log.start
     end = warm_s + dur_s
-    sent, inside = _within(issued, warm_s, end), _within(applied, warm_s, end)
+    sent = _within(issued, warm_s, end)
+    inside = _within(applied, warm_s, end)
     distinct = len(set(numbers[inside].tolist()))
     found: Measures = {"n_sent": int(sent.sum()), "n_applied": int(inside.sum())}
     found |= {"n_distinct": distinct, "dup": found["n_applied"] - distinct}

@@ -152,7 +152,8 @@ class Requested(Pattern):
 
     def _answered(self, _: bytes) -> None:
         """A command that waited goes now: the newest value if the app keeps sending anyway."""
-        waiting, self.waiting = self.waiting, None
+        waiting = self.waiting
+        self.waiting = None
         if waiting is not None:
             self.offer(self.line.newest(waiting))
 
@@ -160,8 +161,11 @@ class Requested(Pattern):
 class ReqRep(Requested):
     """Request and reply: the app sends its next command only when the last one was answered."""
 
-    title, label, colour = "REQ/REP", "REQ/REP", "vermilion"
-    sockets, when_slow = "REQ to ROUTER", "commands become rarer"
+    title = "REQ/REP"
+    label = "REQ/REP"
+    colour = "vermilion"
+    sockets = "REQ to ROUTER"
+    when_slow = "commands become rarer"
     in_step = True
 
 
@@ -171,7 +175,9 @@ class Pipelined(Requested):
     How many is `command.window` of the scenario.
     """
 
-    title, label, colour = "pipelined requests", "pipelined requests", "purple"
+    title = "pipelined requests"
+    label = "pipelined requests"
+    colour = "purple"
     sockets = "DEALER to ROUTER"
     when_slow = "commands become older, by a window at most"
 
@@ -187,8 +193,11 @@ class Paced(Requested):
     How many follows from the times of the answers, see `RequestWindow`.
     """
 
-    title, label, colour = "paced requests", "paced", "brown"
-    sockets, when_slow = "DEALER to ROUTER", "commands become rarer"
+    title = "paced requests"
+    label = "paced"
+    colour = "brown"
+    sockets = "DEALER to ROUTER"
+    when_slow = "commands become rarer"
 
     @override
     def begin(self, line: Line) -> None:
@@ -205,7 +214,8 @@ class Paced(Requested):
         self.waiting = command
 
     def _ask(self, command: Command) -> None:
-        number, sent_at = self._window.sent(), self.line.clock.now
+        number = self._window.sent()
+        sent_at = self.line.clock.now
 
         def answered(reply: bytes) -> None:
             now = self.line.clock.now
@@ -218,8 +228,11 @@ class Paced(Requested):
 class PubSub(Pattern):
     """Publish and subscribe: the app sends without waiting, and the robot applies every command."""
 
-    title, label, colour = "plain PUB/SUB", "plain PUB/SUB", "blue"
-    sockets, when_slow = "XPUB to SUB", "commands queue without bound"
+    title = "plain PUB/SUB"
+    label = "plain PUB/SUB"
+    colour = "blue"
+    sockets = "XPUB to SUB"
+    when_slow = "commands queue without bound"
     published = True
 
     def offer(self, command: Command) -> None:
@@ -230,7 +243,9 @@ class PubSub(Pattern):
 class LatestWins(PubSub):
     """Publish and subscribe, but the robot applies only the newest command that it has."""
 
-    title, label, colour = "latest-wins PUB/SUB", "latest-wins", "green"
+    title = "latest-wins PUB/SUB"
+    label = "latest-wins"
+    colour = "green"
     when_slow = "commands are skipped"
     newest_wins = True
 

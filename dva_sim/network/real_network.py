@@ -43,7 +43,8 @@ class RealNetwork(ABC):
     """
 
     def __init__(self, clock: LiveClock, tell: Callable[[str], object]) -> None:
-        self.clock, self._tell = clock, tell
+        self.clock = clock
+        self._tell = tell
         self.counters: Counter[str] = Counter()
         self.watcher: Callable[[str, Any, bool], object] | None = None
         self.taps: dict[str, RequestTap] = {}
@@ -134,7 +135,8 @@ class RealNetwork(ABC):
             send(reply)
 
         request = make_request(data, answer, sender, peer, origin)
-        service, tap = self._services[node], self.taps.get(node)
+        service = self._services[node]
+        tap = self.taps.get(node)
         if tap is None:
             service(request)
         else:

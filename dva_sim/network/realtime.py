@@ -126,7 +126,8 @@ class LiveClock(Clock):
         self._poller = Poller()
         self._handlers: dict[Any, Callable[[], object]] = {}
         self._running = False
-        self._slept, self._on_suspended = slept(), list[Callable[[float], object]]()
+        self._slept = slept()
+        self._on_suspended = list[Callable[[float], object]]()
         self.lateness = 0.0
         self._catch_up(math.inf)
 
@@ -200,7 +201,8 @@ class LiveClock(Clock):
 
     def _catch_up(self, end: float) -> None:
         """Let the events happen that are due, in their order, then make it now."""
-        env, real = self.env, self._real()
+        env = self.env
+        real = self._real()
         until = real if real < end else end
         for _ in range(AT_ONCE):
             due = env.peek()
@@ -239,11 +241,14 @@ class PacedClock(LiveClock):
     """
 
     def __init__(self, factor: float = 1.0) -> None:
-        self._factor, self._halted = factor, False
-        self._base, self._since = 0, time.monotonic_ns() // 1000
+        self._factor = factor
+        self._halted = False
+        self._base = 0
+        self._since = time.monotonic_ns() // 1000
         self._pulses: list[_Pulse] = []
         self.on_late: Callable[[float], object] = lambda _: None
-        self.given_up, self._worst = 0.0, 0.0
+        self.given_up = 0.0
+        self._worst = 0.0
         super().__init__()
 
     @property
@@ -269,7 +274,8 @@ class PacedClock(LiveClock):
 
     def worst_lag(self) -> float:
         """By how much an event has come too late at most since the last time of asking [s]."""
-        worst, self._worst = self._worst, 0.0
+        worst = self._worst
+        self._worst = 0.0
         return worst
 
     def pulse(self, period: float, action: Callable[[], object]) -> None:
@@ -335,7 +341,8 @@ class _Pulse:
     """Something to be done again and again by the wall clock."""
 
     def __init__(self, period: float, action: Callable[[], object]) -> None:
-        self._period, self._action = period, action
+        self._period = period
+        self._action = action
         self.due = time.monotonic()
 
     def beat(self, now: float) -> None:

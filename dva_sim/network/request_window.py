@@ -46,7 +46,8 @@ class RequestWindow:
 
     def __init__(self, rate_hz: float) -> None:
         self._period = 1.0 / rate_hz
-        self.size, self.unanswered = _FIRST, 0
+        self.size = _FIRST
+        self.unanswered = 0
         self._rounds: deque[_Round] = deque()
         self._trips: list[float] = []
         self._sent = self._last_of_round = 0
@@ -92,14 +93,17 @@ class RequestWindow:
             self._rounds.popleft()
         least = min(each.least for each in self._rounds)
         if self.size * (1.0 - least / self._rounds[-1].least) > _QUEUE:
-            self._queue_seen, self._doubles = now, False
+            self._queue_seen = now
+            self._doubles = False
         rates = [each.rate for each in self._rounds if each.end > now - _RATE_S]
         if self._queue_seen is not None and now - self._queue_seen < _RATE_S and max(rates) > 0.0:
             self.size = min(self.size + 1, self._youngest(least, max(rates)))
         elif self._was_short:
             self.size = min(MOST, 2 * self.size if self._doubles else self.size + 1)
-        self._trips, self._was_short = [], False
-        self._last_of_round, self._round_began = self._sent, now
+        self._trips = []
+        self._was_short = False
+        self._last_of_round = self._sent
+        self._round_began = now
 
     def _youngest(self, round_trip: float, rate: float) -> int:
         """The window with the least wait in a queue and half a time between commands."""

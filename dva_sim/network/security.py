@@ -250,7 +250,10 @@ class Security:
         ring: KeyRing | None,
         tell: Callable[[Refusal], object],
     ) -> None:
-        self._context, self._poller, self._ring, self._tell = context, poller, ring, tell
+        self._context = context
+        self._poller = poller
+        self._ring = ring
+        self._tell = tell
         self._has_keys = ring is not None
         self._watches: dict[Socket, _Watch] = {}
         self._monitors: dict[Socket, Socket] = {}
@@ -411,7 +414,8 @@ class Security:
     def _answer(self, frames: list[bytes]) -> None:
         """Say whether a key is good, and whose it is (ZeroMQ RFC 27)."""
         version, request, domain, address, _, mechanism, *credentials = frames
-        device, key = domain.decode(), b"".join(credentials)
+        device = domain.decode()
+        key = b"".join(credentials)
         curve = mechanism == b"CURVE" and len(key) == 32
         owner = self._ring.owner(key) if curve and self._ring is not None else None
         # Whose key it is counts at each message: until then it may have been taken away.
@@ -435,7 +439,8 @@ class Security:
     def _note(self, monitor: Socket, frames: list[bytes]) -> None:
         """Take an event of a monitor."""
         event, value = struct.unpack("=HI", frames[0])
-        watch, endpoint = self._watches[monitor], frames[1].decode()
+        watch = self._watches[monitor]
+        endpoint = frames[1].decode()
         if event == zmq.EVENT_MONITOR_STOPPED:
             self._drop(monitor)
         elif watch.peer is None:

@@ -60,7 +60,10 @@ class SocketWire:
     kind: int
 
     def __init__(self, network: SocketNetwork, node: str, peer: str, on_reply: OnReply) -> None:
-        self._network, self._node, self._peer, self._on_reply = network, node, peer, on_reply
+        self._network = network
+        self._node = node
+        self._peer = peer
+        self._on_reply = on_reply
         self._socket = network.client(self.kind, node, peer)
         self._configure()
         network.clock.watch(self._socket, self._replies)
@@ -145,7 +148,9 @@ class SocketSubscription:
         topic: str,
         handler: Callable[[Any], object],
     ) -> None:
-        self._network, self._node, self._peer = network, node, publisher
+        self._network = network
+        self._node = node
+        self._peer = publisher
         self._handler = handler
         self._socket = network.client(zmq.SUB, node, publisher)
         self._socket.subscribe(topic)
@@ -307,7 +312,8 @@ class SocketNetwork(RealNetwork):
 
     @override
     def join(self, node: str, host: str = "127.0.0.1", port: int = 0) -> str:
-        router, publisher = self._listener(zmq.ROUTER, node), self._listener(zmq.XPUB, node)
+        router = self._listener(zmq.ROUTER, node)
+        publisher = self._listener(zmq.XPUB, node)
         for _ in range(PORT_TRIES):
             try:
                 chosen = _bind(router, host, port)
@@ -425,7 +431,9 @@ class SocketNetwork(RealNetwork):
         data = parts[start] if len(parts) == start + 1 else b""
         # The peer is what the socket itself calls the connection: nobody can take another's.
         self._serve_request(
-            *(node, data, lambda reply: self.send(router, [*route, reply])),
+            node,
+            data=data,
+            send=lambda reply: self.send(router, [*route, reply]),
             sender=sender,
             peer=peer,
             origin=origin,
@@ -519,7 +527,8 @@ class SocketNetwork(RealNetwork):
         """Heed the keys that have come and gone: connections made with others end."""
         if self._context.closed:
             return False
-        before, changed = set(ring.devices), ring.refresh()
+        before = set(ring.devices)
+        changed = ring.refresh()
         for peer in sorted(changed):
             known = self._has_key(peer)
             came = "has changed" if peer in before else "is new"
@@ -536,7 +545,8 @@ class SocketNetwork(RealNetwork):
     def _renew_publisher(self, node: str) -> None:
         """Reopen the publishing socket, so that subscribers are admitted by the current keys."""
         old = self._publishers[node].socket
-        endpoint, old.linger = _text(old.last_endpoint).rstrip("\0"), 0
+        endpoint = _text(old.last_endpoint).rstrip("\0")
+        old.linger = 0
         self._discard(old)
         self._publishers[node] = PublisherSocket(self._listener(zmq.XPUB, node))
         self._bind_again(node, endpoint)

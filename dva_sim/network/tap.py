@@ -66,13 +66,15 @@ class Tap:
         on_exchange: Callable[[Exchange], object],
         publications: bool = True,
     ) -> None:
-        self._clock, self._on_exchange = clock, on_exchange
+        self._clock = clock
+        self._on_exchange = on_exchange
         self.publications = publications
         self._count = 0
 
     def serve(self, service: Service, request: Request) -> None:
         """Let a service take a request, and see its answer, whenever that comes."""
-        exchange, begun = self._new(request.data, request.peer), time.perf_counter()
+        exchange = self._new(request.data, request.peer)
+        begun = time.perf_counter()
         is_handled = False
 
         def answer(reply: bytes) -> None:

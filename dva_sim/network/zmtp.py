@@ -22,8 +22,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final, Generic, Protocol, TypeVar
 
-from typing_extensions import override
-
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.link import Link
 from dva_sim.network.tcp import TcpConnection, TcpEndpoint, TcpOptions
@@ -50,7 +48,9 @@ class Pipe(Generic[T]):
     """
 
     def __init__(self, mark: int = HIGH_WATER_MARK, conflate: bool = False) -> None:
-        self._mark, self._low, self._conflate = mark, (mark + 1) // 2, conflate
+        self._mark = mark
+        self._low = (mark + 1) // 2
+        self._conflate = conflate
         self._items: deque[T] = deque(maxlen=1 if conflate else None)
         self._written = self._read = self._acknowledged = self.superseded = 0
         self._refused = False
@@ -99,38 +99,6 @@ class Flow(Protocol):
 
     def resume(self) -> None:
         """Go on with what has waited."""
-
-
-class ReceivePipe(Pipe[T]):
-    """Messages that a connection has delivered and its program has not read yet.
-
-    It tells the connection to wait while it is full.
-
-    Args:
-        mark: High-water mark, in messages.
-        conflate: True to keep only the newest message.
-
-    Attributes:
-        flow: The end of the connection that delivers into it.
-    """
-
-    flow: Flow | None = None
-
-    @override
-    def put(self, item: T) -> bool:
-        # A connection that cannot wait loses what comes while the pipe is full.
-        taken = super().put(item)
-        if self.full and self.flow is not None:
-            self.flow.pause()
-        return taken
-
-    @override
-    def take(self) -> T | None:
-        was_full = self.full
-        item = super().take()
-        if was_full and not self.full and self.flow is not None:
-            self.flow.resume()
-        return item
 
 
 BATCH = 8192  # bytes that the encoder hands over, and the decoder reads, at once
@@ -191,7 +159,9 @@ class ZmtpEnd:
     def __init__(
         self, tcp: TcpEndpoint, link: Link, options: ZmtpOptions, deliver: Deliver
     ) -> None:
-        self._tcp, self._link, self._deliver = tcp, link, deliver
+        self._tcp = tcp
+        self._link = link
+        self._deliver = deliver
         self.pipe: Pipe[tuple[Any, int]] = Pipe(options.mark, options.conflate)
         self._asleep = True  # the sending thread has found the pipe empty, and is to be woken
         self._batch = self._rest = self._position = self._heard = 0
@@ -202,7 +172,9 @@ class ZmtpEnd:
         self.ready = self.closed = False
         self.on_ready: Then = _nothing
         self.on_end: Then = _nothing
-        tcp.on_readable, tcp.on_writable, tcp.on_end = self._read, self._flush, self._end
+        tcp.on_readable = self._read
+        tcp.on_writable = self._flush
+        tcp.on_end = self._end
 
     # --- for the program -----------------------------------------------------------------
 
@@ -352,15 +324,18 @@ class ZmtpConnection:
         opener: ZmtpOptions | None = None,
         peer: ZmtpOptions | None = None,
     ) -> None:
-        opener, peer = opener or ZmtpOptions(), peer or ZmtpOptions()
+        opener = opener or ZmtpOptions()
+        peer = peer or ZmtpOptions()
         self._tcp = TcpConnection(clock, out, back, opener.tcp, peer.tcp)
         self.opener = ZmtpEnd(self._tcp.opener, out, opener, at_opener)
         self.peer = ZmtpEnd(self._tcp.peer, back, peer, at_peer)
-        self.opener.other, self.peer.other = self.peer, self.opener
+        self.opener.other = self.peer
+        self.peer.other = self.opener
 
     def open(self, then: Then, accepted: Then = _nothing) -> None:
         """Shake hands; `then()` when the opener is ready, `accepted()` when the peer is."""
-        self.opener.on_ready, self.peer.on_ready = then, accepted
+        self.opener.on_ready = then
+        self.peer.on_ready = accepted
         self._tcp.open(self.opener.begin, self.peer.begin)
 
     def close(self) -> None:

@@ -2,11 +2,15 @@
 
 The fields of a class are the children of its element, in their order. Every value passes a check
 made from its type in the schema, so that what leaves here is valid by construction.
+
+Valid values are written; values that the schema cannot hold raise `ProtocolError`.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from inspect import Parameter, signature
 from operator import attrgetter
 from typing import Any, Final, NamedTuple, get_args, get_type_hints
@@ -15,7 +19,77 @@ from lxml import etree
 
 from dva_sim.protocol import limits
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.xml_values import Write, bad, writer
+from dva_sim.protocol.errors import ProtocolError
+
+Write = Callable[[Any], str]
+
+_FORMS: Final = {
+    "DeviceID": "like 70:1A:04:F9:81:D6",
+    "Timestamp": "HH:MM:SS",
+    "Address": "like 192.168.1.48 or with :port",
+    "Name": "printable characters",
+    "Text": "printable characters",
+    "Url": "ASCII characters without spaces",
+}
+"""Texts of each type in words, without their length."""
+
+
+def bad(reason: str) -> ProtocolError:
+    """Return the error to raise about a value that no message can hold."""
+    return ProtocolError(m.BAD_MESSAGE, reason)
+
+
+def writer(element: str, kind: str) -> Write:
+    """Return what writes a value of a simple type as the text of an element of that name."""
+    known = limits.facets(kind)
+    base = known["base"][0]
+    if "enumeration" in known:
+        words = known["enumeration"]
+        return _text(element, "|".join(words), " or ".join(words))
+    if base == "xs:string":
+        if "maxLength" not in known:
+            return _text(element, limits.pattern(kind), _FORMS[kind])
+        least, most = limits.length(kind)
+        form = f"{least} to {most} {_FORMS[kind]}" if least else f"up to {most} {_FORMS[kind]}"
+        return _text(element, f"(?=(?s:.{{{least},{most}}})\\Z){limits.pattern(kind)}", form)
+    return _integer(element, kind) if base in limits.WHOLE else _real(element, kind)
+
+
+def _real(element: str, kind: str) -> Write:
+    low, high = limits.bounds(kind)
+
+    def write(value: float) -> str:
+        if low <= value <= high:
+            # float() because a numpy scalar spells its own type in its repr; 0.0 for -0.0, which
+            # no reader expects of a speed.
+            return repr(float(value) + 0.0)
+        raise bad(f"{element} must be within {low:g} and {high:g}, not {value!r}")
+
+    return write
+
+
+def _integer(element: str, kind: str) -> Write:
+    low, high = limits.bounds(kind)
+
+    def write(value: int) -> str:
+        if low <= value <= high:
+            return f"{value:d}"
+        raise bad(f"{element} must be within {low} and {high}, not {value!r}")
+
+    return write
+
+
+def _text(element: str, pattern: str, form: str) -> Write:
+    match = re.compile(pattern).fullmatch
+
+    @lru_cache(maxsize=256)
+    def write(value: str) -> str:
+        if match(value):
+            return value.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+        raise bad(f"{element} must be {form}, not {value!r}")
+
+    return write
+
 
 DECLARATION: Final = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>'
 
@@ -51,7 +125,8 @@ class Form:
         self._text = ""
         given = signature(kind).parameters
         for (name, hint), node in zip(get_type_hints(kind).items(), declared, strict=True):
-            tag, (least, most) = node.get("name", ""), limits.occurs(node)
+            tag = node.get("name", "")
+            (least, most) = limits.occurs(node)
             inner = _value_of(node, _inner(hint))
             if most > 1:
                 self._add("%s", [(name, _several(tag, inner.write, least, most))])

@@ -21,7 +21,8 @@ def is_absurd(session: int, known: int) -> bool:
     It is more than a day ahead of the highest that is known, or leaves no room for another day.
     Without any known session (0) the former cannot be checked.
     """
-    count, newest = session >> LOW_BITS, (1 << LOW_BITS) - 1
+    count = session >> LOW_BITS
+    newest = (1 << LOW_BITS) - 1
     return count > newest - A_DAY or (bool(known) and count > (known >> LOW_BITS) + A_DAY)
 
 
@@ -37,7 +38,8 @@ class Outbox:
 
     def __init__(self, source: str, start_of_day: float = NOON, exact: bool = False) -> None:
         self.source = source
-        self._start, self._exact = start_of_day, exact
+        self._start = start_of_day
+        self._exact = exact
         self._last_id = 0
 
     def set_clock(self, by: float) -> None:
@@ -70,7 +72,8 @@ class _Kept:
     __slots__ = ("keys", "used")
 
     def __init__(self) -> None:
-        self.keys, self.used = deque[Key](), 0
+        self.keys = deque[Key]()
+        self.used = 0
 
 
 class ReplyCache:
@@ -88,7 +91,9 @@ class ReplyCache:
     """
 
     def __init__(self, each: int = 64, sources: int = 1024, room: int = 65_536) -> None:
-        self._each, self._sources, self._room = each, sources, room
+        self._each = each
+        self._sources = sources
+        self._room = room
         self._replies: dict[Key, bytes] = {}
         self._kept: OrderedDict[str, _Kept] = OrderedDict()
 
@@ -102,7 +107,8 @@ class ReplyCache:
         if kept is None:
             kept = self._kept[source] = _Kept()
         self._kept.move_to_end(source)
-        keys, used = kept.keys, kept.used + len(reply)
+        keys = kept.keys
+        used = kept.used + len(reply)
         keys.append(key)
         self._replies[key] = reply
         while len(keys) > self._each or (used > self._room and len(keys) > 1):

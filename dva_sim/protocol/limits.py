@@ -81,8 +81,10 @@ def length(name: str) -> tuple[int, int]:
 
 def bounds(name: str) -> tuple[float, float]:
     """The least and the greatest of a type's numbers; of whole numbers they are whole."""
-    known, kind = facets(name), int if facets(name)["base"][0] in WHOLE else float
-    low, high = known.get("minInclusive", ["0"])[0], known.get("maxInclusive")
+    known = facets(name)
+    kind = int if facets(name)["base"][0] in WHOLE else float
+    low = known.get("minInclusive", ["0"])[0]
+    high = known.get("maxInclusive")
     return kind(low), kind(high[0]) if high else WHOLE[known["base"][0]]
 
 

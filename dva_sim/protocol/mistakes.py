@@ -41,7 +41,8 @@ def _in_words(known: dict[str, list[str]]) -> str:
         kind = "a whole number" if base in WHOLE else "a number"
         return f"{kind} from {low} to {high}, in the digits 0 to 9"
     if "maxLength" in known:
-        shortest, longest = known.get("minLength", ["0"])[0], known["maxLength"][0]
+        shortest = known.get("minLength", ["0"])[0]
+        longest = known["maxLength"][0]
         length = f"{shortest} to {longest} characters"
         return f"{length} of the form {known['pattern'][0]}" if "pattern" in known else length
     return "of the form " + " and ".join(known["pattern"])
@@ -176,7 +177,8 @@ def _element_at(tree: etree._ElementTree, path: str | None) -> etree._Element:
 
 def _explain(element: etree._Element, entry: Any) -> str:
     """Translate a finding of libxml2, and say what would be right."""
-    name, kind = str(element.tag), entry.type_name
+    name = str(element.tag)
+    kind = entry.type_name
     _, _, expected = entry.message.rstrip(". ").partition(" Expected is ")
     right = expected.removeprefix("one of").strip("() ").replace(", ", " or ")
     if kind == "SCHEMAV_CVC_ELT_1":

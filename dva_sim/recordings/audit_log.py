@@ -122,7 +122,8 @@ class AuditLog:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.number, self.head = 0, NOTHING_BEFORE
+        self.number = 0
+        self.head = NOTHING_BEFORE
         is_new = not path.exists() or _holds_nothing(path)
         if not is_new:
             self._refuse_what_is_broken()
@@ -142,7 +143,8 @@ class AuditLog:
         if found.problem is not None:
             text = f"row {found.problem.number} {found.problem.text}"
             raise ConfigError(f"is not an audit log that can be appended to: {text}", self.path)
-        self.number, self.head = found.rows, found.head
+        self.number = found.rows
+        self.head = found.head
 
     def append(self, entries: Sequence[AuditEntry]) -> list[AuditRow]:
         """Add rows, all or none; when this returns they are on the disk.
@@ -160,7 +162,8 @@ class AuditLog:
                 self._file.execute("ROLLBACK")
             raise AuditWriteError(f"the audit log cannot be written: {error}") from None
         if rows:
-            self.number, self.head = rows[-1].number, rows[-1].hash
+            self.number = rows[-1].number
+            self.head = rows[-1].hash
         return rows
 
     def _rows(self, entries: Sequence[AuditEntry]) -> list[AuditRow]:
@@ -273,11 +276,15 @@ def _followed(file: sqlite3.Connection) -> Verified:
     kept = dict(file.execute("SELECT name, value FROM about"))
     if kept.get("format") != str(FORMAT):
         return Verified(0, NOTHING_BEFORE, FirstWrong(1, f"is not an audit log of format {FORMAT}"))
-    number, head, last = 0, NOTHING_BEFORE, ""
+    number = 0
+    head = NOTHING_BEFORE
+    last = ""
     for values in file.execute(f"{_SELECT} ORDER BY number"):
         if wrong := _wrong(values, number + 1, head):
             return Verified(number, head, FirstWrong(number + 1, wrong))
-        number, head, last = number + 1, values[-1], values[COLUMNS.index("action")]
+        number += 1
+        head = values[-1]
+        last = values[COLUMNS.index("action")]
     (given,) = next(file.execute("SELECT max(seq) FROM sqlite_sequence WHERE name = 'audit'"), (0,))
     if (given or 0) > number:
         lost = f"is missing: rows up to {given} were written, and the end was cut"
@@ -302,7 +309,9 @@ def _wrong(values: Sequence[Any], number: int, head: str) -> str | None:
 def verify_plain(rows: Sequence[Mapping[str, Any]]) -> Verified:
     """Verify rows kept elsewhere, as in a recording; they may begin at any row."""
     first = rows[0] if rows else {}
-    number, head, last = first.get("number", 1) - 1, first.get("before", NOTHING_BEFORE), ""
+    number = first.get("number", 1) - 1
+    head = first.get("before", NOTHING_BEFORE)
+    last = ""
     for plain in rows:
         try:
             values = [plain["number"], *_columns(plain), plain["before"], plain["hash"]]
@@ -311,7 +320,9 @@ def verify_plain(rows: Sequence[Mapping[str, Any]]) -> Verified:
             wrong = f"is not whole: {error!r}"
         if wrong:
             return Verified(number, head, FirstWrong(number + 1, wrong))
-        number, head, last = number + 1, plain["hash"], plain["action"]
+        number += 1
+        head = plain["hash"]
+        last = plain["action"]
     return Verified(number, head, None, last == END)
 
 

@@ -59,7 +59,8 @@ def sparse(track: Sequence[TrackPoint]) -> Iterator[TrackPoint]:
     """
     last = len(track) - 1
     for index, here in enumerate(track):
-        before, after = track[max(0, index - 1)], track[min(last, index + 1)]
+        before = track[max(0, index - 1)]
+        after = track[min(last, index + 1)]
         still = before[1:] == here[1:] == after[1:]
         alive = here.time // ALIVE_S != before.time // ALIVE_S
         if not still or alive or index in (0, last):
@@ -144,7 +145,8 @@ def grids(playback: Playback) -> Iterator[ChannelMessage]:
 
 def _grid(what: str, time: float, cell: float, raster: Raster) -> ChannelMessage:
     rows, columns = np.nonzero(raster.values > 0)
-    low, left = int(rows.min()), int(columns.min())
+    low = int(rows.min())
+    left = int(columns.min())
     part = raster.values[low : rows.max() + 1, left : columns.max() + 1]
     west, _, south, _ = raster.extent
     return stamped(
@@ -170,8 +172,11 @@ def _shortened(values: NDArray[np.float64]) -> NDArray[np.float32]:
 
 
 HAZARDS = "/hazards"
-TOPIC, SCHEMA = "/scene", "foxglove.SceneUpdate"
-WALL, INK, EXIT = "#3a3f47", "#2b3038", "#2f7d32"
+TOPIC = "/scene"
+SCHEMA = "foxglove.SceneUpdate"
+WALL = "#3a3f47"
+INK = "#2b3038"
+EXIT = "#2f7d32"
 BODIES = {"robot": "#2f7fd0", "guard": "#2f7d32", "bystander": "#8c6d5a"}
 TALL = {"robot": 0.5, "guard": 1.75, "bystander": 1.7}  # as drawn [m]
 PERSON = 0.25  # radius [m]
@@ -293,7 +298,8 @@ def body(time: float, name: str, radius: float = PERSON) -> ChannelMessage:
     """Somebody, in a frame that moves with them: `robot-1` is drawn as a robot."""
     kind = name.rpartition("-")[0]
     known = kind if kind in TALL else "robot"
-    tall, paint = TALL[known], messages.colour(BODIES[known])
+    tall = TALL[known]
+    paint = messages.colour(BODIES[known])
     arrow = {
         "pose": messages.pose(0.0, 0.0, z=tall),
         "shaft_length": radius,
@@ -346,10 +352,17 @@ def _words(text: str, x: float, y: float, z: float = 0.0) -> dict[str, Any]:
     }
 
 
-STORY, MESSAGES, DECISIONS, AUDIT = "/story", "/messages", "/decisions/", "/audit"
-FACTS, OBSERVED = "/facts", "/observed/"
+STORY = "/story"
+MESSAGES = "/messages"
+DECISIONS = "/decisions/"
+AUDIT = "/audit"
+FACTS = "/facts"
+OBSERVED = "/observed/"
 # Last parts of topics.
-SCREEN, COMMANDS, CAMERA, APPLIED = "screen", "commands", "camera", "applied"
+SCREEN = "screen"
+COMMANDS = "commands"
+CAMERA = "camera"
+APPLIED = "applied"
 LEVELS = {"safety": 3, "mode": 1, "link": 1}  # of Foxglove's log; all else is for information
 
 
@@ -402,7 +415,8 @@ def network_messages(playback: Playback) -> Iterator[ChannelMessage]:
 
     Of a camera's frame, what it stands for. What happens at the same moment stays in its order.
     """
-    names, traffic = names_of(playback.labels), iter(playback.recorder.traffic or ())
+    names = names_of(playback.labels)
+    traffic = iter(playback.recorder.traffic or ())
     for fact in playback.recorder.facts or ():
         if not isinstance(fact, Sent):
             word, time, values = as_plain(fact)
@@ -448,9 +462,11 @@ def names_of(labels: Mapping[str, str]) -> dict[str, str]:
 
 def shown(playback: Playback) -> Iterator[ChannelMessage]:
     """The frames that come onto the operators' screens."""
-    labels, names = playback.labels, names_of(playback.labels)
+    labels = playback.labels
+    names = names_of(playback.labels)
     for number, drive in enumerate(playback.recorder.drives):
-        topic, whose = f"/{names[drive.operator]}/{SCREEN}", labels[drive.robot]
+        topic = f"/{names[drive.operator]}/{SCREEN}"
+        whose = labels[drive.robot]
         for at in drive.frames:
             yield frame_shown(at.time, topic, number, whose, captured=at.captured)
 
@@ -465,9 +481,11 @@ def frame_shown(
 
 def commanded(playback: Playback) -> Iterator[ChannelMessage]:
     """Yield the commands that phones make from the tilt."""
-    labels, names = playback.labels, names_of(playback.labels)
+    labels = playback.labels
+    names = names_of(playback.labels)
     for number, drive in enumerate(playback.recorder.drives):
-        topic, whose = f"/{names[drive.operator]}/{COMMANDS}", labels[drive.robot]
+        topic = f"/{names[drive.operator]}/{COMMANDS}"
+        whose = labels[drive.robot]
         for time, speed, turn_rate in drive.commands:
             # Plus 0.0, since what is rounded to nothing may be -0.0.
             values = round(speed, 5) + 0.0, round(turn_rate, 5) + 0.0
@@ -491,7 +509,9 @@ def applied(playback: Playback) -> Iterator[ChannelMessage]:
             )
 
 
-EVENTS, LATENCIES, IMAGE = "/events", "/latencies", "image"
+EVENTS = "/events"
+LATENCIES = "/latencies"
+IMAGE = "image"
 
 
 def event_message(time: float, event: Event) -> ChannelMessage:

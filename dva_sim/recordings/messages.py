@@ -63,7 +63,8 @@ def point(x: float, y: float, z: float = 0.0) -> dict[str, float]:
 
 def turned(heading: float) -> dict[str, float]:
     """A turn about the vertical [rad], as a quaternion."""
-    z, w = round(math.sin(heading / 2), TURNS), round(math.cos(heading / 2), TURNS)
+    z = round(math.sin(heading / 2), TURNS)
+    w = round(math.cos(heading / 2), TURNS)
     return {"x": 0.0, "y": 0.0, "z": z, "w": w}
 
 

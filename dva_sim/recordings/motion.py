@@ -108,7 +108,8 @@ class MotionWriter:
     def __init__(self, path: Path) -> None:
         self.name = path.name
         self._file = path.open("x", encoding="utf-8", buffering=1)
-        self._left, self._first = MOST_BYTES, 0.0
+        self._left = MOST_BYTES
+        self._first = 0.0
         self._begun = False
         for line in (FIRST_LINE, *UNITS, COLUMNS):
             self._write(line)
@@ -120,7 +121,8 @@ class MotionWriter:
     def sample(self, sample: MotionSample) -> None:
         """One more."""
         if not self._begun:
-            self._begun, self._first = True, sample.stamp
+            self._begun = True
+            self._first = sample.stamp
         since_first = sample.stamp - self._first
         numbers = since_first, sample.came, sample.at, *sample.xyz
         self._write(",".join(map(repr, numbers)) + f",{sample.orientation}")
@@ -177,7 +179,8 @@ def _sample(line: str) -> MotionSample:
 def _app(content: dict[str, Any]) -> MotionApp:
     x, y, z = (float(part) for part in content["reference_mps2"])
     profile = validate(PhoneProfile, content["profile"], lambda problem, _: ConfigError(problem))
-    at, period = float(content["at_s"]), float(content["period_s"])
+    at = float(content["at_s"])
+    period = float(content["period_s"])
     return MotionApp(at, period, (x, y, z), content["ios"] is True, profile)
 
 
@@ -206,12 +209,15 @@ def _by_app(
     motion: PhoneMotion, app: MotionApp, until: float, looks: Iterator[float] | None, rate_hz: float
 ) -> Iterator[tuple[float, TiltCommand]]:
     waiting = iter([sample for sample in motion.samples if sample.came >= app.at])
-    tilt, sample = _made(app, 0), next(waiting, None)
-    turned, now = 0, app.at
+    tilt = _made(app, 0)
+    sample = next(waiting, None)
+    turned = 0
+    now = app.at
     while now <= until and now < math.inf:
         while sample is not None and sample.came <= now:
             if sample.orientation != turned:
-                turned, tilt = sample.orientation, _made(app, sample.orientation)
+                turned = sample.orientation
+                tilt = _made(app, sample.orientation)
             tilt.sample(sample.at, to_tilt_axes(sample.xyz, sample.orientation, app.ios))
             sample = next(waiting, None)
         command = tilt.look(now)

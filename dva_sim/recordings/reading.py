@@ -18,7 +18,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pydantic
-from numpy.typing import NDArray
 from typing_extensions import override
 
 from dva_sim.core.events import Event, State
@@ -93,7 +92,8 @@ def recorded_hazard(number: int, entry: Mapping[str, Any], records: Records) -> 
 
     own = [(time, state) for time, state in records if state["number"] == number]
     keys = "radius_m", "danger_radius_m", "severity"
-    position, start = entry["hazard"]["position"], entry["hazard"]["start"]
+    position = entry["hazard"]["position"]
+    start = entry["hazard"]["start"]
     return AsRecorded(
         position=tuple(position),
         start=start,
@@ -126,10 +126,12 @@ class RecordedSurroundings(Surroundings):
         if not index:
             return Raster(np.zeros((1, 1)), (west, east, south, north), QUANTITIES[what].unit)
         content = records[index - 1][1]
-        cell, place = content["cell_size"]["x"], content["pose"]["position"]
+        cell = content["cell_size"]["x"]
+        place = content["pose"]["position"]
         part = np.frombuffer(base64.b64decode(content["data"]), "<f4")
         part = part.reshape(-1, content["column_count"])
-        low, left = round((place["y"] - south) / cell), round((place["x"] - west) / cell)
+        low = round((place["y"] - south) / cell)
+        left = round((place["x"] - west) / cell)
         rows = max(round((north - south) / cell), low + part.shape[0])
         columns = max(round((east - west) / cell), left + part.shape[1])
         values = np.zeros((rows, columns))
@@ -341,7 +343,8 @@ def _recorder(raw: RawRecords, run: Mapping[str, Any]) -> Recorder:
 
 
 def _point(time: float, content: Mapping[str, Any], mode: str) -> TrackPoint:
-    place, turn = content["pose"]["position"], content["pose"]["orientation"]
+    place = content["pose"]["position"]
+    turn = content["pose"]["orientation"]
     return TrackPoint(time, place["x"], place["y"], messages.heading_of(turn), mode)
 
 
@@ -350,11 +353,13 @@ def _track(
 ) -> list[TrackPoint]:
     """The samples of a track as they were taken, with those left out of somebody who stands."""
     track: list[TrackPoint] = []
-    turns, mode = iter([*modes, (inf, {"activity": ""})]), ""
+    turns = iter([*modes, (inf, {"activity": ""})])
+    mode = ""
     since, following = next(turns)
     for time, content in contents:
         while since <= time:
-            mode, (since, following) = following["activity"], next(turns)
+            mode = following["activity"]
+            (since, following) = next(turns)
         here = _point(time, content, mode)
         track += _left_out(track[-1], here.time, period) if track else ()
         track.append(here)
@@ -400,7 +405,8 @@ def _drives(raw: RawRecords, run: Mapping[str, Any]) -> list[DriveLog]:
 
 
 def _applied(time: float, content: Mapping[str, Any]) -> Applied:
-    until, captured = content["until_s"], content["captured_s"]
+    until = content["until_s"]
+    captured = content["captured_s"]
     return Applied(
         issued=content["made_s"],
         sent=content["sent_s"],
@@ -410,52 +416,3 @@ def _applied(time: float, content: Mapping[str, Any]) -> Applied:
         sample_age=nan,
         captured=nan if captured is None else captured,
     )
-
-
-Columns = dict[str, NDArray[Any]]
-
-
-@dataclass(frozen=True)
-class Lapse:
-    """A run as a figure needs it.
-
-    Attributes:
-        tracks: A row for each sampled moment of everybody: `agent`, `t_s`, `x_m`, `y_m`,
-            `heading_rad`, `mode`; in order of time for each agent.
-        story: A row for each line of the story: `t_s`, `who`, `what`, `kind`.
-        incidents: The hazards, with those that were reported and not there.
-        contained: Time at which incidents were contained [s], by their index in `incidents`.
-        duration: Length of the run, or of the file [s].
-    """
-
-    site: Site
-    tracks: Columns
-    story: Columns
-    incidents: tuple[RunHazard, ...]
-    contained: dict[int, float]
-    duration: float
-
-
-def read_lapse(path: Path) -> Lapse:
-    """Read what a figure needs of a recording.
-
-    Raises:
-        ConfigError: no such file, or not a recording.
-    """
-    playback = read_recording(path).playback
-    recorder = playback.recorder
-    rows = [(name, *point) for name, track in recorder.tracks.items() for point in track]
-    story = [(m.time, m.who, m.what, m.kind) for m in recorder.timeline]
-    return Lapse(
-        playback.site,
-        _columns(rows, "agent", "t_s", "x_m", "y_m", "heading_rad", "mode"),
-        _columns(story, "t_s", "who", "what", "kind"),
-        tuple(playback.incidents),
-        playback.contained,
-        playback.duration,
-    )
-
-
-def _columns(rows: list[tuple[Any, ...]], *names: str) -> Columns:
-    columns = list(zip(*rows, strict=True)) or [()] * len(names)
-    return {name: np.array(column) for name, column in zip(names, columns, strict=True)}

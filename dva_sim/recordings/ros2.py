@@ -88,8 +88,10 @@ def _velocity(before: TrackPoint, after: TrackPoint) -> tuple[float, float, floa
     gap = after.time - before.time
     turn = (after.heading - before.heading + math.pi) % (2 * math.pi) - math.pi
     middle = before.heading + turn / 2
-    dx, dy = (after.x - before.x) / gap, (after.y - before.y) / gap
-    cos, sin = math.cos(middle), math.sin(middle)
+    dx = (after.x - before.x) / gap
+    dy = (after.y - before.y) / gap
+    cos = math.cos(middle)
+    sin = math.sin(middle)
     return cos * dx + sin * dy, cos * dy - sin * dx, turn / gap
 
 
@@ -132,7 +134,8 @@ class _Maker:
 
     def log(self, moment: Moment) -> Any:
         """rcl_interfaces/Log."""
-        level, stamp = LEVELS.get(moment.kind, INFO), self._time(moment.time)
+        level = LEVELS.get(moment.kind, INFO)
+        stamp = self._time(moment.time)
         return self._new("rcl_interfaces/msg/Log", stamp, level, moment.who, moment.what, "", "", 0)
 
     def _new(self, kind: str, *values: Any) -> Any:
@@ -150,6 +153,7 @@ class _Maker:
 
     def _pose(self, p: TrackPoint) -> Any:
         place = self._new("geometry_msgs/msg/Point", p.x, p.y, 0.0)
-        z, w = math.sin(p.heading / 2), math.cos(p.heading / 2)
+        z = math.sin(p.heading / 2)
+        w = math.cos(p.heading / 2)
         turn = self._new("geometry_msgs/msg/Quaternion", 0.0, 0.0, z, w)
         return self._new("geometry_msgs/msg/Pose", place, turn)

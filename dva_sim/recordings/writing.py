@@ -79,7 +79,8 @@ def _map_files(site: Site) -> dict[str, bytes]:
     """A bare map in ROS map_server form, each cell as it was read."""
     from PIL import Image
 
-    grid, shades = site.grid, np.zeros(256, np.uint8)
+    grid = site.grid
+    shades = np.zeros(256, np.uint8)
     for cell, shade in SHADES.items():
         shades[cell] = shade
     picture = io.BytesIO()
@@ -95,7 +96,10 @@ def _map_files(site: Site) -> dict[str, bytes]:
 FORMAT = 1  # of what is attached; a reader refuses a later one
 COUNTS = "dva-sim messages"  # metadata of how many each topic has, by which filtering is found
 ABOUT, DIGEST = "dva-sim", "digest"  # name of the metadata, and of one entry of it
-RUN, SCENARIO, TABLES, SITE = "run.json", "scenario.json", "tables.json", "site/"
+RUN = "run.json"
+SCENARIO = "scenario.json"
+TABLES = "tables.json"
+SITE = "site/"
 DESCRIBED = ("title", "shows", "colour", "mark")  # of a hazard whose class a reader does not load
 HELD_TO = "held_to"  # what robots are held to, where the facts are recorded that this is judged by
 SENT = ("responder", "operator", "actor")  # to an event

@@ -52,7 +52,8 @@ class RosBody(RobotBody):
         send: Callable[[float, float], bool],
     ) -> None:
         super().__init__(world, name, spec, Pose(0.0, 0.0, 0.0))
-        self._clock, self._send = clock, send
+        self._clock = clock
+        self._send = send
         self._set_point = 0.0, 0.0, 0.0
         self.stopped_at = self._stop_until = -math.inf
         self.has_stood = True
@@ -72,9 +73,11 @@ class RosBody(RobotBody):
 
     def place(self, motion: RosMotion) -> None:
         """Be where odometry says, and move so."""
-        body, heading = self.body, motion.heading
+        body = self.body
+        heading = motion.heading
         turns = round((body.angle - heading) / (2.0 * math.pi))
-        body.position, body.angle = (motion.x, motion.y), heading + 2.0 * math.pi * turns
+        body.position = (motion.x, motion.y)
+        body.angle = heading + 2.0 * math.pi * turns
         ahead = math.cos(heading), math.sin(heading)
         body.velocity = motion.speed * ahead[0], motion.speed * ahead[1]
         body.angular_velocity = motion.turn_rate
@@ -83,7 +86,9 @@ class RosBody(RobotBody):
 
     @override
     def drive(self, speed: float, turn_rate: float, until: float) -> None:
-        most, fastest, now = self.spec.max_speed, self.spec.max_turn_rate, self._clock.now
+        most = self.spec.max_speed
+        fastest = self.spec.max_turn_rate
+        now = self._clock.now
         if not (math.isfinite(speed) and math.isfinite(turn_rate)) or math.isnan(until):
             speed = turn_rate = 0.0
         speed = 0.0 if speed < 0.0 else most if speed > most else speed
@@ -103,8 +108,10 @@ class RosBody(RobotBody):
         """Tell the robot to stand."""
         now = self._clock.now
         if self._is_asked_to_move or now >= self._stop_until:
-            self.stopped_at, self.has_stood = now, self.has_stood and not self._is_asked_to_move
-        self._is_asked_to_move, self._stop_until = False, now + STOP_REPEATED
+            self.stopped_at = now
+            self.has_stood = self.has_stood and not self._is_asked_to_move
+        self._is_asked_to_move = False
+        self._stop_until = now + STOP_REPEATED
         self._set_point = 0.0, 0.0, now
         self._send(0.0, 0.0)
 

@@ -59,9 +59,14 @@ class RosbridgeClient:
         on_change: Callable[[str], object],
         on_bad: Callable[[str, str], object],
     ) -> None:
-        self._clock, self._url, self._topics, self._advertised = clock, url, topics, advertised
-        self._on_change, self._on_bad = on_change, on_bad
-        self._pause, self._is_over = FIRST_PAUSE, False
+        self._clock = clock
+        self._url = url
+        self._topics = topics
+        self._advertised = advertised
+        self._on_change = on_change
+        self._on_bad = on_bad
+        self._pause = FIRST_PAUSE
+        self._is_over = False
         self._dialer: WebSocketDialer | None = None
         self.is_connected = False
         self.counters: Counter[str] = Counter()
@@ -132,7 +137,8 @@ class RosbridgeClient:
         self._on_change("")
 
     def _lost(self, why: str) -> None:
-        was_connected, self.is_connected = self.is_connected, False
+        was_connected = self.is_connected
+        self.is_connected = False
         if self._is_over:
             return
         self._pause = FIRST_PAUSE if was_connected else min(2.0 * self._pause, LONGEST_PAUSE)

@@ -33,7 +33,9 @@ class Dialling:
         connected: Callable[[socket.socket], object],
         failed: Callable[[str], object],
     ) -> None:
-        self._clock, self._connected, self._failed = clock, connected, failed
+        self._clock = clock
+        self._connected = connected
+        self._failed = failed
         self._deadline = clock.now + OPENS_WITHIN
         self._sock: socket.socket | None = None
         try:

@@ -28,15 +28,22 @@ class Fitness:
 
     def __init__(self, limits: RosLimits) -> None:
         self._limits = limits
-        self._bridge, self._refused = NO_BRIDGE, ""
-        self._heard, self._best, self._at, self._behind = -math.inf, math.inf, 0.0, 0.0
+        self._bridge = NO_BRIDGE
+        self._refused = ""
+        self._heard = -math.inf
+        self._best = math.inf
+        self._at = 0.0
+        self._behind = 0.0
         self._late_since = math.inf
-        self._does_not_stop, self._disabled = False, ""
+        self._does_not_stop = False
+        self._disabled = ""
 
     def connected(self) -> None:
         """The bridge is there; what came over an earlier connection says nothing any more."""
         self._bridge = self._refused = ""
-        self._heard, self._best, self._behind = -math.inf, math.inf, 0.0
+        self._heard = -math.inf
+        self._best = math.inf
+        self._behind = 0.0
         self._late_since = math.inf
 
     def lost(self, why: str) -> None:
@@ -46,11 +53,13 @@ class Fitness:
 
     def moved(self, now: float, stamp: float | None) -> None:
         """Odometry has come, and was measured at `stamp` by the robot's clock [s]."""
-        self._heard, self._refused = now, ""
+        self._heard = now
+        self._refused = ""
         if stamp is not None:
             offset = now - stamp
             self._best = min(offset, self._best + DRIFT * (now - self._at))
-            self._at, self._behind = now, offset - self._best
+            self._at = now
+            self._behind = offset - self._best
 
     def refused(self, why: str) -> None:
         """Odometry has come that says nothing of use."""

@@ -47,7 +47,9 @@ class KnownRobot:
     """
 
     def __init__(self, id_tag: str, name: str, label: str) -> None:
-        self.id_tag, self.name, self.label = id_tag, name, label
+        self.id_tag = id_tag
+        self.name = name
+        self.label = label
         self.frames: Subscription | None = None
         self.scan: ScanReader | None = None
         self.pictures: MjpegReader | None = None
@@ -66,8 +68,11 @@ class ScanReader:
     def __init__(
         self, device: AgentDevice, robot: str, take: Callable[[tuple[float, ...]], object]
     ) -> None:
-        self._device, self._robot, self._take = device, robot, take
-        self._session, self._is_over = 0, False
+        self._device = device
+        self._robot = robot
+        self._take = take
+        self._session = 0
+        self._is_over = False
         topic = sensor_topic(LIDAR, device.id_tag)
         self._heard = device.network.subscribe(device.id_tag, robot, topic, self._on_value)
         self._ask()
@@ -121,7 +126,8 @@ class RosDriver:
     def __init__(self, device: AgentDevice, console: Callable[[], Console]) -> None:
         phone = console().phone
         self._person = PersonAgent(device, console(), lambda: GivenVelocity(phone))
-        self._console, self._number = console, 0
+        self._console = console
+        self._number = 0
         self._wanted: set[str] = set()
         self._newest: dict[str, int] = {}
         device.register()
@@ -225,7 +231,8 @@ class RosGateway:
     """
 
     def __init__(self, stage: Stage, console: Callable[[], Console] | None = None) -> None:
-        self._stage, self.clock = stage, stage.clock
+        self._stage = stage
+        self.clock = stage.clock
         self._console = console or (lambda: console_of(stage, stage.scenario))
         self.device = stage.device("ros", 1)
         self.device.call("rosbridge")
@@ -236,7 +243,8 @@ class RosGateway:
         self.on_frame: Callable[[KnownRobot, CameraFrame], object] = lambda *_: None
         self.on_scan: Callable[[KnownRobot, tuple[float, ...]], object] = lambda *_: None
         self.on_picture: Callable[[KnownRobot, bytes, float], object] = lambda *_: None
-        self.camera_base, self.camera_token = "", ""
+        self.camera_base = ""
+        self.camera_token = ""
         self._free.append(self._new_driver())
         self.device.register(self._look_around)
 

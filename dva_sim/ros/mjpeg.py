@@ -40,11 +40,14 @@ class MjpegReader:
         take: Callable[[bytes, float | None], object],
         is_trusted: bool = False,
     ) -> None:
-        self._clock, self._token, self._take = clock, token, take
+        self._clock = clock
+        self._token = token
+        self._take = take
         self._host, self._port, self._path = _place_of(url, is_trusted)
         self._sock: socket.socket | None = None
         self._dialling: Dialling | None = None
-        self._data, self._is_over = bytearray(), False
+        self._data = bytearray()
+        self._is_over = False
         self._open()
 
     def _open(self) -> None:
@@ -116,7 +119,8 @@ def _place_of(url: str, may_have_name: bool) -> tuple[str, int, str]:
     """Return host, port and path of a stream; no host where a robot says what cannot be one."""
     try:
         parts = urlsplit(url)
-        host, port = parts.hostname or "", parts.port or 80
+        host = parts.hostname or ""
+        port = parts.port or 80
         if not may_have_name:
             ipaddress.ip_address(host)
     except ValueError:

@@ -81,7 +81,8 @@ def stamp_of(message: Any) -> float | None:
     stamp = message.get("header", {}).get("stamp") if isinstance(message, Mapping) else None
     if not isinstance(stamp, Mapping):
         return None
-    whole, rest = stamp.get("sec", stamp.get("secs")), stamp.get("nanosec", stamp.get("nsecs"))
+    whole = stamp.get("sec", stamp.get("secs"))
+    rest = stamp.get("nanosec", stamp.get("nsecs"))
     if not isinstance(whole, int) or not isinstance(rest, int) or not (whole or rest):
         return None
     if not 0 <= whole < LATEST or not 0 <= rest < 1e9:
@@ -105,9 +106,11 @@ class RosReader:
     """Reads the messages of one robot by its profile."""
 
     def __init__(self, profile: RosProfile) -> None:
-        self._profile, origin = profile, profile.origin
+        self._profile = profile
+        origin = profile.origin
         self._turn = math.radians(origin.heading_deg)
-        self._cos, self._sin = math.cos(self._turn), math.sin(self._turn)
+        self._cos = math.cos(self._turn)
+        self._sin = math.sin(self._turn)
         self._origin = origin.x_m, origin.y_m
 
     def odometry(self, message: Any) -> RosMotion:
@@ -119,12 +122,15 @@ class RosReader:
         self._check_frame("header.frame_id", part(message, "header", "frame_id"), "odometry")
         self._check_frame("child_frame_id", part(message, "child_frame_id"), "base")
         x, y, heading = self._placed(part(message, "pose", "pose"), "position", "orientation")
-        twist, units = part(message, "twist", "twist"), self._profile.units
+        twist = part(message, "twist", "twist")
+        units = self._profile.units
         speed = number(part(twist, "linear", "x"), "twist.linear.x") * units.metres
         turn = number(part(twist, "angular", "z"), "twist.angular.z") * units.radians
         if abs(speed) > FASTEST or abs(turn) > FASTEST:
             raise BadReading(f"{speed:g} m/s and {turn:g} rad/s are beyond any robot")
-        return RosMotion(*(x, y, heading), speed=speed, turn_rate=turn, stamp=stamp_of(message))
+        return RosMotion(
+            x, y=y, heading=heading, speed=speed, turn_rate=turn, stamp=stamp_of(message)
+        )
 
     def transform(self, message: Any, before: RosMotion | None) -> RosMotion | None:
         """Return the motion by tf2_msgs/TFMessage; None if the robot is not in it.
@@ -136,7 +142,8 @@ class RosReader:
         Raises:
             BadReading: it is not as it should be.
         """
-        transforms, frames = part(message, "transforms"), self._profile.frames
+        transforms = part(message, "transforms")
+        frames = self._profile.frames
         if not isinstance(transforms, list) or len(transforms) > 1000:
             raise BadReading("transforms is not a list of at most 1000")
         for each in transforms:
@@ -232,7 +239,8 @@ def _moved(
         return RosMotion(x, y, heading, speed=0.0, turn_rate=0.0, stamp=stamp)
     if stamp is None or before.stamp is None or stamp <= before.stamp:
         raise BadReading("transforms have no time that grows, so no speed follows from them")
-    dt, ahead = stamp - before.stamp, heading
+    dt = stamp - before.stamp
+    ahead = heading
     along = (x - before.x) * math.cos(ahead) + (y - before.y) * math.sin(ahead)
     turned = math.remainder(heading - before.heading, 2.0 * math.pi)
     return RosMotion(x, y, heading, speed=along / dt, turn_rate=turned / dt, stamp=stamp)

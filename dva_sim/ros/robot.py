@@ -55,11 +55,17 @@ class RosRobot:
     ) -> None:
         clock = stage.clock
         assert isinstance(clock, LiveClock)
-        self._stage, self._profile, self._clock = stage, profile, clock
-        self._reader, self.fitness = RosReader(profile), Fitness(profile.limits)
-        self._namespace, self._command = namespace, profile.topic(namespace, profile.topics.command)
+        self._stage = stage
+        self._profile = profile
+        self._clock = clock
+        self._reader = RosReader(profile)
+        self.fitness = Fitness(profile.limits)
+        self._namespace = namespace
+        self._command = profile.topic(namespace, profile.topics.command)
         self._motion: RosMotion | None = None
-        self._charge, self._ranges, self._pictured = 1.0, tuple[float, ...](), -math.inf
+        self._charge = 1.0
+        self._ranges = tuple[float, ...]()
+        self._pictured = -math.inf
         self._reported_at: dict[str, float] = {}
         self._is_registered = False
         self.on_picture: Callable[[bytes], object] = lambda _: None
@@ -72,12 +78,16 @@ class RosRobot:
             on_bad=self._refused,
         )
         self.agent = self._made(number)
-        self.agent.unfit, self.agent.takes_missions = NO_ODOMETRY, False
+        self.agent.unfit = NO_ODOMETRY
+        self.agent.takes_missions = False
         clock.every(LOOK, self._look)
 
     def _made(self, number: int) -> RobotAgent:
-        stage, profile, limits = self._stage, self._profile, self._profile.limits
-        device, world = stage.device("robot", number), World(stage.site)
+        stage = self._stage
+        profile = self._profile
+        limits = self._profile.limits
+        device = stage.device("robot", number)
+        world = World(stage.site)
         spec = DriveSpec(
             mass=1.0,
             radius=profile.radius_m,
@@ -112,7 +122,8 @@ class RosRobot:
         )
 
     def _setup(self) -> RobotSetup:
-        stage, profile = self._stage, self._profile
+        stage = self._stage
+        profile = self._profile
         sensors = {}
         if profile.topics.battery is not None:
             sensors["battery"] = SensorPort("1", lambda _: (self._charge,), SENSOR_HZ)
@@ -131,8 +142,10 @@ class RosRobot:
         )
 
     def _topics(self) -> dict[str, Subscribed]:
-        profile, topics = self._profile, self._profile.topics
-        name, kind = partial(profile.topic, self._namespace), profile.type_name
+        profile = self._profile
+        topics = self._profile.topics
+        name = partial(profile.topic, self._namespace)
+        kind = profile.type_name
         sensor = partial(kind, "sensor_msgs")
         picture = 4 * profile.largest_picture_bytes // 3 + 1000  # as base64
         wanted = {
@@ -204,7 +217,8 @@ class RosRobot:
 
     def _refused(self, topic: str, why: str) -> None:
         """Count what was refused; tell it in one line, but not each time."""
-        device, now = self.agent.device, self._clock.now
+        device = self.agent.device
+        now = self._clock.now
         device.recorder.counters[f"refused from the robot: {topic or 'a message'}"] += 1
         if now - self._reported_at.get(topic, -math.inf) > TELL_AGAIN:
             self._reported_at[topic] = now
@@ -254,7 +268,9 @@ class RosRobot:
         self.bridge.call(service, answered)
 
     def _look(self) -> None:
-        now, agent, body = self._clock.now, self.agent, self.body
+        now = self._clock.now
+        agent = self.agent
+        body = self.body
         self.fitness.obeys(now, body.stopped_at, body.has_stood)
         problem = self.fitness.problem(now)
         late = self._profile.topics.picture is not None and now - self._pictured
@@ -284,7 +300,8 @@ class RosRobot:
     def _check_place(self) -> None:
         """Say so if the robot stands beside the site: the profile's origin may be wrong."""
         west, south, east, north = self._stage.site.extent
-        x, y = self.body.x, self.body.y
+        x = self.body.x
+        y = self.body.y
         if not (west <= x <= east and south <= y <= north):
             site = self._stage.site.name
             self.agent.device.tell(

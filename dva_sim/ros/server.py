@@ -76,14 +76,20 @@ class RosbridgeServer:
         site: Site,
         tell: Callable[[str], object],
     ) -> None:
-        self._clock, self._listener, self._gateway, self._site = clock, port.listener, gateway, site
-        self._admission, self._tell = port.admission(), tell
+        self._clock = clock
+        self._listener = port.listener
+        self._gateway = gateway
+        self._site = site
+        self._admission = port.admission()
+        self._tell = tell
         self._places = PortConnections(MOST_CONNECTIONS, MOST_SERVED)
         self._peers: dict[WebSocketConnection, RosPeer | None] = {}
-        self._count, self._map = 0, b""
-        gateway.on_frame, gateway.on_scan = self._on_frame, self._on_scan
+        self._count = 0
+        self._map = b""
+        gateway.on_frame = self._on_frame
+        gateway.on_scan = self._on_scan
         gateway.on_picture = self._on_picture
-        clock.watch(port.listener.fileno(), self._accept)
+        self._listen()
         clock.every(CLOCK_PERIOD, self._tick)
         clock.every(PING, self._ping)
         clock.every(SWEEP, lambda: self._places.sweep(clock.now))
@@ -103,9 +109,18 @@ class RosbridgeServer:
 
     # --- connections ---------------------------------------------------------------------
 
+    def _listen(self) -> None:
+        if self._listener.fileno() >= 0:
+            self._clock.watch(self._listener.fileno(), self._accept)
+
     def _accept(self) -> None:
         from websockets.server import ServerProtocol  # late: start-up
 
+        wait = self._places.wait(self._clock.now)
+        if wait > 0.0:
+            self._clock.unwatch(self._listener.fileno())
+            self._clock.call_after(wait, self._listen)
+            return
         with suppress(OSError):
             sock, _ = self._listener.accept()
             place = self._places.enter(self._clock.now)
@@ -161,7 +176,8 @@ class RosbridgeServer:
         headers = request.headers
         try:
             facts = RequestFacts(headers.get("Host", ""), headers.get("Origin"), changes=True)
-            query, bearer = urlsplit(request.path).query, headers.get("Authorization", "")
+            query = urlsplit(request.path).query
+            bearer = headers.get("Authorization", "")
         except (ValueError, LookupError):  # LookupError: a header that is there twice
             return HTTPStatus.BAD_REQUEST, "the address or the headers make no sense\n"
         refusal = self._admission.refusal(facts, query, bearer)
@@ -238,12 +254,15 @@ class RosbridgeServer:
     # --- readings ------------------------------------------------------------------------
 
     def _on_frame(self, robot: KnownRobot, frame: CameraFrame) -> None:
-        name, seen, at = robot.name, frame.observation, frame.captured
+        name = robot.name
+        seen = frame.observation
+        at = frame.captured
         self._send(f"/{name}/odom", lambda: published.odometry(name, seen, at))
         self._send("/tf", lambda: published.transform(name, seen, at))
 
     def _on_scan(self, robot: KnownRobot, ranges: tuple[float, ...]) -> None:
-        name, now = robot.name, self._clock.now
+        name = robot.name
+        now = self._clock.now
         self._send(f"/{name}/scan", lambda: published.scan(name, ranges, now))
 
     def _on_picture(self, robot: KnownRobot, jpeg: bytes, captured: float) -> None:
@@ -310,7 +329,9 @@ class RosbridgeServer:
         peer.driver.take(robot.id_tag, on_result)
 
     def _rosapi(self, service: str, args: Json) -> Json:
-        topics, services, kind = self.topics(), self.services(), str(args.get("type", ""))
+        topics = self.topics()
+        services = self.services()
+        kind = str(args.get("type", ""))
         match service.rpartition("/")[2]:
             case "topics":
                 return {"topics": list(topics), "types": list(topics.values())}

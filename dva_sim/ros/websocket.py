@@ -53,12 +53,16 @@ class WebSocketConnection:
         on_text: Callable[[bytes], object],
         on_end: Callable[[str], object],
     ) -> None:
-        self._clock, self._sock, self._protocol = clock, sock, protocol
-        self._on_text, self._on_end = on_text, on_end
+        self._clock = clock
+        self._sock = sock
+        self._protocol = protocol
+        self._on_text = on_text
+        self._on_end = on_end
         self._parts: list[bytes] = []
         self._buffer = bytearray()
         self._flushing = False
-        self.is_open, self.heard_at = True, clock.now
+        self.is_open = True
+        self.heard_at = clock.now
         self.on_event: Callable[[Any], object] = lambda _: None
         sock.setblocking(False)
         with suppress(OSError):
@@ -184,7 +188,8 @@ class WebSocketConnection:
         elif int(opcode) in (0, 1, 2):
             self._parts.append(bytes(event.data))
             if event.fin:
-                data, self._parts = b"".join(self._parts), []
+                data = b"".join(self._parts)
+                self._parts = []
                 self._on_text(data)
 
     def end(self, why: str) -> None:
@@ -215,7 +220,8 @@ class WebSocketUrl:
             self.uri = parse_uri(text)
         except (InvalidURI, ValueError):
             raise ConfigError(f"{option} {text!r} {should}") from None
-        self.text, self.host = text, self.uri.host
+        self.text = text
+        self.host = self.uri.host
         self.port = self.uri.port if f":{self.uri.port}" in text else PORT
 
 
@@ -244,8 +250,12 @@ class WebSocketDialer:
         on_text: Callable[[bytes], object],
         on_end: Callable[[str], object],
     ) -> None:
-        self._clock, self._url, self._largest = clock, url, largest
-        self._on_open, self._on_text, self._on_end = on_open, on_text, on_end
+        self._clock = clock
+        self._url = url
+        self._largest = largest
+        self._on_open = on_open
+        self._on_text = on_text
+        self._on_end = on_end
         self.connection: WebSocketConnection | None = None
         self._is_open = self._is_over = False
         self._dialling = Dialling(clock, url.host, url.port, self._connected, self._over)

@@ -138,7 +138,8 @@ class Admission:
         except ValueError:  # more fields than anybody writes
             return 400, "the address makes no sense"
         token = token or bearer.removeprefix("Bearer ")
-        shown, secret = token.encode("utf-8", "replace"), self.token.encode()
+        shown = token.encode("utf-8", "replace")
+        secret = self.token.encode()
         if self.token and not hmac.compare_digest(shown, secret):
             return 401, "the token is missing or wrong: add ?token=... as printed with the address"
         return None

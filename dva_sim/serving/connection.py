@@ -35,7 +35,9 @@ class HttpProtocol(H11Protocol):
 
     def __init__(self, place: PortConnection, **given: Any) -> None:
         super().__init__(**given)
-        self._place, self.is_made, self._is_lost = place, False, False
+        self._place = place
+        self.is_made = False
+        self._is_lost = False
         self.app = extended(self.app, {PLACE: place, WIRE: self})
         kind: Any = self.ws_protocol_class
         if kind is not None:
@@ -66,7 +68,8 @@ class HttpProtocol(H11Protocol):
     def connection_made(self, transport: Any) -> None:
         """Let the connection be cut for others."""
         super().connection_made(transport)
-        self.is_made, self._place.drop = True, self.cut
+        self.is_made = True
+        self._place.drop = self.cut
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Give the place to others."""

@@ -64,8 +64,11 @@ class PipeEnd:
 
     def __init__(self, end: int, following: Callable[[], bytes | None] = lambda: None) -> None:
         os.set_blocking(end, False)
-        self._end, self._following = end, following
-        self._rest, self._lines, self.is_open = b"", Lines(), True
+        self._end = end
+        self._following = following
+        self._rest = b""
+        self._lines = Lines()
+        self.is_open = True
 
     def fileno(self) -> int:
         """Return the number of the file; -1 once it is closed."""
@@ -151,7 +154,10 @@ class WatchedEnd(PipeEnd):
         following: Callable[[], bytes | None] = lambda: None,
     ) -> None:
         super().__init__(end, following)
-        self._loop, self._take, self._ended, self._waits = loop, take, ended, False
+        self._loop = loop
+        self._take = take
+        self._ended = ended
+        self._waits = False
         loop.add_reader(end, self._hear)
 
     def _hear(self) -> None:

@@ -1,8 +1,9 @@
 """Connections of a port: bounded in number, and the least important one makes room for a newcomer.
 
 Anybody can open a connection, so one on which no token was shown never keeps out another: it is cut
-after a few seconds, and at once if all places are taken. Connections with a token yield to those
-with a token of a higher rank. Pure: without a clock and without sockets.
+after a few seconds, and sooner if all places are taken. Newcomers then take turns at a bounded
+rate, so each has time to show its token, over a slow network too. Connections with a token yield to
+those with a token of a higher rank. Pure: without a clock and without sockets.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from dataclasses import dataclass, field
 _LOG = logging.getLogger("uvicorn.error")  # that of the server
 MOST = 512  # connections of a port
 MOST_SERVED = 400  # of them with a token and a request in progress; the others are for newcomers
+NEWCOMERS = 500  # design: that may cut others without a token [1/s]
 SILENT = 5.0  # without a token a connection is cut after this [s]
 IDLE = 20.0  # with one, between two requests [s]; longer than the server keeps it open itself
 
@@ -24,13 +26,15 @@ class PortConnection:
 
     Attributes:
         places: The connections that it is one of.
-        since: Time at which it was made, or its newest request began or ended [s].
+        made: Time at which it was made [s].
+        since: The same, or the time at which its newest request began or ended [s].
         rank: Rank of the role that its newest request showed; 0: no token.
         busy: True while a request is in progress or a WebSocket is open.
         drop: Cuts the connection.
     """
 
     places: PortConnections = field(repr=False)
+    made: float
     since: float
     rank: int = 0
     busy: bool = False
@@ -49,12 +53,15 @@ class PortConnection:
             now: Time [s].
             is_limited: False for requests outside the limit.
         """
-        self.rank, self.busy, self.since = rank, True, now
+        self.rank = rank
+        self.busy = True
+        self.since = now
         return not (is_limited and self.is_served) or self.places.bear(self)
 
     def end(self, now: float) -> None:
         """Note that the request is answered, or its WebSocket is closed."""
-        self.busy, self.since = False, now
+        self.busy = False
+        self.since = now
 
     def leave(self) -> None:
         """Note that the connection is closed; may be repeated."""
@@ -74,18 +81,24 @@ class PortConnections:
     """
 
     def __init__(self, most: int = MOST, most_served: int = MOST_SERVED) -> None:
-        self._most, self._most_served = most, most_served
+        self._most = most
+        self._most_served = most_served
+        self._turn = most / NEWCOMERS
         self.taken: dict[PortConnection, None] = {}
         self.dropped = {"silent": 0, "for a newcomer": 0, "for a higher rank": 0}
+
+    def wait(self, now: float) -> float:
+        """Return how long a newcomer waits for a place: so that each has its turn [s]."""
+        if len(self.taken) < self._most:
+            return 0.0
+        least = self._least()
+        return 0.0 if least.rank else max(0.0, least.made + self._turn - now)
 
     def enter(self, now: float) -> PortConnection:
         """Return the place of a new connection; if all are taken, another connection is cut."""
         if len(self.taken) >= self._most:
-            known = [place for place in self.taken if place.rank > 0]
-            # Newcomers show their token in their first request, so some places are always theirs.
-            full = known if len(known) > self._most_served else ()
-            self._drop(min(full or self.taken, key=_importance), "for a newcomer")
-        place = PortConnection(self, now)
+            self._drop(self._least(), "for a newcomer")
+        place = PortConnection(self, now, now)
         self.taken[place] = None
         return place
 
@@ -106,6 +119,13 @@ class PortConnections:
             if not place.is_served and now - place.since > (IDLE if place.rank else SILENT):
                 self._drop(place, "silent")
 
+    def _least(self) -> PortConnection:
+        """Return the connection that makes room first."""
+        known = [place for place in self.taken if place.rank > 0]
+        # Newcomers show their token in their first request, so some places are always theirs.
+        full = known if len(known) > self._most_served else ()
+        return min(full or self.taken, key=_importance)
+
     def _drop(self, place: PortConnection, why: str) -> None:
         place.leave()
         self.dropped[why] += 1
@@ -116,5 +136,8 @@ class PortConnections:
 
 
 def _importance(place: PortConnection) -> tuple[bool, int, float]:
-    """Requests with a token come first, then the rank; of the others the newest matter most."""
-    return place.is_served, place.rank, place.since
+    """Requests with a token come first, then the rank; of the others the newest matter most.
+
+    Without a token no request makes a connection newer: it would keep its place for ever.
+    """
+    return place.is_served, place.rank, place.since if place.rank else place.made

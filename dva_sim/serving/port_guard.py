@@ -25,12 +25,15 @@ class PortGuard:
     """
 
     def __init__(self, app: ASGIApp, admission: Admission) -> None:
-        self._app, self._admission = app, admission
+        self._app = app
+        self._admission = admission
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request."""
-        place, headers = place_of(scope), HTTPConnection(scope).headers
-        query, bearer = scope["query_string"].decode("latin-1"), headers.get("authorization", "")
+        place = place_of(scope)
+        headers = HTTPConnection(scope).headers
+        query = scope["query_string"].decode("latin-1")
+        bearer = headers.get("authorization", "")
         refusal = self._admission.refusal(facts_of(scope, is_page=True), query, bearer)
         if not place.begin(0 if refusal else CLIENT, time.monotonic()):
             refusal = 503, "too many connections are in use"

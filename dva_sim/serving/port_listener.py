@@ -64,7 +64,10 @@ class PortListener:
         context: ssl.SSLContext | None,
         places: PortConnections,
     ) -> None:
-        self._sock, self._make, self._context, self._places = sock, make, context, places
+        self._sock = sock
+        self._make = make
+        self._context = context
+        self._places = places
         self._at_once = SERVED_AT_ONCE if context is None else HANDSHAKES_AT_ONCE
         self._speaking: deque[tuple[socket.socket, PortConnection]] = deque()
         self._connecting: set[asyncio.Task[None]] = set()
@@ -86,14 +89,16 @@ class PortListener:
 
     def _accept(self) -> None:
         for _ in range(AT_ONCE):
+            wait = self._places.wait(time.monotonic())
+            if wait > 0.0:
+                self._pause(wait)
+                return
             try:
                 connection, _ = self._sock.accept()
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
                 return
             except OSError:  # no file is left, here or in the whole system
-                loop = asyncio.get_running_loop()
-                loop.remove_reader(self._sock)
-                loop.call_later(PAUSE, self._resume)
+                self._pause(PAUSE)
                 return
             place = self._places.enter(time.monotonic())
             place.drop = partial(self._close, connection)
@@ -124,6 +129,11 @@ class PortListener:
                 task.add_done_callback(self._connecting.discard)
         if self._speaking:
             asyncio.get_running_loop().call_soon(self._serve_some)
+
+    def _pause(self, wait: float) -> None:
+        loop = asyncio.get_running_loop()
+        loop.remove_reader(self._sock)
+        loop.call_later(wait, self._resume)
 
     def _resume(self) -> None:
         if self._sock.fileno() >= 0:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import socket
 from collections.abc import Iterator
 from typing import Any
@@ -11,7 +12,6 @@ from typing import Any
 import uvicorn
 from starlette.types import ASGIApp
 
-from dva_sim.serving.complaints import limit_complaints
 from dva_sim.serving.connection import HttpProtocol
 from dva_sim.serving.port_connections import PortConnection, PortConnections
 from dva_sim.serving.port_listener import PortListener
@@ -71,3 +71,35 @@ async def serve(
     accepting.cancel()
     waiting.cancel()
     await serving
+
+
+MOST_COMPLAINTS = 5
+
+
+def limit_complaints() -> None:
+    """Limit the loggers of the server and of its event loop to a few complaints in all."""
+    handler = Complaints()
+    for name in ("uvicorn.error", "asyncio"):
+        logger = logging.getLogger(name)
+        logger.handlers = [handler]
+        logger.propagate = False
+        logger.setLevel(logging.WARNING)
+
+
+class Complaints(logging.StreamHandler):  # type: ignore[type-arg]
+    """Writes the first few records in full, and none about what clients sent or how they left."""
+
+    NOISE = ("Invalid", "Cancel", "Unsupported", "No supported", "ASGI callable")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._count = 0
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a complaint, unless it is of a client or there were enough."""
+        cut_off = record.exc_info and isinstance(record.exc_info[1], asyncio.CancelledError)
+        if cut_off or record.getMessage().startswith(self.NOISE):
+            return
+        self._count += 1
+        if self._count <= MOST_COMPLAINTS:  # nobody may read them
+            super().emit(record)

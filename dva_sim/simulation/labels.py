@@ -40,7 +40,6 @@ _LEVELS = {
     "trinomial": "trinomial-like",
     "irtp": "IRTP-like",
     "btp": "BTP-like",
-    "rtnp": "RTNP-like",
     "rtnp-in-network": "RTNP-like, network",
     "rtnp-in-hosts": "RTNP-like, hosts",
     "direct": "direct control",
@@ -122,12 +121,6 @@ def factor_name(factor: str) -> str:
     return key.title if key else _OF_STUDIES.get(factor, without_unit(habit or factor))
 
 
-def absent_at_zero(factor: str) -> str:
-    """Return what is absent at a level of zero: `delay` of `link.delay_s`; mostly nothing."""
-    key = _keys().get(factor)
-    return key.absent if key else ""
-
-
 def with_unit(factor: str) -> str:
     """A factor's name with its unit in brackets, for the head of a column."""
     unit = unit_of(factor)
@@ -185,7 +178,8 @@ def brief(levels: Mapping[str, Scalar]) -> str:
 
 
 def _brief(factor: str, level: Scalar, units: Sequence[str]) -> str:
-    unit, name = unit_of(factor), level_name(factor, level, short=True)
+    unit = unit_of(factor)
+    name = level_name(factor, level, short=True)
     if isinstance(level, str):
         return name
     is_quantity = unit and units.count(unit) == 1 and not isinstance(level, bool)
@@ -201,5 +195,6 @@ def setting(levels: Mapping[str, Scalar]) -> str:
 
 def named(factor: str, level: Scalar) -> str:
     """A level behind its factor's name, unless its own has that: `direct control`."""
-    name, own = factor_name(factor), level_name(factor, level)
+    name = factor_name(factor)
+    own = level_name(factor, level)
     return own if name in own.split() else f"{name} {own}"

@@ -4,24 +4,19 @@
 service times only, a thousand times faster; the DVA's core is the same in both. `task`: one
 person at a task of the literature, with the operators and hands of the full model. `transports`:
 a session of teleoperation beside TCP flows on one congested link, and a drive over it.
-`middleware`: commands over real middleware and an emulated link, in real time. Users add their own:
-a class derived from `Model` in a file or an installed package, named in a scenario.
+`middleware`: commands over real middleware and an emulated link, in real time.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, ClassVar, Final, Generic, TypeVar
 
-from dva_sim.kernel import config_overrides
-from dva_sim.kernel.config import Config, Fail
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Columns, names_of
-from dva_sim.kernel.plugins import Plugins
-from dva_sim.kernel.read_once import read_once
+from dva_sim.kernel.retired import use_now
 from dva_sim.kernel.suggestions import unknown
-from dva_sim.kernel.yaml_files import Document, file_in
+from dva_sim.kernel.yaml_files import Document
 from dva_sim.simulation import full, middleware, task, timed, transports
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import episode_measures as of_full
@@ -41,30 +36,7 @@ from dva_sim.simulation.transports import session_measures as of_transports
 Tables = dict[str, list[dict[str, Any]]]
 
 
-class OwnScenario(Config):
-    """A scenario of a user's own model, to be derived from; its other keys are the model's.
-
-    It is sent to other processes by the name of its model, which they load by themselves.
-
-    Attributes:
-        model: Name of the model, `mine.py:Mine`.
-    """
-
-    model: str
-    description: str = ""
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Return what another process rebuilds it from."""
-        return _restored, (self.model, self.model_dump())
-
-
-def _restored(model: str, data: dict[str, Any]) -> Any:
-    return model_named(model).scenario.model_validate(data)
-
-
-AnyScenario = (
-    Scenario | TimedScenario | TaskScenario | TransportScenario | MiddlewareScenario | OwnScenario
-)
+AnyScenario = Scenario | TimedScenario | TaskScenario | TransportScenario | MiddlewareScenario
 
 
 S = TypeVar("S", bound=AnyScenario)
@@ -74,18 +46,14 @@ Operated = TypeVar("Operated", Scenario, TaskScenario, TransportScenario)
 class Model(Generic[S]):
     """Base class of models: what a study does with a scenario.
 
-    A user's model defines `scenario`, `columns`, `simulate` and `rows`; the rest is as here.
-
     Attributes:
-        name: Set when it is loaded: a file's with its whole path.
-        scenario: Class of its scenarios; a user's derives from `OwnScenario`.
+        scenario: Class of its scenarios.
         columns: Every column of its tables. `runs` has one row for each run.
         is_recorded: True if its runs can be recorded, filmed and run side by side.
         is_real_time: True if runs take real time: then nothing else may run beside them, and their
             order is random.
     """
 
-    name = ""
     scenario: type[S]
     columns: ClassVar[Columns]
     is_recorded = False
@@ -99,25 +67,13 @@ class Model(Generic[S]):
         """Return what is measured of a run, by table."""
         raise NotImplementedError
 
-    def complete(self, scenario: S, error: Fail) -> S:
-        """Judge what the keys alone do not tell, and add what follows from them.
-
-        Raises:
-            ConfigError: made by `error` from a problem and a key.
-        """
-        return scenario
-
     def build(self, source: Document | Mapping[str, Any], changes: Mapping[str, Any]) -> S:
-        """The scenario of a file, with some keys changed.
+        """Return the scenario of a file, with some keys changed.
 
         Raises:
             ConfigError: it is not valid.
         """
-        return config_overrides.build(self.scenario, source, changes, self.complete, self._sign)
-
-    def _sign(self, data: dict[str, Any], folders: Sequence[Path]) -> None:
-        """A scenario names its model so that it is found from anywhere."""
-        data["model"] = self.name
+        raise NotImplementedError
 
     def measures(self, scenario: S | None = None) -> tuple[str, ...]:
         """Columns of the runs that a study may ask for: of some scenario, or of a certain one."""
@@ -283,65 +239,32 @@ class _Middleware(Model[MiddlewareScenario]):
         return middleware.tables(recording)
 
 
-SHIPPED: Final[dict[str, type[Model[Any]]]] = {
-    "full": _Full,
-    "timed": _Timed,
-    "task": _Task,
-    "transports": _Transports,
-    "middleware": _Middleware,
+MODELS: Final[dict[str, Model[Any]]] = {
+    "full": _Full(),
+    "timed": _Timed(),
+    "task": _Task(),
+    "transports": _Transports(),
+    "middleware": _Middleware(),
 }
-MODELS: Final[dict[str, Model[Any]]] = {name: model() for name, model in SHIPPED.items()}
-"""Ours, by name: what a results folder or a recording may name."""
-
-PLUGINS: Final = Plugins[Model[Any]](
-    kind="model",
-    base=Model,
-    shipped=SHIPPED,
-    folder="experiments/models",
-    group="dva_sim.models",
-    key="model",
-    needs="simulate(scenario, seed)",
-    public="dva_sim.simulation.models.Model",
-)
+"""By name, as a scenario, a results folder or a recording names them."""
 
 
 def model_of(document: Document) -> Model[Any]:
-    """The model that a scenario file asks for; a file that it names is loaded.
+    """Return the model that a scenario file asks for.
 
     Raises:
-        ConfigError: there is no such model, or it cannot be loaded.
+        ConfigError: there is no such model.
     """
     name = document.data.get("model", "full")
-    if not isinstance(name, str):
-        raise document.error(unknown("model", name, MODELS), ("model",))
-    try:
-        return model_named(PLUGINS.located(name, document.file.parent))
-    except ConfigError as error:
-        if error.file is not None:
-            raise
-        raise document.error(error.problem, ("model",)) from None
+    if isinstance(name, str) and name in MODELS:
+        return MODELS[name]
+    own = use_now("model", "FILE:CLASS") if ".py:" in str(name) else ""
+    raise document.error(own or unknown("model", name, MODELS), ("model",))
 
 
 def model_for(scenario: AnyScenario) -> Model[Any]:
-    """The model of a scenario that has been read."""
-    return model_named(scenario.model)
-
-
-def model_named(name: str) -> Model[Any]:
-    """A shipped model, an installed one, or one in a file that is named with its whole path.
-
-    Raises:
-        ConfigError: there is none, or it cannot be loaded or made.
-    """
-    return MODELS[name] if name in MODELS else _loaded(name)
-
-
-@read_once(lambda name: [Path(file_in(name))])
-def _loaded(name: str) -> Model[Any]:
-    """One object for each state of a file, so that its scenarios are of one class."""
-    model = PLUGINS.make(name, PLUGINS.find(name), {})
-    model.name = name
-    return model
+    """Return the model of a scenario that has been read."""
+    return MODELS[scenario.model]
 
 
 def measured_names() -> set[str]:

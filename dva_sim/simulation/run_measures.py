@@ -144,9 +144,8 @@ def value_of(measure: RunMeasure, recording: Any) -> float:
 
 
 def reads(measure: RunMeasure, model: str) -> bool:
-    """Return True if a measure, which may be in a file, can be taken of runs of a model."""
-    named = (Path(name).name for name in (model, model.rpartition(":")[2]))
-    return model in measure.models or any(name in measure.models for name in named)
+    """Return True if a measure can be taken of runs of a model."""
+    return model in measure.models
 
 
 def refuse_twins(measures: Iterable[RunMeasure], taken: Iterable[str]) -> None:

@@ -49,9 +49,7 @@ What does not hold: nothing does where slow runs are missing more often (a third
 middle, a twentieth of those below), for the runs that are left are other runs. Tests to one side
 err more often where the tail is: with the 5 % allowed, in 5 to 8 % of studies of skewness 1.75 and
 in 8 to 15 % of skewness 6.2, and to the other side less. So do tests of equivalence. With 12
-persons or fewer of whom most are zero intervals are too short. Sobol's are wide: of Ishigami's
-function from 64 points they hold in 94 to 99 % (200 studies, one person) and 95 to 100 % (120
-studies, 24 persons).
+persons or fewer of whom most are zero intervals are too short.
 """
 
 from dva_sim.statistics.bands import Band, band
@@ -77,20 +75,16 @@ from dva_sim.statistics.paired_differences import (
 )
 from dva_sim.statistics.persons import LEVEL, Floats, Interval, person_means, students_t
 from dva_sim.statistics.proportions import quantile_interval, share_interval
-from dva_sim.statistics.sensitivity import Effect, factorial_effects
-from dva_sim.statistics.sobol import SobolIndex, sobol_indices
 
 __all__ = [
     "CUT",
     "LEVEL",
     "Band",
     "Components",
-    "Effect",
     "EffectSize",
     "Floats",
     "Incidence",
     "Interval",
-    "SobolIndex",
     "VarianceReduction",
     "adjusted",
     "band",
@@ -98,7 +92,6 @@ __all__ = [
     "cumulative_incidence",
     "effect_size",
     "equivalence",
-    "factorial_effects",
     "first_of",
     "holm",
     "holm_levels",
@@ -112,7 +105,6 @@ __all__ = [
     "person_means",
     "quantile_interval",
     "share_interval",
-    "sobol_indices",
     "students_t",
     "variance_reduction",
 ]

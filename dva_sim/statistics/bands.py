@@ -49,7 +49,8 @@ def moments(values: Floats, weights: Floats) -> tuple[Floats, Floats, Floats]:
     there = np.isfinite(values)
     filled = np.where(there, values, 0.0)
     count = weights @ there
-    nobody, few = count < 1, count < 2
+    nobody = count < 1
+    few = count < 2
     centre = filled.sum(axis=0) / np.maximum(there.sum(axis=0), 1)
     off = np.where(there, values - centre, 0.0)  # centred first: squares keep their digits
     mean = np.where(nobody, np.nan, (weights @ off) / np.maximum(count, 1))
@@ -94,10 +95,12 @@ def reach(ratio: Floats, count: Floats, level: float) -> tuple[Floats, Floats]:
     """
     least = np.array([students_t(level, int(n)) for n in count])
     few = count < FEWEST_TO_RESAMPLE
-    ranked, sizes = np.sort(ratio, axis=0), np.sort(abs(ratio), axis=0)
+    ranked = np.sort(ratio, axis=0)
+    sizes = np.sort(abs(ratio), axis=0)
     either = np.maximum(least, sizes[place(len(ratio), level)])
     end = place(len(ratio), (1 + level) / 2)
-    down, up = ranked[end], -ranked[-1 - end]
+    down = ranked[end]
+    up = -ranked[-1 - end]
     return (
         np.where(few, least, np.maximum(either, down)),
         np.where(few, least, np.maximum(either, up)),
@@ -120,7 +123,8 @@ def chance_above(means: Floats) -> float:
     if len(means) < FEWEST_TO_RESAMPLE:
         return students
     ratio = studentised(means[:, np.newaxis], mean, error, RESAMPLES)
-    either, above = (abs(ratio) >= off).mean() / 2, (ratio >= off).mean()
+    either = (abs(ratio) >= off).mean() / 2
+    above = (ratio >= off).mean()
     return max(students, float(either), float(above))
 
 

@@ -116,9 +116,11 @@ def pair_correlation(a: ArrayLike, b: ArrayLike) -> float:
 
     Nan with fewer than two pairs, or where one side does not vary.
     """
-    first, second = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    first = np.asarray(a, dtype=float)
+    second = np.asarray(b, dtype=float)
     both = np.isfinite(first) & np.isfinite(second)
-    first, second = first[both], second[both]
+    first = first[both]
+    second = second[both]
     if len(first) < 2 or np.ptp(first) == 0 or np.ptp(second) == 0:
         return math.nan
     return float(np.corrcoef(first, second)[0, 1])
@@ -201,9 +203,11 @@ def components(values: ArrayLike) -> Components:
     """
     grid = np.asarray(values, dtype=float)
     there = np.isfinite(grid)
-    grid, there = grid[there.any(axis=1)], there[there.any(axis=1)]
+    grid = grid[there.any(axis=1)]
+    there = there[there.any(axis=1)]
     count = there.sum(axis=1)
-    persons, runs = len(count), int(count.sum())
+    persons = len(count)
+    runs = int(count.sum())
     if persons < 2 or runs <= persons:
         return Components(math.nan, math.nan)
     filled = np.where(there, grid, 0.0)
@@ -251,7 +255,9 @@ def _studentised(
     References:
         Efron & Tibshirani, An Introduction to the Bootstrap (1993), chapters 11 and 12.
     """
-    n, rows, shift = len(first), _rows(first, second), float((first - second).mean())
+    n = len(first)
+    rows = _rows(first, second)
+    shift = float((first - second).mean())
     whole, drawn = (
         _Drawn(weights, rows, shift) for weights in (np.ones((1, n)), draws(n, resamples))
     )
@@ -275,7 +281,8 @@ class _Drawn:
 
     def of(self, statistic: Statistic) -> tuple[Floats, Floats]:
         """A statistic of each draw and its jackknife standard error, each `(b,)`."""
-        left_out, n = statistic(self.left_out), self.weights.shape[1]
+        left_out = statistic(self.left_out)
+        n = self.weights.shape[1]
         weights = np.where(np.isfinite(left_out), self.weights, 0.0)
         left_out = np.where(weights > 0, left_out, 0.0)
         total = weights.sum(axis=1)

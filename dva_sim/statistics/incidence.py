@@ -105,7 +105,8 @@ def incidence(time: ArrayLike, cause: ArrayLike, causes: int) -> Incidence:
         cause: Number of the cause, from 1; `CUT` if it was cut off.
         causes: Number of causes.
     """
-    when, what = np.asarray(time, dtype=float), np.asarray(cause, dtype=np.intp)
+    when = np.asarray(time, dtype=float)
+    what = np.asarray(cause, dtype=np.intp)
     times, place = np.unique(when[what != CUT], return_inverse=True)
     met = np.zeros((causes, len(times)))
     np.add.at(met, (what[what != CUT] - 1, place), 1.0)
@@ -154,7 +155,8 @@ def cumulative_incidence(
     moments = np.asarray(times, dtype=float)
     there = np.isfinite(moments)
     what = np.array([str(c) if c is not None else "" for c in causes])[there]
-    moments, who = moments[there], np.asarray(person)[there]
+    moments = moments[there]
+    who = np.asarray(person)[there]
     what[moments > horizon] = ""
     names = [str(name) for name in np.unique(what) if name]
     persons, owner = np.unique(who, return_inverse=True)

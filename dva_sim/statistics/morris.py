@@ -66,7 +66,8 @@ def elementary_effects(walks: Floats, outcome: NDArray[np.float64]) -> list[Elem
     counts = np.isfinite(effects).sum(axis=0)
     ends = zip(about.mean, about.pointwise_low, about.pointwise_high, counts, strict=True)
     means = [Interval(float(m), float(low), float(high), int(n)) for m, low, high, n in ends]
-    sizes, spreads = np.nanmean(abs(effects), axis=0), np.nanstd(effects, axis=0, ddof=1)
+    sizes = np.nanmean(abs(effects), axis=0)
+    spreads = np.nanstd(effects, axis=0, ddof=1)
     return [
         ElementaryEffects(mean, float(size), float(spread))
         for mean, size, spread in zip(means, sizes, spreads, strict=True)

@@ -34,7 +34,8 @@ def mean_interval(values: ArrayLike, person: ArrayLike, level: float = LEVEL) ->
     """
     means = person_means(values, person)[1]
     found = band(means[:, np.newaxis], level)
-    low, high = float(found.pointwise_low[0]), float(found.pointwise_high[0])
+    low = float(found.pointwise_low[0])
+    high = float(found.pointwise_high[0])
     return Interval(float(found.mean[0]), low, high, len(means))
 
 

@@ -48,7 +48,8 @@ def person_means(values: ArrayLike, person: ArrayLike) -> tuple[NDArray[Any], Fl
     Returns:
         The persons `(m,)`, sorted, and their means `(m,)`; nobody without a value.
     """
-    numbers, who = np.asarray(values, dtype=float), np.asarray(person)
+    numbers = np.asarray(values, dtype=float)
+    who = np.asarray(person)
     there = np.isfinite(numbers)
     persons, code = np.unique(who[there], return_inverse=True)
     totals = np.bincount(code, weights=numbers[there], minlength=len(persons))
@@ -61,7 +62,8 @@ def paired_means(a: ArrayLike, b: ArrayLike, person: ArrayLike) -> tuple[Floats,
     Returns:
         Means of `a` `(m,)` and of `b` `(m,)`, person by person.
     """
-    first, second = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    first = np.asarray(a, dtype=float)
+    second = np.asarray(b, dtype=float)
     both = np.isfinite(first) & np.isfinite(second)
     one = person_means(np.where(both, first, np.nan), person)[1]
     return one, person_means(np.where(both, second, np.nan), person)[1]

@@ -45,7 +45,8 @@ def interval_of_share(share: float, variance: float, persons: int, runs: int) ->
     n = _runs_worth(share, variance, persons, runs)
     if math.isnan(n):
         return Interval(share, math.nan, math.nan, persons)
-    beyond, seen = (1 - LEVEL) / 2, share * n
+    beyond = (1 - LEVEL) / 2
+    seen = share * n
     low = special.betaincinv(seen, n - seen + 1, beyond) if share > 0 else 0.0
     high = special.betaincinv(seen + 1, n - seen, 1 - beyond) if share < 1 else 1.0
     return Interval(share, float(low), float(high), persons)
@@ -72,7 +73,8 @@ def quantile_interval(values: ArrayLike, person: ArrayLike, q: float = 0.5) -> I
     estimate = float(np.quantile(numbers, q))
     if persons < 2:
         return Interval(estimate, math.nan, math.nan, 1)
-    below, runs = (numbers <= estimate).astype(float), len(numbers)
+    below = (numbers <= estimate).astype(float)
+    runs = len(numbers)
     n = _runs_worth(float(below.mean()), _variance(below, code), persons, runs)
     compatible = np.flatnonzero(_is_compatible(np.arange(runs + 1) / runs, n, q))
     ends = np.concatenate([[-np.inf], np.sort(numbers), [np.inf]])
@@ -81,7 +83,8 @@ def quantile_interval(values: ArrayLike, person: ArrayLike, q: float = 0.5) -> I
 
 def _present(values: ArrayLike, person: ArrayLike) -> tuple[Floats, NDArray[np.intp], int]:
     """Numbers that are there `(n,)`, whose each is `(n,)`, and how many persons have any."""
-    numbers, who = np.asarray(values, dtype=float), np.asarray(person)
+    numbers = np.asarray(values, dtype=float)
+    who = np.asarray(person)
     there = np.isfinite(numbers)
     persons, code = np.unique(who[there], return_inverse=True)
     return numbers[there], code, len(persons)
@@ -109,7 +112,8 @@ def _is_compatible(share: Floats, n: float, q: float) -> NDArray[np.bool_]:
     """Return True where `q` lies within the interval of a share `(k,)` of `n` independent runs."""
     from scipy import special
 
-    beyond, seen = (1 - LEVEL) / 2, share * n
+    beyond = (1 - LEVEL) / 2
+    seen = share * n
     with np.errstate(invalid="ignore"):
         is_below = special.betainc(seen, n - seen + 1, q) <= beyond
         is_above = special.betainc(seen + 1, n - seen, q) >= 1 - beyond

@@ -63,7 +63,8 @@ def draw(seed: int, profile: str = "all") -> StormPlan:
 
 
 def _scenario(chance: random.Random) -> dict[str, Any]:
-    robots, guards = chance.choice((2, 2, 3, 4, 6)), chance.choice((0, 0, 1, 2))
+    robots = chance.choice((2, 2, 3, 4, 6))
+    guards = chance.choice((0, 0, 1, 2))
     return {
         "site": _site(chance),
         "robot": {

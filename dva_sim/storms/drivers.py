@@ -59,17 +59,24 @@ class BusyDriver:
     ) -> None:
         self._hand = Intruder(stage, FIRST_NUMBER + number, f"driver-{number}")
         self.device = self._hand.device
-        self._robots, self._sensors = robots, sensors
-        self._chance, self._place = chance, place
-        self._publishes, self._clock = stage.pattern().published, stage.clock
-        self._robot, self._session, self._level = "", 0, LEVELS[0]
+        self._robots = robots
+        self._sensors = sensors
+        self._chance = chance
+        self._place = place
+        self._publishes = stage.pattern().published
+        self._clock = stage.clock
+        self._robot = ""
+        self._session = 0
+        self._level = LEVELS[0]
         self._does: Callable[[], object] = self._look_for_robot
         self._until = self._hushed = 0.0
         self._wish = m.SetTeleOp(0.0, 0.0)
         self._tick: int | None = None
-        self._wanted, self._takeover = robots[0], TAKEOVERS[0]
+        self._wanted = robots[0]
+        self._takeover = TAKEOVERS[0]
         self._frames: Subscription | None = None
-        self._life, self._insists = 0, 0.0
+        self._life = 0
+        self._insists = 0.0
         self._listening: list[Subscription] = []
         self.device.serve(self._on_request)
 
@@ -104,7 +111,8 @@ class BusyDriver:
             self._wanted = self._chance.choice(self._robots)
             self._level = self._chance.choice(LEVELS)
             self._takeover = self._chance.choice(TAKEOVERS)
-        robot, level = self._wanted, self._level
+        robot = self._wanted
+        level = self._level
         self._until = self._clock.now + (1.0 if self._takeover == "force" else 3.0)
         life = self._life
 
@@ -124,15 +132,19 @@ class BusyDriver:
 
     def _take(self, robot: str, level: str, session: int) -> None:
         """Begin with a robot that was granted."""
-        self._robot, self._session, self._level = robot, session, level
-        self._until, self._insists = self._clock.now + LONGEST_WAIT, 0.0
+        self._robot = robot
+        self._session = session
+        self._level = level
+        self._until = self._clock.now + LONGEST_WAIT
+        self._insists = 0.0
         for listening in self._listening:
             listening.close()
         self._listening = [self._listen(sensor) for sensor in self._sensors]
         if level == "missions" or (level == "both" and self._chance.random() < 0.6):
             self._send_out()
             return
-        network, me = self.device.network, self.device.id_tag
+        network = self.device.network
+        me = self.device.id_tag
         self._frames = network.subscribe(me, robot, FRAME, self._see)
         self._does = self._start
         self._start()
@@ -140,7 +152,8 @@ class BusyDriver:
     def _listen(self, sensor: str) -> Subscription:
         """Subscribe to a sensor until the next robot is taken, even if this one is lost."""
         self._order(m.DevSub(sensor, 1.0))
-        network, me = self.device.network, self.device.id_tag
+        network = self.device.network
+        me = self.device.id_tag
         return network.subscribe(me, self._robot, sensor_topic(sensor, me), do_nothing)
 
     def _see(self, frame: object) -> None:
@@ -160,7 +173,8 @@ class BusyDriver:
 
     def _drive(self) -> None:
         """Drive about, look at this and that meanwhile, and stop in one way or another."""
-        chance, now = self._chance, self._clock.now
+        chance = self._chance
+        now = self._clock.now
         if now >= self._until:
             chance.choice(_ENDS)(self)
             return
@@ -229,7 +243,8 @@ class BusyDriver:
         self._finish(KEPT)
 
     def _finish(self, after: float) -> None:
-        self._does, self._until = self._wait, self._clock.now + after
+        self._does = self._wait
+        self._until = self._clock.now + after
 
     def _give_back(self) -> None:
         if self._robot:
@@ -241,7 +256,9 @@ class BusyDriver:
         """Have no robot, and look for another one a little later."""
         if self._frames is not None:
             self._frames.close()
-        self._frames, self._tick, self._robot = None, None, ""
+        self._frames = None
+        self._tick = None
+        self._robot = ""
         self._life += 1
         self._does = self._look_for_robot
         self._until = self._clock.now + self._chance.uniform(1.0, 20.0)
@@ -270,7 +287,8 @@ class BusyDriver:
                 body = body._replace(seen_tick=self._tick + self._chance.randrange(100, 5000))
             if self._publishes:
                 message = self.device.outbox.message(self._robot, body, now, self._session)
-                data, topic = encode(message), command_topic(self._robot)
+                data = encode(message)
+                topic = command_topic(self._robot)
                 self.device.network.publish(self.device.id_tag, topic, data, len(data))
             else:
                 self._hand.send_message(self._robot, body, self._session)

@@ -66,8 +66,10 @@ def _messages(make: Callable[[float, random.Random], Callable[..., bool]]) -> Be
     """A rule for the messages between some nodes."""
 
     def begin(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-        source, to = storm.id_of(fault.source), storm.id_of(fault.target)
-        rule, interference = make(fault.value, chance), storm.interference
+        source = storm.id_of(fault.source)
+        to = storm.id_of(fault.target)
+        rule = make(fault.value, chance)
+        interference = storm.interference
 
         def meets(passing: i.PassingMessage) -> bool:
             if source not in ("", passing.source) or to not in ("", passing.to):
@@ -86,11 +88,9 @@ def _messages(make: Callable[[float, random.Random], Callable[..., bool]]) -> Be
 
 def _freeze(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     """A process that is stopped: what comes and goes waits, and is there all at once."""
-    node, held, interference = (
-        storm.id_of(fault.target),
-        list[i.PassingMessage](),
-        storm.interference,
-    )
+    node = storm.id_of(fault.target)
+    held = list[i.PassingMessage]()
+    interference = storm.interference
 
     def meets(passing: i.PassingMessage) -> bool:
         if node not in (passing.source, passing.to):
@@ -121,7 +121,8 @@ def _order_again(storm: StormScene, fault: Fault, chance: random.Random) -> None
 
     Meanwhile an intruder asks in the name of its sender, until the robot has forgotten its reply.
     """
-    robot, clock = storm.id_of(fault.target), storm.run.clock
+    robot = storm.id_of(fault.target)
+    clock = storm.run.clock
     past = storm.interference.past(robot)
     orders = [each for each in past if any(kind in each.payload for kind in _ORDERS)]
     for passing in orders[-1:]:
@@ -245,7 +246,9 @@ def _lie(storm: StormScene, fault: Fault, chance: random.Random) -> End | None:
 
 
 def _drift(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    controller, clock, goes = storm.robot(fault.target).agent.controller, storm.run.clock, [True]
+    controller = storm.robot(fault.target).agent.controller
+    clock = storm.run.clock
+    goes = [True]
     rate = chance.choice((-DRIFT, DRIFT))
 
     def tick() -> bool:
@@ -262,7 +265,8 @@ def _by_hand(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     It tries again and again, also while others drive the robot. Now and then the hand
     rests, or lets go and takes it again at once.
     """
-    hand, goes = ManualControl(storm.robot(fault.target).agent), [True]
+    hand = ManualControl(storm.robot(fault.target).agent)
+    goes = [True]
     rests = storm.now
 
     def drive() -> bool:
@@ -318,7 +322,8 @@ def _fill_disk(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 def _slow_dva(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     """Let each request wait until those before it have had so much of the DVA's time."""
-    interference, free_at = storm.interference, storm.now
+    interference = storm.interference
+    free_at = storm.now
 
     def meets(passing: i.PassingMessage) -> bool:
         nonlocal free_at
@@ -359,7 +364,8 @@ def _vanish(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 def _idle(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     """A guard answers every order with OK, and does nothing."""
-    node, network = storm.id_of(fault.target), storm.device(fault.target).network
+    node = storm.id_of(fault.target)
+    network = storm.device(fault.target).network
     assert isinstance(network, VirtualNetwork)
     heeds = network.service(node)
     assert heeds is not None
@@ -397,7 +403,8 @@ def _revoke(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 def _take_over(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     """Somebody else is given the robot, unasked, starts at once, and gives it back later."""
-    robot, dva = storm.id_of(fault.target), storm.run.dva
+    robot = storm.id_of(fault.target)
+    dva = storm.run.dva
     if dva.is_gone:  # nobody is given anything by the dead
         return
     others = [device for device in storm.labelled if device.startswith(DRIVERS)]
@@ -406,7 +413,8 @@ def _take_over(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     grant = dva.core.sessions.permissions.grants.get(robot)
     if grant is None or grant.holder != taker.id_tag:
         return
-    session, until = grant.session, storm.now + GIVEN_BACK
+    session = grant.session
+    until = storm.now + GIVEN_BACK
 
     def begin() -> bool:
         taker.ask(robot, m.StartTeleOp(), session=session)
@@ -422,7 +430,8 @@ def _ask_twice(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
     It gives back every permission that it gets, even one that it drives by.
     """
-    device, robot = storm.device(fault.target), chance.choice(storm.robots)
+    device = storm.device(fault.target)
+    robot = chance.choice(storm.robots)
 
     def answered(reply: m.Reply) -> None:
         if isinstance(reply.content, m.Permission):
@@ -436,7 +445,8 @@ def _ask_twice(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 def _old_session(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     """An operator acts by sessions of before, or that never were."""
-    device, robot = storm.device(fault.target), chance.choice(storm.robots)
+    device = storm.device(fault.target)
+    robot = chance.choice(storm.robots)
     bodies: list[m.Body] = [m.StartTeleOp(), m.SetTeleOp(0.4, 0.1), m.StopTeleOp()]
     bodies += [m.GoTo((storm.free_place(chance),)), m.CancelMission()]
     bodies += [m.DevSub(name, 2.0) for name in robot.agent.sensors]
@@ -452,7 +462,9 @@ def _second_driver(storm: StormScene, fault: Fault, chance: random.Random) -> En
 
 def _flood(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     """An intruder sends so many requests a second: of all kinds, or of one."""
-    to, goes, clock = storm.id_of(fault.target), [True], storm.run.clock
+    to = storm.id_of(fault.target)
+    goes = [True]
+    clock = storm.run.clock
     every = m.GetMissionStatus(), m.StartTeleOp(), m.GetSensorInfo(), m.SetTeleOp(0.5, 0.0)
     bodies = chance.choice((every, every[:1], every[1:2], (m.DevSub("smoke", 1.0),)))
 
@@ -466,7 +478,9 @@ def _flood(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 def _flood_in_doubt(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     """An intruder orders a robot about so many times a second, and the DVA does not hear of it."""
-    robot, goes, rules = storm.id_of(fault.target), [True], storm.interference.rules
+    robot = storm.id_of(fault.target)
+    goes = [True]
+    rules = storm.interference.rules
 
     def meets(passing: i.PassingMessage) -> bool:
         storm.interference.counts[fault.kind] += passing[:2] == (robot, DVA)
@@ -496,20 +510,24 @@ def _report(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 
 def _report_twice(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    kind, place = chance.choice(("fire", "gas_leak")), storm.anywhere(chance)
+    kind = chance.choice(("fire", "gas_leak"))
+    place = storm.anywhere(chance)
     for _ in range(max(2, round(fault.value))):
         storm.intruder.report(kind, Position(place.latitude, place.longitude))
 
 
 def _take_back(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     """An event is reported, and taken back a little later by who has reported it."""
-    place, hand = storm.anywhere(chance), storm.intruder
+    place = storm.anywhere(chance)
+    hand = storm.intruder
     hand.report("flood", place)
     body = m.EventReport(None, "flood", place, 0.5, 0.9, "refuted")
     storm.run.clock.call_after(fault.value, hand.ask, DVA, body)
 
 
-_LONG, _SHORT, _SHARE = (2.0, 60.0), (0.5, 15.0), (0.1, 0.9)
+_LONG = (2.0, 60.0)
+_SHORT = (0.5, 15.0)
+_SHARE = (0.1, 0.9)
 FAULTS: Final[dict[str, FaultKind]] = {
     "messages-lost": FaultKind(
         "a share of the messages is lost",

@@ -52,8 +52,11 @@ class Interference:
     """
 
     def __init__(self, clock: Clock, watch: Callable[[PassingMessage], None]) -> None:
-        self.clock, self.rules, self.counts = clock, list[Rule](), Counter[str]()
-        self._watch, self.delivered = watch, 0
+        self.clock = clock
+        self.rules = list[Rule]()
+        self.counts = Counter[str]()
+        self._watch = watch
+        self.delivered = 0
         self._awaited: list[tuple[bytes, str, Callable[[str], object]]] = []
         self._past: dict[tuple[str, bool], deque[PassingMessage]] = {}
 
@@ -152,7 +155,8 @@ def corrupts(share: float, chance: random.Random) -> Meddling:
     def rule(interference: Interference, passing: PassingMessage) -> bool:
         if not isinstance(passing.payload, bytes) or chance.random() >= share:
             return False
-        data, place = passing.payload, chance.randrange(len(passing.payload))
+        data = passing.payload
+        place = chance.randrange(len(passing.payload))
         new = bytes([chance.randrange(256)]) * chance.randrange(3)
         altered = data[:place] + new + data[place + 1 :]
         interference.deliver(passing._replace(payload=altered))

@@ -27,7 +27,8 @@ class Intruder:
         self.device: AgentDevice = stage.device("operator", number)
         self.device.label = stage.labels[self.device.id_tag] = label
         self.device.serve(lambda message: m.Reply(message.message_id, m.OK, ""))
-        self._network, self._tags = stage.network, count(1)
+        self._network = stage.network
+        self._tags = count(1)
         self._wires: dict[str, Wire] = {}
         self.ask = self.device.ask
 
@@ -53,7 +54,8 @@ class Intruder:
         Returns:
             What ends that: it vanishes without giving anything back.
         """
-        held, goes = list[int](), [True]
+        held = list[int]()
+        goes = [True]
         self.device.register()
 
         def answered(reply: m.Reply) -> None:

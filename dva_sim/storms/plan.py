@@ -130,7 +130,8 @@ def load_plan(path: Path) -> StormPlan:
     data = load_yaml(path).data
     try:
         faults = tuple(Fault(**fault) for fault in data["faults"])
-        calm, drivers = float(data["calm_s"]), int(data.get("drivers", 0))
+        calm = float(data["calm_s"])
+        drivers = int(data.get("drivers", 0))
         plan = StormPlan(int(data["seed"]), data["scenario"], faults, calm, drivers)
     except (KeyError, TypeError, ValueError) as error:
         raise ConfigError(f"is not the plan of a storm: {error}", path) from None

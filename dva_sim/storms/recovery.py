@@ -47,15 +47,19 @@ class RecoveryProbes:
         calm: float,
         releaser: Releaser,
     ) -> None:
-        self._stage, self._recorder, self._motion_of = stage, recorder, motion_of
-        self._calm, self._clock = calm, stage.clock
+        self._stage = stage
+        self._recorder = recorder
+        self._motion_of = motion_of
+        self._calm = calm
+        self._clock = stage.clock
         self._releaser = releaser
         self._probe = Intruder(stage, BYSTANDER, "probe")
         self._open: dict[str, str] = {}
         self._used: dict[str, float] = {}
         self._session: dict[str, int] = {}
         self._granted: dict[str, float] = {}
-        self._missing, self._listed = set[str](), 0
+        self._missing = set[str]()
+        self._listed = 0
         self._beats: dict[str, float] = {}
         self._place = m.Position(0.0, 0.0)
 
@@ -195,7 +199,8 @@ class RecoveryProbes:
 
     def _drive(self, robot: str, session: int) -> None:
         """Command until it obeys; a drive that ended before its start was answered begins again."""
-        waits, self._session[robot] = "obeys no command of its driver", session
+        waits = "obeys no command of its driver"
+        self._session[robot] = session
         if self._open.get(robot) != waits:
             return
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
+import sqlite3
+from collections.abc import Callable, Iterator
 from functools import cached_property, partial
 from pathlib import Path
 from typing import NamedTuple
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.robot.faults import RobotFaults
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.core.store import Store
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.virtual_network import VirtualNetwork
@@ -23,11 +25,105 @@ from dva_sim.protocol.messages import PermissionGrant, Position
 from dva_sim.simulation.full.run import Run, Watched
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.storms.drivers import BusyDriver
-from dva_sim.storms.dva_lives import DvaLives
 from dva_sim.storms.interference import Interference, PassingMessage
 from dva_sim.storms.intruder import NUMBER, Intruder
 from dva_sim.storms.plan import StormPlan
 from dva_sim.storms.releaser import Releaser
+
+
+class Killed(BaseException):
+    """The process of the DVA ends here; nothing of what it was about to do happens."""
+
+
+class DvaLives:
+    """Kills and restarts the DVA of a run, and fills the disk that its memory is on.
+
+    Args:
+        file: Its memory.
+        down: Called with True when it is killed, and with False when it is back.
+
+    Attributes:
+        memory: Memory since the last restart.
+        kills: Number of kills.
+        full: Number of faults that keep the disk full now.
+        lost: Time for which the last life could write nothing before it was killed [s].
+    """
+
+    def __init__(self, file: Path, down: Callable[[bool], object]) -> None:
+        self._down = down
+        self._file = file
+        self.kills = 0
+        self.full = 0
+        self.lost = 0.0
+        self._wrote_at = 0.0
+        self._run: Run | None = None
+        self._away = 0.0
+        self._is_away = False
+        self._writes_left: int | None = None
+        self.memory = self._opened()
+
+    def _opened(self) -> Store:
+        self._writes_left, memory = None, Store(self._file)
+        memory.between_writes = self._between_writes
+        return memory
+
+    def _between_writes(self) -> None:
+        """Fail as the disk does, or end the process."""
+        if self._writes_left is not None:
+            self._writes_left -= 1
+            if self._writes_left < 0:
+                raise Killed
+        if self.full:
+            raise sqlite3.OperationalError("database or disk is full")
+        if self._run is not None:
+            self._wrote_at = self._run.clock.now
+
+    def begin(self, run: Run) -> None:
+        """Take over the DVA of a run that was made with this memory."""
+        self._run = run
+
+    def kill(self, away: float) -> None:
+        """Kill the DVA now, and restart it after a time `away` [s]."""
+        run = self._run
+        assert run is not None
+        if self._is_away:
+            return
+        self.kills += 1
+        self._is_away = True
+        self.lost = run.clock.now - self._wrote_at if self.full else 0.0
+        assert isinstance(run.network, VirtualNetwork)
+        run.network.leave(DVA)
+        run.dva.crash()
+        self._down(True)
+        run.clock.call_after(away, self._back)
+
+    def kill_at_write(self, number: int, away: float) -> None:
+        """Kill the DVA at one of its next writes, of which nothing is kept."""
+        self._writes_left = number
+        self._away = away
+
+    def survive(self, until: float) -> None:
+        """Let time pass, through any death in the midst of a write."""
+        run = self._run
+        assert run is not None
+        while True:
+            try:
+                run.clock.run(until)
+            except Killed:
+                self.kill(self._away)
+            else:
+                return
+
+    def _back(self) -> None:
+        run = self._run
+        assert run is not None
+        self._is_away = False
+        self.memory = self._opened()
+        run.start_dva(self.memory)
+        assert isinstance(run.network, VirtualNetwork)
+        run.network.come_back(DVA)
+        self._down(False)
+
 
 FLOODER = NUMBER + 1  # holds nothing, ever
 FITS = 0.8  # around a place to which robots are sent [m]
@@ -64,7 +160,8 @@ class StormScene:
     """
 
     def __init__(self, plan: StormPlan, folder: Path) -> None:
-        self.plan, self.recorder = plan, Recorder(False)
+        self.plan = plan
+        self.recorder = Recorder(False)
         self.dva = DvaLives(folder / "dva.sqlite", self.dva_is_down)
         clock = Clock()
         watched = Watched(
@@ -90,7 +187,8 @@ class StormScene:
         self._sessions: dict[str, list[int]] = {}
 
     def _make_drivers(self) -> Iterator[BusyDriver]:
-        stage, robots = self.run.stage, [robot.id for robot in self.robots]
+        stage = self.run.stage
+        robots = [robot.id for robot in self.robots]
         sensors = tuple(sorted(self.robots[0].agent.sensors))
         for number in range(1, self.plan.drivers + 1):
             chance = random.Random(f"{self.plan.seed} driver {number}")
@@ -139,7 +237,8 @@ class StormScene:
         """Draw a place within the bounds of the site, in walls or not."""
         site = self.run.stage.site
         low_x, low_y, high_x, high_y = site.extent
-        x, y = chance.uniform(low_x, high_x), chance.uniform(low_y, high_y)
+        x = chance.uniform(low_x, high_x)
+        y = chance.uniform(low_y, high_y)
         return Position(*site.frame.to_latlon(x, y))
 
     @cached_property
@@ -148,7 +247,8 @@ class StormScene:
 
     def free_place(self, chance: random.Random) -> Position:
         """Draw a place where a robot fits."""
-        site, (rows, columns) = self.run.stage.site, self._free
+        site = self.run.stage.site
+        (rows, columns) = self._free
         number = chance.randrange(len(rows))
         x, y = site.grid.to_xy(rows[number] + 0.5, columns[number] + 0.5)
         return Position(*site.frame.to_latlon(float(x), float(y)))

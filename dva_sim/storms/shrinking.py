@@ -46,8 +46,11 @@ class Shrinker:
         before: Callable[[Storm], object] = lambda _: None,
         tries: int = TRIES,
     ) -> None:
-        self.plan, self.outcome, self.left = plan, outcome, tries
-        self._before, self._wanted = before, outcome.signature
+        self.plan = plan
+        self.outcome = outcome
+        self.left = tries
+        self._before = before
+        self._wanted = outcome.signature
 
     def shrink(self) -> StormPlan:
         """Return the smallest storm that still breaks one of the same rules."""
@@ -71,7 +74,8 @@ class Shrinker:
             return False  # nobody is left to act, for example
         if not outcome.signature & self._wanted:
             return False
-        self.plan, self.outcome = plan, outcome
+        self.plan = plan
+        self.outcome = outcome
         return True
 
     def _play(self, plan: StormPlan) -> StormOutcome:

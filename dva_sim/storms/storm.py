@@ -20,13 +20,11 @@ from dva_sim.kernel.recorder import Accepted, Breach
 from dva_sim.simulation.full.observations import RobotMotion, motion_of
 from dva_sim.simulation.full.physical_world import PHYSICS_TICK
 from dva_sim.simulation.full.stage import DVA, id_of
-from dva_sim.storms.answers import AnswerWatch
-from dva_sim.storms.bounds import is_waiting, oversized, waiting_of
+from dva_sim.storms.checkers import AnswerWatch, RefusedDrivers, is_waiting, oversized, waiting_of
 from dva_sim.storms.faults import FAULTS
 from dva_sim.storms.interference import PassingMessage
 from dva_sim.storms.plan import Fault, StormPlan
 from dva_sim.storms.recovery import RecoveryProbes
-from dva_sim.storms.refused_drivers import RefusedDrivers
 from dva_sim.storms.scene import StormScene
 
 LOOK_AT_BOUNDS = 30.0  # how often all containers are counted [s]
@@ -89,7 +87,8 @@ class Storm(StormScene):
 
     def __init__(self, plan: StormPlan, folder: Path) -> None:
         super().__init__(plan, folder)
-        run, clock = self.run, self.run.clock
+        run = self.run
+        clock = self.run.clock
         labels = run.stage.labels
         people = *self.guards, *self.operators
         nodes = {node: labels[node] for node in (DVA, *(r.id for r in self.robots), *people)}
@@ -111,7 +110,8 @@ class Storm(StormScene):
         clock.every(1.0, self._look_at_queues)
         for fault in plan.faults:
             clock.call_at(fault.at_s, self._await, fault)
-        robots, others = [robot.id for robot in self.robots], (*self.guards, *self.operators)
+        robots = [robot.id for robot in self.robots]
+        others = (*self.guards, *self.operators)
         self._recovery.begin(robots, others, self.free_place(_chance(plan)))
 
     def play(self, enough: Callable[[], bool] = lambda: False) -> StormOutcome:
@@ -120,7 +120,9 @@ class Storm(StormScene):
         Args:
             enough: Returns True once a broken rule need not be waited for any longer.
         """
-        began, now, end = time.process_time(), 0.0, self.plan.horizon_s
+        began = time.process_time()
+        now = 0.0
+        end = self.plan.horizon_s
         while now < end and not (self.recorder.broken and enough()):
             now = min(now + 1.0, end)
             self.dva.survive(now)
@@ -146,7 +148,8 @@ class Storm(StormScene):
             self._begin(fault)
             return
         # What never comes is not waited for beyond the storm.
-        waits, kind = [True], fault.target.partition("-*")[0]
+        waits = [True]
+        kind = fault.target.partition("-*")[0]
         is_any = fault.target.endswith("-*")
         to = id_of(kind, 1)[: len("02:00:00:01")] if is_any else self.id_of(fault.target)
 
@@ -243,7 +246,9 @@ class _Witness:
     """Passes on what a storm has to know; see `Observer`."""
 
     def __init__(self, storm: Storm) -> None:
-        self.sent, self.accepted, self.moves = storm.sent, storm.accepted, storm.moves
+        self.sent = storm.sent
+        self.accepted = storm.accepted
+        self.moves = storm.moves
 
     def _nothing(self, *_: object) -> None:
         """Ignore the observation."""

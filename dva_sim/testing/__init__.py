@@ -16,10 +16,8 @@ from typing import TYPE_CHECKING, Any
 from dva_sim.testing.promises import TRIALS
 
 if TYPE_CHECKING:
-    from dva_sim.testing.figures import check_figure as check_figure
     from dva_sim.testing.hazards import check_hazard as check_hazard
     from dva_sim.testing.measures import check_measure as check_measure
-    from dva_sim.testing.models import check_model as check_model
     from dva_sim.testing.operators import check_operator as check_operator
     from dva_sim.testing.patterns import check_pattern as check_pattern
     from dva_sim.testing.policies import check_policy as check_policy

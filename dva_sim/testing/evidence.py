@@ -112,7 +112,8 @@ def missing_topics(opened: Opened) -> dict[str, list[str]]:
         RULES,
     )
 
-    facts, terms = opened.playback.recorder.facts, opened.terms
+    facts = opened.playback.recorder.facts
+    terms = opened.terms
     if facts is None or terms is None:
         return {}
     needed_by = {"book": OF_THE_DVA, "arrived": OF_MESSAGES, "heard": ("S2",), "places": ("S6",)}
@@ -190,7 +191,8 @@ def check_recorded_link(path: Path) -> Found:
         times = recorded.read_trace(file)
     except ConfigError as error:
         return [Problem(error.line or 1, error.column or 1, error.problem)], [], ""
-    gap, lasts = recorded.longest_gap_s(times), float(times[-1])
+    gap = recorded.longest_gap_s(times)
+    lasts = float(times[-1])
     rate = len(times) * OPPORTUNITY_BYTES * 8 / lasts
     doubts = []
     if gap > LONG_GAP_S:
@@ -207,7 +209,8 @@ def check_recorded_link(path: Path) -> Found:
 def _of_delay_log(log: DelayLog) -> str:
     from dva_sim.network.link.delay_logs import WRITE  # late: start-up
 
-    lost, lasts = float(np.isnan(log.delays).mean()), log.times[-1] - log.times[0]
+    lost = float(np.isnan(log.delays).mean())
+    lasts = log.times[-1] - log.times[0]
     runs = f" in {log.runs} runs of ping" if log.runs > 1 else ""
     ask = ""
     if log.assumed:
@@ -232,7 +235,8 @@ class _Replayed(NamedTuple):
 
 
 def _replayed(lines: Sequence[bytes], path: Path) -> _Replayed:
-    problems, count = list[Problem](), 0
+    problems = list[Problem]()
+    count = 0
     try:
         for line, what, then, now in (_of_dva if _is_of_dva(lines) else _of_robot)(lines, path):
             count += 1

@@ -31,7 +31,7 @@ from dva_sim.kernel.yaml_files import Document, read_text
 from dva_sim.protocol.mistakes import Problem
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.middleware import MiddlewareScenario
-from dva_sim.simulation.models import OwnScenario, model_of
+from dva_sim.simulation.models import model_of
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.simulation.task import TaskScenario
 from dva_sim.simulation.timed.scenario import TimedScenario
@@ -52,7 +52,6 @@ _SCENARIOS: Final = (
     TaskScenario,
     TransportScenario,
     MiddlewareScenario,
-    OwnScenario,
 )
 
 
@@ -104,7 +103,8 @@ def notes(kind: FileKind, document: Document) -> str:
 def _without_a_place(document: Document) -> Iterator[str]:
     """Say of a map in how many runs no event finds a place."""
     scenario = scenarios.load(PROBE)
-    model, problems = model_of(scenario), list[str]()
+    model = model_of(scenario)
+    problems = list[str]()
     for seed in range(1, PROBES + 1):
         try:
             model.rehearse(model.build(scenario, {"site.map": str(document.file.resolve())}), seed)
@@ -207,7 +207,8 @@ def _frame_of(path: Path) -> GeoFrame:
         position: Any = next(f["geometry"]["coordinates"] for f in features if f.get("geometry"))
         while isinstance(position[0], list):
             position = position[0]
-        longitude, latitude = float(position[0]), float(position[1])
+        longitude = float(position[0])
+        latitude = float(position[1])
     except (LookupError, TypeError, ValueError, AttributeError, StopIteration):
         return DEFAULT_FRAME  # what is wrong with it, its reader says with the place
     return GeoFrame(latitude, longitude) if abs(latitude) < 89 else DEFAULT_FRAME

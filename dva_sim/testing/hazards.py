@@ -84,8 +84,12 @@ class _Trial:
     """
 
     def __init__(self, make: Make, site: Site, rng: np.random.Generator) -> None:
-        self._make, self._site, self._rng = make, site, rng
-        self.asked, self.mean, self._picture = 0, 0.0, 0.0
+        self._make = make
+        self._site = site
+        self._rng = rng
+        self.asked = 0
+        self.mean = 0.0
+        self._picture = 0.0
         self.parts = (self._texts, self._sizes, self._air, self._repeats, self._stops, self._sight,
                       self._pictures, self._detectors, self._doses)  # fmt: skip
 
@@ -116,7 +120,9 @@ class _Trial:
 
     def _sizes(self) -> Iterator[Case]:
         """Radii and severity: numbers that grow from nothing, whenever it begins."""
-        hazard, later, fresh = self._hazard(), self._hazard(LATER), self._hazard()
+        hazard = self._hazard()
+        later = self._hazard(LATER)
+        fresh = self._hazard()
         for name, most in (("radius", 1e3), ("danger_radius", 1e3), ("severity", 1.0)):
             sizes = [getattr(hazard, name)(START + age) for age in AGES]
             for age, size in zip(AGES, sizes, strict=True):
@@ -136,7 +142,8 @@ class _Trial:
     def _answers(self, field: HazardField, order: list[int] | None = None) -> list[Conditions]:
         """The air at all places and ages, asked in an order; told in the usual one."""
         asked = [(*place, START + age) for age in AGES for place in AROUND]
-        order, began = order or list(range(len(asked))), time.perf_counter()
+        order = order or list(range(len(asked)))
+        began = time.perf_counter()
         answers = {number: field.at(*asked[number]) for number in order}
         self.mean = (time.perf_counter() - began) / len(asked)
         self.asked += len(asked)
@@ -169,7 +176,8 @@ class _Trial:
 
     def _stops(self) -> Iterator[Case]:
         """A source that is stopped changes nothing before, and makes nothing worse."""
-        whole, stopped = self._field(), self._field()
+        whole = self._field()
+        stopped = self._field()
         stopped.until = START + STOPPED
         for age in AGES:
             for place in AROUND:
@@ -183,7 +191,8 @@ class _Trial:
 
     def _sight(self) -> Iterator[Case]:
         """Check that sight is limited by the extinction at eye height."""
-        field, building = self._field(), building_of(self._site)
+        field = self._field()
+        building = building_of(self._site)
         places = SitePoints(building, np.array(AROUND))
         for age in AGES:
             air = [field.at(*place, START + age).extinction for place in AROUND]
@@ -195,7 +204,8 @@ class _Trial:
 
     def _pictures(self) -> Iterator[Case]:
         """A raster for what it shows, of numbers, empty before it begins."""
-        field, places = self._field(), self._places()
+        field = self._field()
+        places = self._places()
         for what in (*QUANTITIES, "layer"):
             shown = ("smoke" if what == "layer" else what) in self._hazard().shows
             for when in (START, START + 20.0, START + 601.0):
@@ -215,12 +225,14 @@ class _Trial:
 
     def _places(self) -> SitePoints:
         west, south, east, north = self._site.extent
-        x, y = np.arange(west, east, CELL), np.arange(south, north, CELL)
+        x = np.arange(west, east, CELL)
+        y = np.arange(south, north, CELL)
         return SitePoints(building_of(self._site), np.stack(np.meshgrid(x, y), axis=2))
 
     def _detectors(self) -> Iterator[Case]:
         """Detectors of kinds that there are, which notice it whenever it begins."""
-        hazard, later = self._hazard(), self._hazard(LATER)
+        hazard = self._hazard()
+        later = self._hazard(LATER)
         for kind in dict.fromkeys((*hazard.detectors, *hazard.noticed_by())):
             if kind not in DETECTORS:
                 yield "is noticed by what does not exist", f"{kind!r}: {', '.join(DETECTORS)}"
@@ -236,7 +248,8 @@ class _Trial:
         """Check that the dose of a person who stays is finite and never falls."""
         field = self._field()
         for place in AROUND:
-            dose, last = Dose(), 0.0
+            dose = Dose()
+            last = 0.0
             for age in AGES:
                 dose.add(field.at(*place, START + age), 1.0)
                 if not math.isfinite(dose.heat + dose.toxic) or dose.heat + dose.toxic < last:

@@ -75,9 +75,11 @@ class _Trial:
     """
 
     def __init__(self, make: Callable[[], RunMeasure], models: list[str]) -> None:
-        self._make, self._models = make, models
+        self._make = make
+        self._models = models
         self._used = make()
-        self.took, self.answers = list[float](), list[float]()
+        self.took = list[float]()
+        self.answers = list[float]()
 
     def says_what_it_is(self) -> Iterator[Case]:
         """Its name, its meaning and its bounds."""

@@ -104,8 +104,11 @@ class _Trial:
     """
 
     def __init__(self, make: Callable[[Person, Reach], Driver], rng: np.random.Generator) -> None:
-        self._make, self._rng = make, rng
-        self.count, self.took, self.late = 0, list[float](), list[str]()
+        self._make = make
+        self._rng = rng
+        self.count = 0
+        self.took = list[float]()
+        self.late = list[str]()
         population = Population()
         drawn = (draw_person(population, 1, index) for index in range(2))
         self._persons = (median_person(population), *drawn)
@@ -129,7 +132,9 @@ class _Trial:
     def _robots(self) -> Iterator[Case]:
         """Finite and within reach, whatever is seen."""
         for reach in ROBOTS:
-            strategy, now, route = self.new(self._persons[0], reach), 0.0, _way(WAYS["a corner"])
+            strategy = self.new(self._persons[0], reach)
+            now = 0.0
+            route = _way(WAYS["a corner"])
             for number in range(LOOKS):
                 now += self._one_of(WAITS)
                 x, y, heading, speed, turn = (self._anything() for _ in range(5))
@@ -147,13 +152,15 @@ class _Trial:
 
     def _cursors(self) -> Iterator[Case]:
         """Check sightings of cursors."""
-        strategy, now = self.new(self._persons[0], CURSOR), 0.0
+        strategy = self.new(self._persons[0], CURSOR)
+        now = 0.0
         path = Route(np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 0.5)]))
         for number in range(LOOKS):
             now += self._one_of(WAITS)
             seen = Sighting._make([number, *(self._anything() for _ in range(8)), 0.01, math.inf])
             delay = self._one_of(GUESSES)
-            point, view = PointView(now, seen, delay), PathView(now, seen, delay, path)
+            point = PointView(now, seen, delay)
+            view = PathView(now, seen, delay, path)
             for got in (strategy.point(point), strategy.follow(view)):
                 case = f"{got!r} on {seen!r}"
                 if not _is_pair(got):
@@ -225,13 +232,15 @@ class _Trial:
     ) -> list[_Step]:
         """Drive a robot that obeys at once, with pictures late by `delay`."""
         self.count += 1
-        strategy, route = strategy or self.new(person, reach), _way(WAYS[name])
+        strategy = strategy or self.new(person, reach)
+        route = _way(WAYS[name])
         x = y = heading = 0.0
         late = round(delay / FRAME)
         pictures = [
             Observation(tick=0, x=0.0, y=0.0, heading=0.0, speed=0.0, turn_rate=0.0, hazards=())
         ] * (late + 1)
-        track, spent = list[_Step](), 0.0
+        track = list[_Step]()
+        spent = 0.0
         for number in range(round(seconds / FRAME)):
             view = View(number * FRAME, pictures[-late - 1], max(delay, FRAME))
             started = time.perf_counter()

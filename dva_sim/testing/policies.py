@@ -128,7 +128,8 @@ def _situation(kind: _Draw, policy: Policy, rng: np.random.Generator) -> Situati
 
 
 def _responders(kind: _Draw, rng: np.random.Generator) -> tuple[Responder, ...]:
-    guards, robots = _number(kind.guards, rng), _number(kind.robots, rng)
+    guards = _number(kind.guards, rng)
+    robots = _number(kind.robots, rng)
 
     def one(number: int) -> Responder:
         device = f"02:00:00:01:{number // 256:02X}:{number % 256:02X}"
@@ -179,7 +180,8 @@ def _engage(
     rng: np.random.Generator,
 ) -> tuple[tuple[Task, ...], tuple[Responder, ...]]:
     """Put some responders under way to a task each, that they could be given."""
-    open_tasks, busy = list(tasks), list(team)
+    open_tasks = list(tasks)
+    busy = list(team)
     looks = [t for t in rng.permutation(len(tasks)).tolist() if tasks[t].stage == "confirm"]
     share = rng.random(len(team)) < kind.under_way
     for r, t in zip(np.flatnonzero(share).tolist(), looks, strict=False):
@@ -209,7 +211,8 @@ def _ways(
 
 
 def _cover(team: tuple[Responder, ...], rng: np.random.Generator) -> Cover:
-    stations, zones = int(rng.integers(0, 5)), int(rng.integers(1, 7))
+    stations = int(rng.integers(0, 5))
+    zones = int(rng.integers(1, 7))
     eta = np.round(rng.uniform(0.0, 300.0, (len(team), stations)))
     stuck = [who.kind == "robot" or who.engaged is not None for who in team]
     eta[np.array(stuck, dtype=bool)] = np.inf
@@ -267,7 +270,8 @@ def check_policy(
     slowest = 0.0, ""
     for number, (kind, situation) in enumerate(situations(one, count, 1), start=1):
         where = f"situation {number} ({kind})"
-        answer, other = _ask(one, situation, number), _ask(twin, situation, number)
+        answer = _ask(one, situation, number)
+        other = _ask(twin, situation, number)
         slowest = max(slowest, (min(answer.took, other.took), where))
         for promise, case in _broken(one, situation, answer, other):
             found.setdefault(promise, []).append(f"{case}in {where}")
@@ -287,7 +291,8 @@ class _Answer:
 
 
 def _ask(policy: Policy, situation: Situation, seed: int) -> _Answer:
-    before, rng = _contents(situation), np.random.default_rng(seed)
+    before = _contents(situation)
+    rng = np.random.default_rng(seed)
     started = time.perf_counter()
     try:
         advice = policy.advise(situation, rng)

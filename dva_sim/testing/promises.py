@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
+from dva_sim.testing.shipped_words import shipped_words
+
 if TYPE_CHECKING:
     from dva_sim.kernel.plugins import Plugins
 
@@ -123,7 +125,6 @@ class CheckedKind:
         summary: Description of the check, with `{tries}`, and `{ms}` or `{us}` of the slowest.
         folder: Folder of the named files, for kinds that are not classes.
         class_word: The word for a class of it, where that is another.
-        worded: The module whose `WORDS` describe the shipped ones, where loading these takes long.
     """
 
     kind: str
@@ -132,7 +133,6 @@ class CheckedKind:
     summary: str
     folder: str = ""
     class_word: str = ""
-    worded: str = ""
 
     @property
     def classes(self) -> str:
@@ -155,12 +155,17 @@ class CheckedKind:
         return f"dva_sim.{self.classes}"
 
     def words(self) -> dict[str, str]:
-        """The shipped ones by name, each with what it is, in a sentence at first."""
-        if self.worded:
-            return dict(import_module(f"dva_sim.{self.worded}").WORDS)
+        """Describe the shipped ones by name, without loading them."""
+        return shipped_words()[self.kind]
+
+    def docstrings(self) -> dict[str, str]:
+        """Load the shipped ones; the first paragraph of each docstring, by name."""
         plugins = self.load_plugins()
-        names = plugins.shipped.keys() - plugins.hidden
-        return {name: inspect.getdoc(plugins.shipped[name]) or "" for name in names}
+        texts = {
+            name: inspect.getdoc(plugins.shipped[name]) or ""
+            for name in plugins.shipped.keys() - plugins.hidden
+        }
+        return {name: " ".join(text.partition("\n\n")[0].split()) for name, text in texts.items()}
 
     def known(self) -> list[str]:
         """Names that are shipped or installed."""
@@ -185,8 +190,9 @@ def plural(kind: str) -> str:
     return f"{kind.removesuffix('y')}ies" if kind.endswith("y") else f"{kind}s"
 
 
-_US, _READINGS = "{us:.0f} microseconds", "{us:.1f} microseconds a reading"
-_STRATEGIES, _FIGURES = "agents.operator.strategies.loading", "experiments.report.figures.registry"
+_US = "{us:.0f} microseconds"
+_READINGS = "{us:.1f} microseconds a reading"
+_STRATEGIES = "agents.operator.strategies.loading"
 TRIALS: Final[dict[str, CheckedKind]] = {
     row[0]: CheckedKind(*row)
     for row in (
@@ -198,14 +204,6 @@ TRIALS: Final[dict[str, CheckedKind]] = {
         ("mapping", "agents.tilt.mappings", "tilt", f"{{tries}} runs, {_READINGS}"),
         ("hazard", "worlds.hazards", "hazards", f"{{tries}} questions, {_US} an answer"),
         ("measure", "simulation.run_measures", "measures", "{tries} answers, slowest {ms:.1f} ms"),
-        (
-            *("model", "simulation.models", "models", "{tries} runs, slowest {ms:.0f} ms"),
-            *("", "", "simulation.model_words"),
-        ),
-        (
-            *("figure", _FIGURES, "figures", "{tries} drawings, slowest {ms:.0f} ms"),
-            *("", "", "experiments.report.figure_words"),
-        ),
         (
             *("robot", "worlds.drives", "robots", f"{{tries}} drives, {_US} a tick"),
             *("agents/robots", "drive"),

@@ -91,8 +91,10 @@ class _Trial:
     """
 
     def __init__(self, spec: DriveSpec, rng: np.random.Generator) -> None:
-        self.spec, self.rng = spec, rng
-        self.count, self.took = 0, list[float]()
+        self.spec = spec
+        self.rng = rng
+        self.count = 0
+        self.took = list[float]()
         alone = self._set_points, self._answers, self._drives, self._stops
         self.parts = (*alone, self._obeys, self._walls)
 
@@ -105,13 +107,15 @@ class _Trial:
 
     def _command(self) -> tuple[float, float]:
         """Something within the limits; often one of the limits, or nothing."""
-        spec, rng = self.spec, self.rng
+        spec = self.spec
+        rng = self.rng
         speed = rng.choice([0.0, spec.max_speed, rng.uniform(0, spec.max_speed)])
         most = spec.max_turn_rate
         return float(speed), float(rng.choice([0.0, most, -most, rng.uniform(-most, most)]))
 
     def _set_points(self) -> Iterator[Case]:
-        drive, spec = self._new(), self.spec
+        drive = self._new()
+        spec = self.spec
         for _ in range(500):
             asked = self._command()
             speed, turn_rate = drive.set_point(*asked)
@@ -125,7 +129,9 @@ class _Trial:
 
     def _answers(self) -> Iterator[Case]:
         """Finite, whatever is measured; the same from each copy, used or new."""
-        used, spec, rng = self._new(), self.spec, self.rng
+        used = self._new()
+        spec = self.spec
+        rng = self.rng
         for number in range(500):
             speed, turn_rate = used.set_point(*self._command())
             now = rng.uniform(-1, 1.5) * spec.max_speed, rng.uniform(-2, 2) * spec.max_turn_rate
@@ -143,7 +149,8 @@ class _Trial:
         spec = self.spec
         for number in range(DRIVES):
             self.count += 1
-            state, ticks = _State(self._new(), TICKS[number % len(TICKS)]), 0
+            state = _State(self._new(), TICKS[number % len(TICKS)])
+            ticks = 0
             started = time.perf_counter()
             for _ in range(COMMANDS):
                 wanted = state.drive.set_point(*self._command())
@@ -156,7 +163,9 @@ class _Trial:
                 return
 
     def _within(self, state: _State, where: str) -> Iterator[Case]:
-        speed, turn_rate, spec = state.speed, state.turn_rate, self.spec
+        speed = state.speed
+        turn_rate = state.turn_rate
+        spec = self.spec
         case = f"{_velocity_text(speed, turn_rate)} {where}, tick {state.dt:g} s"
         if not speed <= spec.max_speed * (1 + SLACK):
             yield "drives faster than its limit", case
@@ -207,7 +216,8 @@ class _Trial:
         for number in range(APPROACHES):
             self.count += 1
             heading = 2 * math.pi * number / APPROACHES
-            x, y = size / 2 + run * math.cos(heading), size / 2 + run * math.sin(heading)
+            x = size / 2 + run * math.cos(heading)
+            y = size / 2 + run * math.sin(heading)
             far = 0.0 if math.sin(heading) >= 0 else size
             wall = (size / 2, far, size / 2, size - far if number % 2 else size / 2)
             world = World(hall(size, size, [wall]), LONGEST_TICK)

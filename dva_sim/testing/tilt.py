@@ -91,7 +91,9 @@ class _FilterTrial:
     """
 
     def __init__(self, make: Callable[[], Filter], rng: np.random.Generator) -> None:
-        self.make, self.rng, self.took = make, rng, list[float]()
+        self.make = make
+        self.rng = rng
+        self.took = list[float]()
         self.parts: tuple[Part, ...] = (
             self._begins, self._bounds, self._copies, self._constant, self._ages
         )  # fmt: skip
@@ -107,7 +109,8 @@ class _FilterTrial:
         return values
 
     def _samples(self, count: int = SAMPLES) -> list[Pair]:
-        level, turn = self.rng.uniform(-2, 12, count), self.rng.uniform(-40, 40, count)
+        level = self.rng.uniform(-2, 12, count)
+        turn = self.rng.uniform(-40, 40, count)
         return list(zip(level.tolist(), turn.tolist(), strict=True))
 
     def _begins(self) -> Iterator[Case]:
@@ -141,9 +144,11 @@ class _FilterTrial:
 
     def _copies(self) -> Iterator[Case]:
         """Check that copies give the same values independently, and that reading has no effect."""
-        samples, other = self._samples(), self._samples()
+        samples = self._samples()
+        other = self._samples()
         alone = self._values(self.make(), samples)
-        one, disturbing = self.make(), self.make()
+        one = self.make()
+        disturbing = self.make()
         beside = []
         for number, (sample, odd) in enumerate(zip(samples, other, strict=True), 1):
             one.add(sample)
@@ -188,7 +193,8 @@ class _FilterTrial:
         if batch is None:
             return
         for fresh in (batch // 3, batch // 2):
-            filter_, value = self.make(), (0.0, 0.0)
+            filter_ = self.make()
+            value = (0.0, 0.0)
             for level in (2.0, 8.0, 2.0):
                 for _ in range(10):
                     for _ in range(fresh):
@@ -207,20 +213,24 @@ class _MappingTrial:
     """
 
     def __init__(self, make: Callable[[], Mapping], rng: np.random.Generator) -> None:
-        self.make, self.rng, self.took = make, rng, list[float]()
+        self.make = make
+        self.rng = rng
+        self.took = list[float]()
         self.parts: tuple[Part, ...] = (
             self._limits, self._copies, self._steps, self._rest, self._way, self._tilts,
             self._steered,
         )  # fmt: skip
 
     def _readings(self, count: int = SAMPLES) -> list[Pair]:
-        level, turn = self.rng.uniform(-5, 15, count), self.rng.uniform(-50, 50, count)
+        level = self.rng.uniform(-5, 15, count)
+        turn = self.rng.uniform(-50, 50, count)
         return list(zip(level.tolist(), turn.tolist(), strict=True))
 
     def _limits(self) -> Iterator[Case]:
         hostile = [(one, other) for one in HOSTILE for other in HOSTILE]
         for number in range(RUNS):
-            mapping, readings = self.make(), self._readings() if number else hostile
+            mapping = self.make()
+            readings = self._readings() if number else hostile
             started = time.perf_counter()
             commands = [mapping.command(*reading, PERIOD) for reading in readings]
             self.took.append((time.perf_counter() - started) / len(readings))
@@ -234,7 +244,8 @@ class _MappingTrial:
     def _copies(self) -> Iterator[Case]:
         """Check that copies and new drives start afresh, and that memory is declared."""
         readings = self._readings()
-        one, other = self.make(), self.make()
+        one = self.make()
+        other = self.make()
         alone = [one.command(*reading, PERIOD) for reading in readings]
         for reading in self._readings():
             other.command(*reading, PERIOD)
@@ -257,8 +268,10 @@ class _MappingTrial:
         if not self.make().integrates:
             return
         for share in (1.0, 0.3, 0.1, 0.03):
-            reading, count = (share * HAND[0], share * HAND[1]), round(1.0 / PERIOD)
-            whole, halves = self.make(), self.make()
+            reading = (share * HAND[0], share * HAND[1])
+            count = round(1.0 / PERIOD)
+            whole = self.make()
+            halves = self.make()
             for _ in range(count):
                 one = whole.command(*reading, PERIOD)
                 halves.command(*reading, PERIOD / 2)
@@ -278,7 +291,8 @@ class _MappingTrial:
                 _, last = mapping.command(level, turn, PERIOD)
             speed, rate = mapping.command(0.0, 0.0, PERIOD)
             for _ in range(200):
-                last, (speed, rate) = rate, mapping.command(0.0, 0.0, PERIOD)
+                last = rate
+                (speed, rate) = mapping.command(0.0, 0.0, PERIOD)
                 if abs(rate) > abs(last) + 1e-9:
                     yield "turns faster and faster at rest", f"after {_pair_text((level, turn))}"
                     break
@@ -290,7 +304,8 @@ class _MappingTrial:
         before: Pair = 0.0, 0.0
         for share in (0.0, 0.2, 0.4, 0.6, 0.8, 1.0):
             reading = share * HAND[0], share * HAND[1]
-            mapping, mirror = self.make(), self.make()
+            mapping = self.make()
+            mirror = self.make()
             for _ in range(10):
                 now = mapping.command(*reading, PERIOD)
                 _, turned = mirror.command(reading[0], -reading[1], PERIOD)
@@ -311,7 +326,8 @@ class _MappingTrial:
     def _steered(self) -> Iterator[Case]:
         """A hand that tilts as `tilt_for` says gets what is wanted, and keeps it."""
         for wanted in ((-1.0, 0.0), (5.0, 20.0), (9.0, -25.0), (2.0, 3.0)):
-            mapping, shown = self.make(), (0.0, 0.0)
+            mapping = self.make()
+            shown = (0.0, 0.0)
             shown = mapping.command(0.0, 0.0, PERIOD)
             for _ in range(round(20 * WITHIN / PERIOD)):
                 level, turn = mapping.tilt_for(wanted, shown, WITHIN)
@@ -324,7 +340,8 @@ class _MappingTrial:
 
 
 def _near(one: Pair, other: Pair) -> bool:
-    level, turn = abs(one[0] - other[0]) / LEVELS, abs(one[1] - other[1]) / MAX_TURN_DEG
+    level = abs(one[0] - other[0]) / LEVELS
+    turn = abs(one[1] - other[1]) / MAX_TURN_DEG
     return max(level, turn) < NEAR
 
 

@@ -70,8 +70,10 @@ class _Trial:
     """
 
     def __init__(self, make: Callable[[], CommandTransport]) -> None:
-        self._make, self._port = make, _free_ports()
-        self.count, self.slowest = 0, 0.0
+        self._make = make
+        self._port = _free_ports()
+        self.count = 0
+        self.slowest = 0.0
         self.parts = (self._carry, self._carry, self._stay_away, self._be_alone)
 
     def _carry(self) -> Iterator[Case]:
@@ -152,13 +154,15 @@ class _Robot:
     """The robot's end in a thread of its own: keeps what it hears, sends what it is given."""
 
     def __init__(self, make: Callable[[], CommandTransport], port: int) -> None:
-        self._make, self._folder = make, tempfile.TemporaryDirectory()
+        self._make = make
+        self._folder = tempfile.TemporaryDirectory()
         by = time.monotonic() + CONNECTS_S
         self.place = Rendezvous("127.0.0.1", "127.0.0.1", port, Path(self._folder.name), by)
         self.heard: list[bytes] = []
         self.pictures: list[bytes] = []
         self.problem = ""
-        self._over, self._paused = threading.Event(), threading.Event()
+        self._over = threading.Event()
+        self._paused = threading.Event()
         self._is_paused = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
 

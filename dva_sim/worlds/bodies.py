@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from typing import Final, Generic, NamedTuple, TypeVar
 
 import pymunk
@@ -50,7 +51,9 @@ class Contacts:
     """
 
     def __init__(self) -> None:
-        self.count, self.touching, self.last = 0, 0, -math.inf
+        self.count = 0
+        self.touching = 0
+        self.last = -math.inf
 
     def begin(self, now: float) -> None:
         """It touches one more shape."""
@@ -79,7 +82,10 @@ class Jam:
     def strain(self, x: float, y: float, heading: float, dt: float) -> None:
         """For a tick it was asked to move while it touched something, there [m, rad]."""
         if not self._near(x, y, heading):
-            self._x, self._y, self._heading, self._since = x, y, heading, 0.0
+            self._x = x
+            self._y = y
+            self._heading = heading
+            self._since = 0.0
         if self._since < JAM_TIME <= self._since + dt:
             self.count += 1
         self._since += dt
@@ -99,6 +105,10 @@ GRIP: Final = 0.8  # friction coefficient of rubber on a dry floor
 FRICTION, ELASTICITY = 0.3, 0.1  # of bumpers and walls; both multiply in a contact
 AT_REST = 1e-3  # slower than this, brakes hold [m/s, rad/s]
 WALL, ROBOT, PERSON = 1, 2, 3  # collision types
+
+# An assignment to an attribute of pymunk's costs twice as much as the function behind it.
+_set_force: Callable[[pymunk.Body, tuple[float, float]], None] = pymunk.Body.force.fset  # type: ignore[attr-defined]
+_set_torque: Callable[[pymunk.Body, float], None] = pymunk.Body.torque.fset  # type: ignore[attr-defined]
 
 T = TypeVar("T")
 
@@ -154,9 +164,11 @@ class Ticks:
     """
 
     def __init__(self, dt: float) -> None:
-        self.dt, self.space = dt, pymunk.Space()
+        self.dt = dt
+        self.space = pymunk.Space()
         self._tick_us = round(dt * US)
-        self._tick, self._now_us = 0, 0
+        self._tick = 0
+        self._now_us = 0
         self._awake: dict[Body, None] = {}  # a set that keeps its order
 
     def wake(self, body: Body) -> None:
@@ -189,7 +201,9 @@ class Ticks:
             return
         self._now_us = now_us
         due = now_us // self._tick_us
-        tick, dt, awake = self._tick, self.dt, self._awake
+        tick = self._tick
+        dt = self.dt
+        awake = self._awake
         stand: list[Body] = []
         while tick < due and awake:
             for body in awake:
@@ -217,8 +231,12 @@ class Body:
     kind: int
 
     def __init__(self, world: Ticks, name: str, body: pymunk.Body, shape: pymunk.Shape) -> None:
-        self.name, self._world, self.body, self.shape = name, world, body, shape
-        self.radius, self.impulse = 0.0, 0.0
+        self.name = name
+        self._world = world
+        self.body = body
+        self.shape = shape
+        self.radius = 0.0
+        self.impulse = 0.0
         self._touch = Contacts()
 
     @property
@@ -311,26 +329,33 @@ class Lock:
     """
 
     def __init__(self, space: pymunk.Space, body: pymunk.Body, arm: float) -> None:
-        self._space, self._body, self._arm = space, body, arm
+        self._space = space
+        self._body = body
+        self._arm = arm
         self._joints: list[pymunk.Constraint] = []
         self.closed = False
 
     def close(self, grip: float) -> None:
         """Hold from now on, with this friction coefficient of the floor."""
         self.open()
-        floor, body, most = self._space.static_body, self._body, grip * G * self._body.mass
+        floor = self._space.static_body
+        body = self._body
+        most = grip * G * self._body.mass
         # New ones each time: a joint remembers the impulse with which it held last.
         slide = pymunk.PivotJoint(floor, body, (0.0, 0.0), (0.0, 0.0))
         turn = pymunk.GearJoint(floor, body, 0.0, 1.0)
         slide.max_bias = turn.max_bias = 0.0
-        slide.max_force, turn.max_force = most, most * self._arm
-        self._joints, self.closed = [slide, turn], True
+        slide.max_force = most
+        turn.max_force = most * self._arm
+        self._joints = [slide, turn]
+        self.closed = True
         self._space.add(*self._joints)
 
     def open(self) -> None:
         """Let the wheels roll."""
         self._space.remove(*self._joints)
-        self._joints, self.closed = [], False
+        self._joints = []
+        self.closed = False
 
 
 class RobotBody(Body):
@@ -351,18 +376,26 @@ class RobotBody(Body):
         else:
             moment = pymunk.moment_for_circle(spec.mass, 0.0, spec.radius)
         body = pymunk.Body(spec.mass, moment)
-        body.position, body.angle = (pose.x, pose.y), pose.heading
+        body.position = (pose.x, pose.y)
+        body.angle = pose.heading
         circle = pymunk.Circle(body, spec.radius)
         shape = pymunk.Poly(body, spec.corners) if spec.corners else circle
-        shape.friction, shape.elasticity = FRICTION, ELASTICITY
+        shape.friction = FRICTION
+        shape.elasticity = ELASTICITY
         shape.collision_type = self.kind
         super().__init__(world, name, body, shape)
-        self.spec, self.radius, self.motors = spec, spec.radius, spec.drive(spec)
-        self.distance, self.work, self._grip = 0.0, 0.0, GRIP
+        self.spec = spec
+        self.radius = spec.radius
+        self.motors = spec.drive(spec)
+        self.distance = 0.0
+        self.work = 0.0
+        self._grip = GRIP
         self._powered = True
         self._asked = AskedFor(STOP)
-        self._people, self._jam = Contacts(), Jam()
-        self._mass, self._moment = spec.mass, body.moment
+        self._people = Contacts()
+        self._jam = Jam()
+        self._mass = spec.mass
+        self._moment = body.moment
         self._arm = TRACK * spec.radius
         self._lock = Lock(world.space, body, self._arm)
         self._lock.close(GRIP)
@@ -389,7 +422,8 @@ class RobotBody(Body):
     @property
     def speed(self) -> float:
         """Measured speed along the heading [m/s]."""
-        velocity, angle = self.body.velocity, self.body.angle
+        velocity = self.body.velocity
+        angle = self.body.angle
         return velocity.x * math.cos(angle) + velocity.y * math.sin(angle)
 
     @property
@@ -429,12 +463,14 @@ class RobotBody(Body):
         Whatever is asked for, the motors get a forward speed [m/s] and a turn rate [rad/s]
         within the limits; anything that is not a number, or not finite, means stop.
         """
-        world, spec = self._world, self.spec
+        world = self._world
+        spec = self.spec
         start = world.next_tick()
         if not (math.isfinite(speed) and math.isfinite(turn_rate)) or math.isnan(until):
             self._asked.put(start, STOP)
         else:
-            most, fastest = spec.max_speed, spec.max_turn_rate
+            most = spec.max_speed
+            fastest = spec.max_turn_rate
             speed = 0.0 if speed < 0.0 else most if speed > most else speed
             if not -fastest <= turn_rate <= fastest:
                 turn_rate = math.copysign(fastest, turn_rate)
@@ -463,12 +499,16 @@ class RobotBody(Body):
         wanted, wanted_spin, end = self._asked.at(tick)
         if tick >= end or not self._powered:
             wanted = wanted_spin = 0.0
-        velocity, spin = body.velocity, body.angular_velocity
-        vx, vy = velocity.x, velocity.y
+        velocity = body.velocity
+        spin = body.angular_velocity
+        vx = velocity.x
+        vy = velocity.y
         # Bodies are moved before forces act on them: aim along the heading by then.
         angle = body.angle + spin * dt
-        cos, sin = math.cos(angle), math.sin(angle)
-        forward, sideways = vx * cos + vy * sin, vy * cos - vx * sin
+        cos = math.cos(angle)
+        sin = math.sin(angle)
+        forward = vx * cos + vy * sin
+        sideways = vy * cos - vx * sin
         if wanted == wanted_spin == 0.0:
             if abs(forward) + abs(sideways) + abs(spin) < AT_REST:
                 body.velocity = (0.0, 0.0)
@@ -486,16 +526,20 @@ class RobotBody(Body):
             if self._touch.touching:
                 self._jam.strain(*self.pose(), dt)
         along, turn = self.motors.accelerations(wanted, wanted_spin, forward, spin, dt)
-        across, most = -sideways / dt, self._grip * G
+        across = -sideways / dt
+        most = self._grip * G
         asked = math.hypot(along, across)
         if asked > most:
-            along, across = along * most / asked, across * most / asked
-        along, across = self._mass * along, self._mass * across
-        torque, most_torque = self._moment * turn, self._mass * most * self._arm
+            along = along * most / asked
+            across = across * most / asked
+        along = self._mass * along
+        across = self._mass * across
+        torque = self._moment * turn
+        most_torque = self._mass * most * self._arm
         if not -most_torque <= torque <= most_torque:
             torque = math.copysign(most_torque, torque)
-        body.force = (along * cos - across * sin, along * sin + across * cos)
-        body.torque = torque
+        _set_force(body, (along * cos - across * sin, along * sin + across * cos))
+        _set_torque(body, torque)
         self.distance += abs(forward) * dt
         power = along * (forward + 0.5 * dt * along / self._mass)  # with the mean of the tick
         spinning = torque * (spin + 0.5 * dt * torque / self._moment)

@@ -70,11 +70,14 @@ def _passage(
     """A door with the rooms on both sides; none if it joins a room to itself."""
     x1, y1, x2, y2 = ends
     width = math.hypot(x2 - x1, y2 - y1)
-    x, y, left = (x1 + x2) / 2, (y1 + y2) / 2, math.atan2(x2 - x1, y1 - y2)
+    x = (x1 + x2) / 2
+    y = (y1 + y2) / 2
+    left = math.atan2(x2 - x1, y1 - y2)
     sides = [beyond(rooms, x, y, heading) for heading in (left, left + math.pi)]
     a, b = (None if room is None or room.outdoor else room.name for room in sides)
     if a is None:
-        a, b = b, None
+        a = b
+        b = None
     if a is not None and a != b:
         yield Opening(
             room_a=a, room_b=b, x1=x1, y1=y1, x2=x2, y2=y2, width=width, height=height, kind=kind
@@ -116,7 +119,8 @@ def _straight(lines: Any) -> Floats:
 
 def _up_to(closed: Any, ends: Sequence[float]) -> tuple[float, float, float, float]:
     """An opening lengthened where it was cut `NEAR` a wall."""
-    a, b = np.array(ends[:2]), np.array(ends[2:])
+    a = np.array(ends[:2])
+    b = np.array(ends[2:])
     along = (b - a) / np.hypot(*(b - a)) * NEAR
     a, b = (
         end + way if closed.distance(shapely.Point(end)) < 1e-6 else end
@@ -183,7 +187,9 @@ def _joined(labels: Labels, resolution: float) -> Labels:
         sizes[taker] += sizes[piece]
         borders[taker] += borders[piece]
         borders[:, taker] += borders[:, piece]
-        borders[piece], borders[:, piece], borders[taker, taker] = 0, 0, 0
+        borders[piece] = 0
+        borders[:, piece] = 0
+        borders[taker, taker] = 0
         owner[owner == piece] = taker
     _, number = np.unique(owner, return_inverse=True)
     return np.where(labels >= 0, number[labels], NOWHERE).astype(np.int16)
@@ -201,7 +207,8 @@ def _borders_between(labels: Labels, count: int) -> NDArray[np.int64]:
 def _seams(grid: OccupancyGrid, labels: Labels, blocks: Sequence[Compartment]) -> Iterator[Opening]:
     """Each straight run of cell edges between the same two blocks."""
     for turned, cells in ((False, labels), (True, labels.T)):
-        low, high = cells[:-1].astype(np.int64), cells[1:].astype(np.int64)
+        low = cells[:-1].astype(np.int64)
+        high = cells[1:].astype(np.int64)
         code = np.where((low >= 0) & (high >= 0) & (low != high), low * len(blocks) + high, -1)
         starts = np.diff(code, axis=1, prepend=-1) != 0
         for row, left in zip(*np.nonzero(starts & (code >= 0)), strict=True):

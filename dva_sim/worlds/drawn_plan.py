@@ -107,7 +107,8 @@ def _rooms(kinds: dict[str, list[Feature]], ceiling: float) -> tuple[Room, ...]:
             if name is None or any(name == room.name for room in rooms):
                 raise feature.fail(f"a {kind} needs a name of its own, not {name!r}")
             height = getattr(drawn, "ceiling_m", None) or ceiling
-            outdoor, paved = kind != "room", kind != "yard"
+            outdoor = kind != "room"
+            paved = kind != "yard"
             holes = _holes(feature)
             rooms.append(Room(name, _corners(feature), height, outdoor, paved, holes=holes))
     return tuple(rooms)
@@ -139,7 +140,9 @@ def _exit(rooms: Lookup[Room], feature: Feature, name: str) -> Exit:
     width = math.hypot(x2 - x1, y2 - y1)
     if width < LEAST_EXIT:
         raise feature.fail(f"an exit is at least {LEAST_EXIT:g} m wide, not {width:g} m")
-    x, y, left = (x1 + x2) / 2, (y1 + y2) / 2, math.atan2(x2 - x1, y1 - y2)
+    x = (x1 + x2) / 2
+    y = (y1 + y2) / 2
+    left = math.atan2(x2 - x1, y1 - y2)
     right = math.remainder(left + math.pi, math.tau)
     outwards = right if _how_far_out(rooms, x, y, right) > _how_far_out(rooms, x, y, left) else left
     return Exit(x, y, outwards, width, name)
@@ -211,7 +214,8 @@ def _without_holes(area: Any) -> Iterator[Any]:
     if not area.interiors:
         yield area
         return
-    (xmin, ymin, xmax, ymax), x = area.bounds, area.interiors[0].centroid.x
+    (xmin, ymin, xmax, ymax) = area.bounds
+    x = area.interiors[0].centroid.x
     for low, high in ((xmin, x), (x, xmax)):
         side = shapely.intersection(area, shapely.box(low, ymin, high, ymax))
         for piece in shapely.get_parts(side):

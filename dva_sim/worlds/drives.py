@@ -65,15 +65,18 @@ class Differential(Drive):
 
     def __init__(self, spec: DriveSpec) -> None:
         super().__init__(spec)
-        self._up, self._down = spec.max_acceleration, -spec.max_deceleration
-        self._turn, self._time = spec.max_turn_acceleration, spec.motor_time_constant
+        self._up = spec.max_acceleration
+        self._down = -spec.max_deceleration
+        self._turn = spec.max_turn_acceleration
+        self._time = spec.motor_time_constant
 
     def accelerations(
         self, speed: float, turn_rate: float, now_speed: float, now_turn_rate: float, dt: float
     ) -> tuple[float, float]:
         """First order towards what is wanted, within the limits of acceleration."""
         gain = 1.0 / (self._time if self._time > dt else dt)
-        along, turn = (speed - now_speed) * gain, (turn_rate - now_turn_rate) * gain
+        along = (speed - now_speed) * gain
+        turn = (turn_rate - now_turn_rate) * gain
         if not self._down <= along <= self._up:
             along = self._up if along > 0.0 else self._down
         if not -self._turn <= turn <= self._turn:
@@ -119,7 +122,8 @@ class ThreeWay(Drive):
             raise ConfigError(f"option 'servo_s' is {servo_s!r}; should be at least 0")
         self.turning_radius = wheelbase_m / math.tan(math.radians(steering_deg))
         self._most = 1.0 / self.turning_radius  # curvature [1/m]
-        self._servo, self._motor = servo_s, Differential(spec)
+        self._servo = servo_s
+        self._motor = Differential(spec)
 
     def set_point(self, speed: float, turn_rate: float) -> tuple[float, float]:
         """The nearest duty and the nearest of three positions."""
@@ -156,7 +160,8 @@ class GuardedDrive(Guard, Drive):
 
     def __init__(self, drive: Drive) -> None:
         super().__init__(drive.spec)
-        self.turning_radius, self.drive = drive.turning_radius, drive
+        self.turning_radius = drive.turning_radius
+        self.drive = drive
 
     def set_point(self, speed: float, turn_rate: float) -> tuple[float, float]:
         """Limit the set point; stop on an invalid answer."""
@@ -171,7 +176,8 @@ class GuardedDrive(Guard, Drive):
         self, speed: float, turn_rate: float, now_speed: float, now_turn_rate: float, dt: float
     ) -> tuple[float, float]:
         """Limit the accelerations; brake on an invalid answer."""
-        spec, given = self.spec, (speed, turn_rate, now_speed, now_turn_rate, dt)
+        spec = self.spec
+        given = (speed, turn_rate, now_speed, now_turn_rate, dt)
         got = self._answer(self.drive.accelerations, *given)
         along, turn = got or (-now_speed / dt, -now_turn_rate / dt)
         self._judge_motion(along, turn, now_speed, now_turn_rate, dt=dt)
@@ -188,7 +194,8 @@ class GuardedDrive(Guard, Drive):
         self, along: float, turn: float, now_speed: float, now_turn_rate: float, dt: float
     ) -> None:
         """Check the result of a tick; braking after a push beyond a limit is allowed."""
-        spec, most = self.spec, self.spec.max_turn_acceleration
+        spec = self.spec
+        most = self.spec.max_turn_acceleration
         speed = now_speed + dt * _within(along, -spec.max_deceleration, spec.max_acceleration)
         turn_rate = now_turn_rate + dt * _within(turn, -most, most)
         brakes = min(now_speed, 0.0) <= speed <= max(now_speed, 0.0)

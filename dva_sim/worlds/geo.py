@@ -63,15 +63,18 @@ class GeoFrame:
         The plane does not tell: to it the other side of the earth is as near as this one.
         """
         sin_0, cos_0, _ = self._origin
-        phi, along = math.radians(latitude), math.radians(longitude - self.longitude)
+        phi = math.radians(latitude)
+        along = math.radians(longitude - self.longitude)
         cosine = sin_0 * math.sin(phi) + cos_0 * math.cos(phi) * math.cos(along)
         return _A * math.sqrt(max(0.0, 2 - 2 * cosine))
 
     def to_xy(self, latitude: float, longitude: float) -> tuple[float, float]:
         """Plane coordinates [m] of a geographic position [deg]."""
         sin_0, cos_0, normal_0 = self._origin
-        phi, along = math.radians(latitude), math.radians(longitude) - math.radians(self.longitude)
-        sin, cos = math.sin(phi), math.cos(phi)
+        phi = math.radians(latitude)
+        along = math.radians(longitude) - math.radians(self.longitude)
+        sin = math.sin(phi)
+        cos = math.cos(phi)
         normal = _A / math.sqrt(1 - _E2 * sin * sin)
         out = normal * cos * math.cos(along)
         up = (1 - _E2) * (normal * sin - normal_0 * sin_0)
@@ -82,13 +85,16 @@ class GeoFrame:
 
         Inverts `to_xy` by fixed-point steps; each gains about three digits within 3 km.
         """
-        latitude, longitude = self.latitude, self.longitude
-        east, north = x, y
+        latitude = self.latitude
+        longitude = self.longitude
+        east = x
+        north = y
         for _ in range(4):
             longitude += east * self._degrees[0]
             latitude += north * self._degrees[1]
             x_now, y_now = self.to_xy(latitude, longitude)
-            east, north = x - x_now, y - y_now
+            east = x - x_now
+            north = y - y_now
             if abs(east) + abs(north) < 1e-6:
                 break
         return latitude, longitude

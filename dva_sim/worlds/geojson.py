@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 from shapely.errors import GEOSException
 from shapely.geometry import mapping, shape
 
@@ -21,9 +22,114 @@ from dva_sim.kernel.config import validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import listed, unknown
 from dva_sim.kernel.yaml_files import read_text
-from dva_sim.worlds.drawn_features import KINDS
 from dva_sim.worlds.geo import GeoFrame
+from dva_sim.worlds.site_parts import (
+    DOOR_HEIGHT,
+    QUALITIES,
+    LinkQuality,
+)
 from dva_sim.worlds.storeys import storeys_of, to_choose_from
+
+
+class DrawnFeature(BaseModel):
+    """Properties of a feature; what an editor adds of its own is left alone."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
+
+    name: Annotated[str | None, BeforeValidator(lambda v: v if v is None else str(v))] = None
+
+
+class DrawnRoom(DrawnFeature):
+    """A room; without a height of its own it has the site's."""
+
+    ceiling_m: Annotated[float, Field(ge=1.5, le=50)] | None = None
+
+
+class DrawnDoor(DrawnFeature):
+    """A door."""
+
+    height_m: Annotated[float, Field(ge=1.5, le=10)] = DOOR_HEIGHT
+
+
+class DrawnPose(DrawnFeature):
+    """A place with a heading, counter-clockwise from east."""
+
+    heading_deg: float = 0.0
+
+
+class DrawnZone(DrawnFeature):
+    """A part of the floor with a rule or a purpose."""
+
+    use: Literal["restricted", "charging", "assembly"] = "restricted"
+
+
+class DrawnCamera(DrawnPose):
+    """A fixed camera."""
+
+    field_of_view_deg: Annotated[float, Field(gt=0, le=360)] = 90.0
+    range_m: Annotated[float, Field(gt=0, le=500)] = 15.0
+
+
+class DrawnBaseStation(DrawnFeature):
+    """An antenna."""
+
+    radio: Literal["wifi", "lte", "nr"] = "wifi"
+
+
+class DrawnWifi(DrawnFeature):
+    """The quality of a link: a word, numbers, or a word and the numbers that differ from it."""
+
+    quality: Literal["good", "fair", "poor", "none"] | None = None
+    loss: Annotated[float, Field(ge=0, le=1)] | None = None
+    rate_bps: Annotated[float, Field(ge=1e3)] | None = None
+    extra_delay_s: Annotated[float, Field(ge=0, le=30)] | None = None
+
+    @model_validator(mode="after")
+    def _says_something(self) -> DrawnWifi:
+        if self.quality is None and not self.numbers:
+            raise ValueError("should have a quality (good, fair, poor, none) or numbers")
+        return self
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The numbers that the feature gives."""
+        given = {name: getattr(self, name) for name in LinkQuality._fields}
+        return {name: value for name, value in given.items() if value is not None}
+
+    @property
+    def link(self) -> LinkQuality:
+        """Loss, rate and delay; those that are not given come with the quality."""
+        return QUALITIES[self.quality or "good"]._replace(**self.numbers)
+
+
+class FeatureKind(NamedTuple):
+    """Geometry and properties of a kind of feature."""
+
+    shapes: tuple[str, ...]
+    model: type[DrawnFeature] = DrawnFeature
+
+
+KINDS = {
+    "wall": FeatureKind(("LineString", "MultiLineString", "Polygon")),
+    "room": FeatureKind(("Polygon",), DrawnRoom),
+    "path": FeatureKind(("Polygon",)),
+    "yard": FeatureKind(("Polygon",)),
+    "door": FeatureKind(("LineString",), DrawnDoor),
+    "exit": FeatureKind(("LineString",)),
+    "zone": FeatureKind(("Polygon",), DrawnZone),
+    "wifi": FeatureKind(("Polygon",), DrawnWifi),
+    "robot_base": FeatureKind(("Point",), DrawnPose),
+    "guard_post": FeatureKind(("Point",), DrawnPose),
+    "operator_desk": FeatureKind(("Point",), DrawnPose),
+    "camera": FeatureKind(("Point",), DrawnCamera),
+    "base_station": FeatureKind(("Point",), DrawnBaseStation),
+    "smoke_detector": FeatureKind(("Point",)),
+    "heat_detector": FeatureKind(("Point",)),
+    "co_detector": FeatureKind(("Point",)),
+    "gas_detector": FeatureKind(("Point",)),
+    "water_detector": FeatureKind(("Point",)),
+}
+
 
 Points = NDArray[np.float64]
 Fail = Callable[[str], ConfigError]
@@ -173,7 +279,8 @@ def _crs(collection: Mapping[str, Any]) -> str:
 def _error(path: Path, text: str, index: int, problem: str) -> ConfigError:
     """The mistake in a feature; only now is its line and column looked for."""
     at = _place(text, index)
-    line, column = text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)
+    line = text.count("\n", 0, at) + 1
+    column = at - text.rfind("\n", 0, at)
     return ConfigError(f"feature {index + 1}: {problem}", path, line, column)
 
 
@@ -181,7 +288,8 @@ def _place(text: str, index: int) -> int:
     """Return where a feature begins in the text of its file."""
     features = re.compile(r'"features"\s*:\s*\[').search(text)
     at = features.end() if features else 0
-    decoder, gap = json.JSONDecoder(), re.compile(r"[\s,]*")
+    decoder = json.JSONDecoder()
+    gap = re.compile(r"[\s,]*")
     for _ in range(index):
         at = decoder.raw_decode(text, gap.match(text, at).end())[1]  # type: ignore[union-attr]
     return gap.match(text, at).end()  # type: ignore[union-attr]
@@ -191,7 +299,8 @@ def _parts(data: Any, frame: GeoFrame, crs: str, fail: Fail) -> Iterator[Feature
     """A feature of the file; where its kind needs no name of its own, its parts one by one."""
     if not isinstance(data, dict):
         raise fail("should be a GeoJSON Feature, an object")
-    properties, geometry = data.get("properties"), data.get("geometry")
+    properties = data.get("properties")
+    geometry = data.get("geometry")
     if not isinstance(properties, dict | None):
         raise fail("its 'properties' should be an object")
     properties = properties or {}

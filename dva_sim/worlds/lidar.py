@@ -34,9 +34,12 @@ class Lidar:
     """
 
     def __init__(self, world: World, rays: int = 36, reach: float = 8.0) -> None:
-        self.rays, self.reach, self._step = rays, reach, 2.0 * math.pi / rays
+        self.rays = rays
+        self.reach = reach
+        self._step = 2.0 * math.pi / rays
         self.angles: Floats = self._step * np.arange(rays, dtype=np.float64)
-        self._world, self._walls = world, world.site.walls
+        self._world = world
+        self._walls = world.site.walls
         self._near: dict[tuple[int, int], Ints] = {}
         self._asked: dict[RobotBody, float] = {}
         self._seen: dict[RobotBody, Floats] = {}
@@ -54,7 +57,8 @@ class Lidar:
         others = [*self._world.robots, *self._world.people]
         seen, by = self._others_near(bodies, eyes, others)
         angular = np.array([bool(_corners(body)) for body in others], bool)
-        discs, edged = ~angular[seen], angular[seen]
+        discs = ~angular[seen]
+        edged = angular[seen]
         places = np.array([(body.x, body.y, body.radius) for body in others]).reshape(-1, 3)
         self._meet_discs(eyes, best, by[discs], places[seen[discs]])
         self._meet_segments(eyes, best, *_edges(others, seen[edged], by[edged]))
@@ -65,11 +69,13 @@ class Lidar:
 
         Those who listen are scanned along with the first of them that asks in a tick.
         """
-        now, listeners = self._world.time, {body: None}
+        now = self._world.time
+        listeners = {body: None}
         if now != self._seen_at:
             self._asked = {b: last for b, last in self._asked.items() if now - last <= LISTENS}
             listeners.update(dict.fromkeys(self._asked))
-            self._seen, self._seen_at = {}, now
+            self._seen = {}
+            self._seen_at = now
         if body not in self._seen:
             self._seen.update(zip(listeners, self.scan(list(listeners)), strict=True))
         self._asked[body] = now
@@ -114,12 +120,14 @@ class Lidar:
         """
         turn = 2.0 * math.pi
         low = low % turn
-        firsts, lasts = [], []
+        firsts = []
+        lasts = []
         for begin in (low, low - turn):  # what crosses the first ray comes in two parts
             firsts.append(np.maximum(np.ceil(begin / self._step - EDGE), 0).astype(np.int64))
             last = np.floor((begin + span) / self._step + EDGE).astype(np.int64)
             lasts.append(np.minimum(last, self.rays - 1))
-        first, last = np.concatenate(firsts), np.concatenate(lasts)
+        first = np.concatenate(firsts)
+        last = np.concatenate(lasts)
         count = np.maximum(last - first + 1, 0)
         which = np.repeat(np.arange(len(first)), count)
         before = np.cumsum(count) - count
@@ -128,13 +136,20 @@ class Lidar:
 
     def _meet_segments(self, eyes: Floats, best: Floats, by: Ints, ends: Floats) -> None:
         x, y, heading = eyes[by].T
-        ax, ay, bx, by_ = ends[:, 0] - x, ends[:, 1] - y, ends[:, 2] - x, ends[:, 3] - y
+        ax = ends[:, 0] - x
+        ay = ends[:, 1] - y
+        bx = ends[:, 2] - x
+        by_ = ends[:, 3] - y
         span = np.arctan2(ax * by_ - ay * bx, ax * bx + ay * by_)
         low = np.arctan2(ay, ax) - heading + np.minimum(span, 0.0)
         which, ray = self._rays_between(low, np.abs(span))
         angle = heading[which] + self.angles[ray]
-        ux, uy, ax, ay = np.cos(angle), np.sin(angle), ax[which], ay[which]
-        ex, ey = bx[which] - ax, by_[which] - ay
+        ux = np.cos(angle)
+        uy = np.sin(angle)
+        ax = ax[which]
+        ay = ay[which]
+        ex = bx[which] - ax
+        ey = by_[which] - ay
         across = ux * ey - uy * ex
         with np.errstate(divide="ignore", invalid="ignore"):
             distance = (ax * ey - ay * ex) / across
@@ -144,13 +159,19 @@ class Lidar:
 
     def _meet_discs(self, eyes: Floats, best: Floats, by: Ints, discs: Floats) -> None:
         x, y, heading = eyes[by].T
-        dx, dy, radius = discs[:, 0] - x, discs[:, 1] - y, discs[:, 2]
+        dx = discs[:, 0] - x
+        dy = discs[:, 1] - y
+        radius = discs[:, 2]
         away = np.hypot(dx, dy)
         half = np.where(away > radius, np.arcsin(np.minimum(radius / away, 1.0)), math.pi)
         which, ray = self._rays_between(np.arctan2(dy, dx) - heading - half, 2.0 * half)
         angle = heading[which] + self.angles[ray]
-        ux, uy, dx, dy = np.cos(angle), np.sin(angle), dx[which], dy[which]
-        along, aside = dx * ux + dy * uy, dx * uy - dy * ux
+        ux = np.cos(angle)
+        uy = np.sin(angle)
+        dx = dx[which]
+        dy = dy[which]
+        along = dx * ux + dy * uy
+        aside = dx * uy - dy * ux
         rest = radius[which] ** 2 - aside**2
         met = rest >= 0.0
         distance = np.maximum(along[met] - np.sqrt(rest[met]), 0.0)
@@ -159,7 +180,8 @@ class Lidar:
 
 def _distance(walls: Floats, point: Floats) -> Floats:
     """Return the distance of each wall `(n, 4)` from a point [m]."""
-    a, along = walls[:, :2], walls[:, 2:] - walls[:, :2]
+    a = walls[:, :2]
+    along = walls[:, 2:] - walls[:, :2]
     square = np.maximum((along**2).sum(axis=1), 1e-300)
     share = np.clip(((point - a) * along).sum(axis=1) / square, 0.0, 1.0)
     return np.asarray(np.hypot(*(a + share[:, None] * along - point).T))
@@ -180,6 +202,7 @@ def _edges(others: Sequence[Body], seen: Ints, by: Ints) -> tuple[Ints, Floats]:
 def _sides(body: Body) -> Floats:
     """Return the sides of a body now, shape `(k, 4)` [m]."""
     corners = np.array(_corners(body))
-    cos, sin = math.cos(body.body.angle), math.sin(body.body.angle)
+    cos = math.cos(body.body.angle)
+    sin = math.sin(body.body.angle)
     xy = corners @ np.array([[cos, sin], [-sin, cos]]) + (body.x, body.y)
     return np.hstack([xy, np.roll(xy, -1, axis=0)])

@@ -38,7 +38,8 @@ class Sight:
         return self._kept(a, b)
 
     def _between(self, a: Point, b: Point) -> bool:
-        (ax, ay), (bx, by) = a, b
+        (ax, ay) = a
+        (bx, by) = b
         sides = self._lines @ np.array([[ax, bx], [ay, by], [1.0, 1.0]])
         across = np.array([ay - by, bx - ax]) @ self._ends + (ax * by - bx * ay)
         one, other = sides.T
@@ -52,8 +53,11 @@ class Sight:
         seen = np.ones(len(flat), bool)
         ends = self._ends.T.reshape(-1, 2, 2)
         for (px, py), (qx, qy) in ends.tolist():
-            p, q, on_line = (px, py), (qx, qy), ON_LINE * math.hypot(qx - px, qy - py)
-            side_a, sides = _side(p, q, a), _side(p, q, flat.T)
+            p = (px, py)
+            q = (qx, qy)
+            on_line = ON_LINE * math.hypot(qx - px, qy - py)
+            side_a = _side(p, q, a)
+            sides = _side(p, q, flat.T)
             across = (np.minimum(side_a, sides) < -on_line) & (np.maximum(side_a, sides) > on_line)
             ends_apart = _side(a, flat.T, p) * _side(a, flat.T, q) < 0
             seen &= ~(across & ends_apart)
@@ -62,5 +66,7 @@ class Sight:
 
 def _side(p: Any, q: Any, point: Any) -> Any:
     """On which side of the line p-q a point lies, by sign."""
-    (px, py), (qx, qy), (x, y) = p, q, point
+    (px, py) = p
+    (qx, qy) = q
+    (x, y) = point
     return (qx - px) * (y - py) - (qy - py) * (x - px)

@@ -21,7 +21,9 @@ from dva_sim.kernel.suggestions import guess
 from dva_sim.kernel.yaml_files import Document, beside, load_yaml, with_named_files
 from dva_sim.worlds.geo import Pose
 
-FREE, OCCUPIED, UNKNOWN = 0, 100, 255
+FREE = 0
+OCCUPIED = 100
+UNKNOWN = 255
 
 # What map_saver writes for "never seen" in a trinary map.
 UNKNOWN_SHADE = 205
@@ -48,8 +50,10 @@ class OccupancyGrid:
 
     def to_cell(self, x: float, y: float) -> tuple[int, int]:
         """Row and column of a point [m]; may lie outside of the grid."""
-        dx, dy = x - self.origin.x, y - self.origin.y
-        cos, sin = math.cos(self.origin.heading), math.sin(self.origin.heading)
+        dx = x - self.origin.x
+        dy = y - self.origin.y
+        cos = math.cos(self.origin.heading)
+        sin = math.sin(self.origin.heading)
         column = (cos * dx + sin * dy) / self.resolution
         row = (cos * dy - sin * dx) / self.resolution
         return math.floor(row), math.floor(column)
@@ -58,8 +62,10 @@ class OccupancyGrid:
         """Points `(n, 2)` [m] at fractional cell coordinates; a cell's middle is at +0.5."""
         u = np.asarray(columns, float) * self.resolution
         v = np.asarray(rows, float) * self.resolution
-        cos, sin = np.cos(self.origin.heading), np.sin(self.origin.heading)
-        x, y = self.origin.x + cos * u - sin * v, self.origin.y + sin * u + cos * v
+        cos = np.cos(self.origin.heading)
+        sin = np.sin(self.origin.heading)
+        x = self.origin.x + cos * u - sin * v
+        y = self.origin.y + sin * u + cos * v
         return np.stack([x, y], axis=-1)
 
     def window(self, points: NDArray[np.float64]) -> tuple[slice, slice]:
@@ -348,12 +354,11 @@ def cells_inside(
         border: Segments of closed rings `(n, 4)` [m], holes among them.
         window: Rows and columns to look at.
     """
-    ys, xs = (
-        grid.middles((window[0], slice(0, 1)))[:, 0, 1],
-        grid.middles((slice(0, 1), window[1]))[0, :, 0],
-    )
+    ys = grid.middles((window[0], slice(0, 1)))[:, 0, 1]
+    xs = grid.middles((slice(0, 1), window[1]))[0, :, 0]
     x1, y1, x2, y2 = border.T
-    first, last = np.searchsorted(ys, np.minimum(y1, y2)), np.searchsorted(ys, np.maximum(y1, y2))
+    first = np.searchsorted(ys, np.minimum(y1, y2))
+    last = np.searchsorted(ys, np.maximum(y1, y2))
     edge = np.repeat(np.arange(len(border)), last - first)
     row = np.arange(len(edge)) - np.repeat(np.cumsum(last - first) - last, last - first)
     x = x1[edge] + (ys[row] - y1[edge]) * (x2 - x1)[edge] / (y2 - y1)[edge]

@@ -126,7 +126,8 @@ def lay_out(width: float, depth: float, rng: np.random.Generator) -> Layout:
         depth: South to north [m], at least 12.
         rng: Random generator.
     """
-    width, depth = tenths(width), tenths(depth)
+    width = tenths(width)
+    depth = tenths(depth)
     wings = max(1, int(depth / STOREY + 0.65))
     edges = [tenths(depth * wing / wings) for wing in range(wings + 1)]
     corridors = []
@@ -190,7 +191,8 @@ def _cells(
 
 def _cuts(start: float, end: float, rng: np.random.Generator) -> list[float]:
     """Return where partitions stand: room widths drawn from `WISHES`, scaled to fit."""
-    length, wishes = end - start, list[float]()
+    length = end - start
+    wishes = list[float]()
     while sum(wishes) < length:
         wishes.append(rng.uniform(*WISHES[rng.choice(len(WISHES), p=ODDS)]))
     if sum(wishes) - length > wishes[-1] / 2 or len(wishes) * (LEAST_CELL + 0.1) > length:
@@ -298,7 +300,8 @@ def assign(layout: Layout, bases: int) -> list[tuple[FloorCell, Use, str]]:
     Stairs stand at the facades, as they lead out; robots get the largest rooms near the
     lobby; one of each of `SINGLE` is spread over the house; all others go by their size.
     """
-    left, uses = list(layout.cells), dict[FloorCell, tuple[Use, str]]()
+    left = list(layout.cells)
+    uses = dict[FloorCell, tuple[Use, str]]()
     for use, name, wish in _needs(layout):
         bays = [bay for bay in uses if uses[bay][0] is ROBOT_BAY]
         if use is not ROBOT_BAY or sum(len(base_positions(bay)) for bay in bays) < bases:

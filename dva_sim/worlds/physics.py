@@ -57,9 +57,12 @@ class PersonBody(Body):
         body.position = pose.x, pose.y
         shape = pymunk.Circle(body, radius)
         # Who brushes past a wall or somebody else is not held back.
-        shape.friction, shape.elasticity, shape.collision_type = 0.0, 0.0, self.kind
+        shape.friction = 0.0
+        shape.elasticity = 0.0
+        shape.collision_type = self.kind
         super().__init__(world, name, body, shape)
-        self.radius, self._circle = radius, shape
+        self.radius = radius
+        self._circle = shape
         self._asked = AskedFor((0.0, 0.0))
 
     def walk(self, vx: float, vy: float) -> None:
@@ -85,7 +88,8 @@ class PersonBody(Body):
         if wx == wy == 0.0 and abs(vx) + abs(vy) < AT_REST:
             self.body.velocity = (0.0, 0.0)
             return bool(self._asked.coming)
-        ax, ay = (wx - vx) / RELAXATION, (wy - vy) / RELAXATION
+        ax = (wx - vx) / RELAXATION
+        ay = (wy - vy) / RELAXATION
         asked = math.hypot(ax, ay)
         share = MASS * min(1.0, MOST_PUSH / asked) if asked > 0.0 else 0.0
         self.body.force = (ax * share, ay * share)
@@ -167,7 +171,8 @@ class World(Ticks):
             self._check_place("person", person.name, Pose(x, y, 0.0), person.radius)
         finally:
             shape.filter = pymunk.ShapeFilter(categories=_MOVING)
-        person.body.position, person.body.velocity = (x, y), (0.0, 0.0)
+        person.body.position = (x, y)
+        person.body.velocity = (0.0, 0.0)
         self.space.reindex_shapes_for_body(person.body)
         self.wake(person)
 
@@ -231,7 +236,9 @@ class World(Ticks):
 
 def _wall(space: pymunk.Space, x1: float, y1: float, x2: float, y2: float) -> pymunk.Segment:
     wall = pymunk.Segment(space.static_body, (x1, y1), (x2, y2), 0.0)
-    wall.friction, wall.elasticity, wall.collision_type = FRICTION, ELASTICITY, WALL
+    wall.friction = FRICTION
+    wall.elasticity = ELASTICITY
+    wall.collision_type = WALL
     wall.filter = pymunk.ShapeFilter(categories=_FIXED)
     return wall
 

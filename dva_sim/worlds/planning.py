@@ -21,7 +21,9 @@ STEP = 0.25  # between the points of a finished way [m]
 SNAP = 1.5  # how far to look for a planning cell around a start or goal [m]
 ROUNDS = 20  # of smoothing
 SPARE = 0.30  # on top of the clearance: so near to a wall may a rounded corner get [m]
-KEPT_FIELDS, KEPT_PATHS, KEPT_MAPS = 256, 2048, 4
+KEPT_FIELDS = 256
+KEPT_PATHS = 2048
+KEPT_MAPS = 4
 KEPT_NODES = 2**24  # of all kept fields together, 12 bytes each
 
 Point = tuple[float, float]
@@ -109,7 +111,9 @@ class Roadmap:
     def __init__(
         self, grid: OccupancyGrid, clearance: float, sight: Sight, room: Floats | None = None
     ) -> None:
-        self._grid, self._clearance, self.sight = grid, clearance, sight
+        self._grid = grid
+        self._clearance = clearance
+        self.sight = sight
         room = grid.clearance if room is None else room
         block = max(1, round(CELL / grid.resolution))
         shape = -(-np.array(grid.cells.shape) // block)
@@ -123,7 +127,8 @@ class Roadmap:
         self._at = grid.to_xy(rows + 0.5, columns + 0.5)
         self._block = block
         self._graph = self._connect()
-        cos, sin = math.cos(grid.origin.heading), math.sin(grid.origin.heading)
+        cos = math.cos(grid.origin.heading)
+        sin = math.sin(grid.origin.heading)
         self._corner = np.array([grid.origin.x, grid.origin.y])
         self._turn = np.array([[cos, -sin], [sin, cos]]) / grid.resolution
         self._clearances = room.ravel()
@@ -155,7 +160,8 @@ class Roadmap:
 
         number = np.arange(self._room.size).reshape(self._room.shape)
         free = self._room >= self._clearance
-        pairs, costs = [], []
+        pairs = []
+        costs = []
         for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
             here = np.s_[: len(free) - down, max(0, -right) : free.shape[1] - max(0, right)]
             there = np.s_[down:, max(0, right) : free.shape[1] + min(0, right)]
@@ -174,13 +180,15 @@ class Roadmap:
 
     def cost(self, start: Point, goal: Point) -> float:
         """Return the cost of the path in the graph: the same in both directions."""
-        first, last = self._node_at(start), self._node_at(goal)
+        first = self._node_at(start)
+        last = self._node_at(goal)
         if first is None or last is None:
             return math.inf
         return float(self._field_of(first)[0][last])
 
     def _way(self, start: Point, goal: Point) -> Floats | None:
-        first, last = self._node_at(start), self._node_at(goal)
+        first = self._node_at(start)
+        last = self._node_at(goal)
         if first is None or last is None:
             return None
         costs, towards = self._field_of(last)
@@ -239,11 +247,14 @@ class Roadmap:
 
     def _shorten(self, points: Floats) -> Floats:
         """Cut corners where the straight line costs no more than the way around."""
-        price, length = _price(self.room_at(points)), np.hypot(*np.diff(points, axis=0).T)
+        price = _price(self.room_at(points))
+        length = np.hypot(*np.diff(points, axis=0).T)
         total = np.r_[0.0, np.cumsum(0.5 * length * (price[1:] + price[:-1]))]
-        kept, i = [0], 0
+        kept = [0]
+        i = 0
         while i < len(points) - 1:
-            reach, step = i + 1, 8
+            reach = i + 1
+            step = 8
             while step:
                 j = min(reach + step, len(points) - 1)
                 good = j > reach and self._cost(points[i], points[j]) <= total[j] - total[i]
@@ -285,8 +296,10 @@ def _both_ways(graph: Any) -> Any:
 
 def _points_between(a: Floats, b: Floats, count: int) -> Floats:
     """Interpolate between two points as `np.linspace` does, to the last bit, but faster."""
-    way, last = b - a, count - 1
-    step, numbers = way / last, np.arange(count, dtype=np.float64)[:, None]
+    way = b - a
+    last = count - 1
+    step = way / last
+    numbers = np.arange(count, dtype=np.float64)[:, None]
     points: Floats = numbers * step if step.all() else numbers / last * way
     points += a
     points[-1] = b

@@ -271,7 +271,9 @@ def with_places(site: Site, seed: int, robots: int, guards: int, radius: float =
 
 @lru_cache(maxsize=64)
 def _settled(site: Site, seed: int, robots: int, guards: int, radius: float) -> Site:
-    streams, bases, posts = Streams(seed), site.robot_bases, site.guard_posts
+    streams = Streams(seed)
+    bases = site.robot_bases
+    posts = site.guard_posts
     bases += _scatter(
         site=site,
         streams=streams,
@@ -352,7 +354,9 @@ class _Places:
     """
 
     def __init__(self, site: Site, clearance: float, apart: float, taken: Iterable[Pose]) -> None:
-        self._site, self._clearance, self._apart = site, clearance, apart
+        self._site = site
+        self._clearance = clearance
+        self._apart = apart
         self._taken = np.array([(pose.x, pose.y) for pose in taken]).reshape(-1, 2)
         self._left: Floats | None = None  # middles `(n, 2)` of free cells, once they are few
 
@@ -493,7 +497,9 @@ def _site_of_plan(path: Path) -> str:
 def _check_size(floor: Any, config: SiteFile, document: Document) -> None:
     """Refuse a plan whose grid would take gigabytes."""
     xmin, ymin, xmax, ymax = floor.bounds
-    width, depth, cell = xmax - xmin, ymax - ymin, config.resolution_m
+    width = xmax - xmin
+    depth = ymax - ymin
+    cell = config.resolution_m
     cells = width * depth / cell**2
     if cells > MOST_CELLS:
         raise document.error(

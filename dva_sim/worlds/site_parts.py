@@ -41,7 +41,8 @@ class NamedArea:
             for qx, qy in corners:
                 if (py > y) != (qy > y) and px + (y - py) * (qx - px) / (qy - py) > x:
                     odd = not odd
-                px, py = qx, qy
+                px = qx
+                py = qy
         return odd
 
     @cached_property
@@ -89,7 +90,8 @@ class Lookup(Generic[T]):
 
     def _areas_near(self, column: int, row: int) -> list[T]:
         """Those whose box touches a square of a lattice."""
-        low, high = np.array([column, row]) * SQUARE, np.array([column + 1, row + 1]) * SQUARE
+        low = np.array([column, row]) * SQUARE
+        high = np.array([column + 1, row + 1]) * SQUARE
         touch = np.all((self._boxes[:, :2] <= high) & (self._boxes[:, 2:] >= low), axis=1)
         return [self._areas[index] for index in np.flatnonzero(touch).tolist()]
 
@@ -114,7 +116,8 @@ PROBES = (0.06, 0.2, 0.35, 0.5)  # how far from a door to look for what lies the
 
 def beyond(rooms: Lookup[Room], x: float, y: float, heading: float) -> Room | None:
     """Find the room on one side of a door, given its middle [m] and the direction [rad]."""
-    cos, sin = math.cos(heading), math.sin(heading)
+    cos = math.cos(heading)
+    sin = math.sin(heading)
     found = (rooms.at(x + far * cos, y + far * sin) for far in PROBES)
     return next((room for room in found if room is not None), None)
 

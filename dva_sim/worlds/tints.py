@@ -8,7 +8,8 @@ from dva_sim.worlds.site_parts import Room
 
 FLOORS = ("#eef3f8", "#f6f1e7", "#edf4ec", "#f6edf0", "#f0eff7", "#eaf4f4")
 CORRIDOR = "#fbfbf9"
-PAVING, GRASS = "#ece9e3", "#dfe9d4"
+PAVING = "#ece9e3"
+GRASS = "#dfe9d4"
 
 
 def floor_tint(room: Room, tints: dict[str, str]) -> str:

@@ -45,7 +45,10 @@ from dva_sim.worlds.view_marks import (
 Floats = NDArray[np.float64]
 
 MAP_FLOOR = "#f5f4ef"
-WALL, SOLID, SOLID_EDGE, DOOR = "#3a3f46", "#dcdfe3", "#b9bec6", "#b08c5a"
+WALL = "#3a3f46"
+SOLID = "#dcdfe3"
+SOLID_EDGE = "#b9bec6"
+DOOR = "#b08c5a"
 EXIT = "#009e73"
 # Hues that differ for all eyes, and hatches that differ without hue.
 ZONES = {
@@ -168,7 +171,8 @@ def _draw_walls(ax: Axes, site: Site) -> None:
 
 def _draw_doors(ax: Axes, site: Site) -> None:
     """Leaves that stand open, and the arcs they swing through."""
-    leaves, arcs = [], []
+    leaves = []
+    arcs = []
     busy = Counter(name for o in site.openings for name in (o.room_a, o.room_b) if name)
     for ends in site.doors:
         hinge, jamb = _hung(site, busy, ends)
@@ -183,9 +187,11 @@ def _draw_doors(ax: Axes, site: Site) -> None:
 
 def _hung(site: Site, busy: Counter[str], ends: Floats) -> tuple[Floats, Floats]:
     """Hinge and jamb of a door whose leaf opens to the left: into the room with fewer ways."""
-    hinge, jamb = ends[:2], ends[2:]
+    hinge = ends[:2]
+    jamb = ends[2:]
     along = (jamb - hinge) / max(math.dist(hinge, jamb), 1e-9)
-    aside, middle = 0.3 * np.array([-along[1], along[0]]), (hinge + jamb) / 2
+    aside = 0.3 * np.array([-along[1], along[0]])
+    middle = (hinge + jamb) / 2
     left, right = (
         busy.get(site.room_at(*(middle + way).tolist()) or "", math.inf) for way in (aside, -aside)
     )
@@ -271,7 +277,8 @@ def write_poster(site: Site, file: Path, coverage: bool, width: int) -> None:
 def poster(site: Site, coverage: bool) -> Figure:
     """The picture itself."""
     (left, right), (low, high) = limits(site)
-    across, up = right - left, high - low
+    across = right - left
+    up = high - low
     long = min(MOST_INCHES, max(LONG_SIDE, INCHES_PER_METRE * max(across, up)))
     width, height = (long * side / max(across, up) for side in (across, up))
     handles = _handles(site, coverage)

@@ -27,7 +27,9 @@ from dva_sim.worlds.site_parts import BaseStation, FixedCamera, Room
 
 Floats = NDArray[np.float64]
 
-INK, FAINT_INK, DESK = "#59606a", "#7c8b6d", "#c6cad0"
+INK = "#59606a"
+FAINT_INK = "#7c8b6d"
+DESK = "#c6cad0"
 DETECTORS = {
     "smoke": ("o", "#9aa1ab"),
     "heat": ("D", "#d55e00"),
@@ -35,7 +37,8 @@ DETECTORS = {
     "gas": ("^", "#c79a2a"),
     "water": ("s", "#5b93c7"),
 }
-CAMERA, STATION = "#aa4499", "#332288"
+CAMERA = "#aa4499"
+STATION = "#332288"
 POINTS_PER_INCH = 72.0
 FULL_SIZE = 16.0  # scale at which marks have their full size [pt/m]
 ARROW = 9.0  # half the length of the one to the north [pt]
@@ -49,7 +52,8 @@ def points_per_metre(ax: Axes) -> float:
     _, _, width, height = ax.get_position().bounds
     inches = figure.get_size_inches()
     (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
-    across, up = width * inches[0] / (right - left), height * inches[1] / (high - low)
+    across = width * inches[0] / (right - left)
+    up = height * inches[1] / (high - low)
     return float(min(across, up)) * POINTS_PER_INCH
 
 
@@ -122,7 +126,8 @@ def view_of(site: Site, camera: FixedCamera) -> Floats:
     spread = np.linspace(-0.5, 0.5, RAYS) * camera.field_of_view
     rays = np.stack([np.cos(camera.heading + spread), np.sin(camera.heading + spread)], axis=1)
     eye = np.array([camera.x, camera.y])
-    start, along = site.walls[:, :2] - eye, site.walls[:, 2:] - site.walls[:, :2]
+    start = site.walls[:, :2] - eye
+    along = site.walls[:, 2:] - site.walls[:, :2]
     across = rays[:, :1] * along[:, 1] - rays[:, 1:] * along[:, 0]  # (rays, walls)
     with np.errstate(divide="ignore", invalid="ignore"):
         far = (start[:, 0] * along[:, 1] - start[:, 1] * along[:, 0]) / across
@@ -150,7 +155,9 @@ GAP = 0.2  # between a name and the walls [m]
 PLACES = 9  # tried along each side of a room
 MOST_LINES = 3
 # How much less legible a name is that is turned, covers something, is only a number.
-TURNED, COVERING, ABRIDGED = 0.8, 0.6, 0.35
+TURNED = 0.8
+COVERING = 0.6
+ABRIDGED = 0.35
 
 
 class NameLayout(NamedTuple):
@@ -200,7 +207,8 @@ def _best(
     if area.is_empty:
         return None
     shapely.prepare(area)
-    best, found = 0.0, None
+    best = 0.0
+    found = None
     for setting in _settings(name):
         if setting.worth <= best:
             break  # they come from the most to the least legible
@@ -214,7 +222,8 @@ def _best(
         covered = np.bincount(hit, minlength=len(spots))
         worth = setting.worth * (COVERING if covered.min() else 1.0)
         if worth > best:
-            best, found = worth, (setting, *spots[np.argmin(covered)].tolist())
+            best = worth
+            found = (setting, *spots[np.argmin(covered)].tolist())
     return found
 
 
@@ -264,7 +273,9 @@ def _width(line: str) -> float:
 
 
 def _boxes(middles: NDArray[np.float64], width: float, height: float) -> Any:
-    (x, y), across, up = middles.T, width / 2, height / 2
+    (x, y) = middles.T
+    across = width / 2
+    up = height / 2
     return shapely.box(x - across, y - up, x + across, y + up)
 
 
@@ -319,7 +330,8 @@ def draw_north(ax: Axes, site: Site) -> None:
     if not site.rooms:
         return
     room = site.extent[1] - ax.get_ylim()[0]
-    y, size = _below(ax, site), min(ARROW / points_per_metre(ax), 0.3 * room)
+    y = _below(ax, site)
+    size = min(ARROW / points_per_metre(ax), 0.3 * room)
     x = site.extent[2] - 1.5 * size
     ax.fill(
         [x, x - 0.7 * size, x, x + 0.7 * size],

@@ -132,6 +132,20 @@ def test_a_hand_takes_a_robot_once_and_another_is_told_whose_it_is(dva, robot):
     assert codes == [m.OK, m.OK, m.BUSY]
 
 
+def test_the_timeline_says_when_a_hand_drives_a_robot_and_presses_its_button(dva, robot):
+    hand, timeline = ManualControl(robot), robot.device.recorder.timeline
+    begun, known = dva.now, len(timeline)
+    for does in (lambda: hand.take("ana"), lambda: hand.let_go("ana"), hand.press_emergency):
+        does()
+        dva.run_for(1.0)
+    told = [(each.who, each.time - begun, each.what.split(",")[0]) for each in timeline[known:]]
+    assert told == [
+        ("robot-1", pytest.approx(0.0), "is driven by hand from now on"),
+        ("robot-1", pytest.approx(1.0), "is no longer driven by hand"),
+        ("robot-1", pytest.approx(2.0), "is stopped by its own emergency button"),
+    ]
+
+
 def test_what_is_refused_is_counted_with_its_reason(dva, robot):
     answers = Answers(robot)
     answers.ask(m.PermissionRevocation(ROBOT, OPERATOR, 1))

@@ -23,6 +23,7 @@ ADVISERS = ("min_eta", "batch_optimal")
 PATTERNS = ("req-rep", "pipelined", "pub-sub", "latest-wins")
 FAR = {"link.delay_s": 0.25}
 MAIN = "drive-to-event, latest-wins"
+LOOP = "a fixed loop"
 SECOND, RUN, MESSAGE = "simulated s", "run", "message"
 
 
@@ -41,6 +42,37 @@ class Case:
     prepare: Callable[[], Work]
     takes_long: bool = False
     optional: bool = False
+
+
+# --- the loop that budgets are ratios to ---------------------------------------------------------
+
+
+class Particle:
+    """Point that a spring pulls to the origin."""
+
+    def __init__(self, place: float) -> None:
+        self.place, self.speed = place, 0.0
+
+    def move(self, dt: float) -> float:
+        """Advance by a time step [s]; returns the energy."""
+        self.speed -= self.place * dt
+        self.place += self.speed * dt
+        return 0.5 * (self.place * self.place + self.speed * self.speed)
+
+
+def fixed_loop() -> Work:
+    """Plain Python that never changes: calls, attributes, floats, lists, dictionaries and text."""
+
+    def loop() -> float:
+        particles = [Particle(0.1 * number) for number in range(20)]
+        largest: dict[str, float] = {}
+        for step in range(400):
+            energies = [particle.move(0.01) for particle in particles]
+            name = f"step {step % 7}"
+            largest[name] = max(largest.get(name, 0.0), *sorted(energies)[-5:])
+        return len([largest])
+
+    return loop
 
 
 # --- runs --------------------------------------------------------------------------------------
@@ -228,6 +260,7 @@ CASES = {
     "a task": Case(RUN, pointing),
     **{f"a decision, {p}": Case("decision", partial(decision, p)) for p in ADVISERS},
     "a picture": Case("picture", picture),
+    LOOP: Case("loop", fixed_loop),
     "a message through the network": Case(MESSAGE, published),
     "a call at a later moment": Case(MESSAGE, called),
     "a Store's put and get": Case(MESSAGE, stored),

@@ -67,10 +67,14 @@ def measured(roots: Sequence[Path], names: Sequence[str], counter: str) -> list[
     ]
 
 
-def started(root: Path, names: Iterable[str], counter: str) -> Figures:
+def started(
+    root: Path, names: Iterable[str], counter: str, *, repeats: int = startup.REPEATS
+) -> Figures:
     """Costs of commands in the version in a folder."""
     environment = pinned() | {"PYTHONPATH": str(root)}
-    reports = [startup.measured(name, counter, root, environment) for name in names]
+    reports = [
+        startup.measured(name, counter, root, environment, repeats=repeats) for name in names
+    ]
     return {each["case"]: each for each in reports}
 
 

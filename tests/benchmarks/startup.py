@@ -12,7 +12,7 @@ import sys
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from benchmarks.counting import FOLDER, Callgrind, Perf
 from helpers.processes.other_version import RUNNING
@@ -56,8 +56,22 @@ def results_folder(folder: Path) -> Path:
     return synthetic.write(folder, tables, synthetic.manifest(4, 1))
 
 
-def started(words: list[str], environment: Mapping[str, str]) -> tuple[int, float]:
-    """Run a program to its end; its process, and the CPU time of all its processes [s].
+class Ended(NamedTuple):
+    """Program that has ended.
+
+    Attributes:
+        pid: Its process.
+        cpu_s: CPU time of all its processes [s].
+        peak_mb: Most memory of the largest of them [MB].
+    """
+
+    pid: int
+    cpu_s: float
+    peak_mb: float
+
+
+def started(words: list[str], environment: Mapping[str, str]) -> Ended:
+    """Run a program to its end.
 
     Raises:
         RuntimeError: it crashed.
@@ -71,10 +85,12 @@ def started(words: list[str], environment: Mapping[str, str]) -> tuple[int, floa
         process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode not in (0, 2) or "Traceback" in output:
         raise RuntimeError(output.strip().splitlines()[-1])
-    return process.pid, used.ru_utime + used.ru_stime
+    return Ended(process.pid, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024)
 
 
-def measured(name: str, counter: str, root: Path, environment: Mapping[str, str]) -> dict[str, Any]:
+def measured(
+    name: str, counter: str, root: Path, environment: Mapping[str, str], *, repeats: int = REPEATS
+) -> dict[str, Any]:
     """Instructions, where they are counted, and the least CPU time [s] of starting a command."""
     with tempfile.TemporaryDirectory() as folder:
         results = results_folder(Path(folder) / "results")
@@ -88,12 +104,12 @@ def measured(name: str, counter: str, root: Path, environment: Mapping[str, str]
 
         instructions: float | None = None
         try:
-            cpu_s = min(started(words(), environment)[1] for _ in range(REPEATS))
+            cpu_s = min(started(words(), environment).cpu_s for _ in range(repeats))
             if counter == Perf.name:
-                instructions = Perf().count(lambda: started(words(), environment)[1])[1]
+                instructions = Perf().count(lambda: started(words(), environment).cpu_s)[1]
             elif counter == Callgrind.name:
                 under = [*Callgrind.words(Path(folder), at_once=True), *words()]
-                pid, _ = started(under, environment)
+                pid = started(under, environment).pid
                 instructions = Callgrind.total(Path(folder) / str(pid))
         except RuntimeError as error:
             return {"case": PREFIX + name, "error": str(error)}

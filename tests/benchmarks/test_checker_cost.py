@@ -14,9 +14,8 @@ from benchmarks.goals import goal
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.safety_checks import SafetyAudit
-from dva_sim.storms.answers import AnswerWatch
 from dva_sim.storms.campaign import play_seed
-from dva_sim.storms.refused_drivers import RefusedDrivers
+from dva_sim.storms.checkers import AnswerWatch, RefusedDrivers
 from dva_sim.storms.storm import Storm
 
 SEEDS = range(1, 4)

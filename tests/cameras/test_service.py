@@ -20,10 +20,10 @@ from dva_sim.cameras.screens import topic_of
 from dva_sim.cameras.service import CameraService
 from dva_sim.cameras.streams import MOST_VIEWERS
 from dva_sim.kernel.recorder import Recorder
-from dva_sim.live.options import LiveOptions
 from dva_sim.live.parts import WorldPart
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
+from dva_sim.options.runs import LiveOptions
 from dva_sim.protocol import messages as m
 from dva_sim.serving.pipes import MOST_WAITING
 from dva_sim.simulation.full.stage import DVA, Stage, id_of
@@ -55,7 +55,7 @@ class LiveWorld:
     def process(self) -> int:
         """The process that draws; 0: there is none."""
         child = self.service._child
-        return 0 if child is None else child.process.pid
+        return 0 if child is None else child.pid
 
     def let(self, work: Callable[[], object]) -> None:
         """Let time pass until some work in a thread is done."""

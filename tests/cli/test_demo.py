@@ -19,7 +19,7 @@ def played(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, bool]]:
     done: list[tuple[str, bool]] = []
 
     def study(request: RunRequest) -> ExitCode:
-        done.append((request.study, (request.folder / PICTURE).exists()))
+        done.append((request.options.study, (request.folder / PICTURE).exists()))
         return ExitCode.INTERRUPTED
 
     monkeypatch.setattr(module.study_runs, "run", study)

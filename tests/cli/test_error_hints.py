@@ -179,7 +179,7 @@ def test_a_process_that_cannot_be_started_is_told_with_the_way_around(monkeypatc
     def refuse(*_, **__):
         raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
 
-    monkeypatch.setattr(subprocess, "Popen", refuse)
+    monkeypatch.setattr(subprocess.Popen, "__init__", refuse)
     with (
         pytest.raises(DvaSimError) as error,
         executors.LocalProcesses(2) as workers,

@@ -14,9 +14,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.emulator.forwarder import links_of
 from dva_sim.network.emulator.report import DirectionReport, Durations, LinkFlow, LinkReport
 from dva_sim.network.link import LinkConfig
-from dva_sim.network.link.files import read_link
 
-ENDS = ("near", "far")
 CALM = LinkReport(
     up=DirectionReport(10, 7, 700, 1, 1, 1, *(0.1, 0.2, 0.3)),
     down=LinkFlow(links_of(LinkConfig(), 1)[1], waits=Durations()).report(),
@@ -58,26 +56,6 @@ def test_a_system_without_namespaces_is_named(monkeypatch, capsys):
     monkeypatch.setattr(sys, "platform", "plan9")
     assert call(["link", "--near", "true", "--far", "true"]) == 2
     assert not unnamed(capsys.readouterr().err, "Linux", "/dev/net/tun", "plan9")
-
-
-def test_a_link_is_read_from_its_keys_or_from_a_scenario(tmp_path):
-    (tmp_path / "link.yaml").write_text("delay_s: 0.2\nup: {loss: 0.1}\n")
-    (tmp_path / "run.yaml").write_text("horizon_s: 60\nlink:\n  delay_s: 0.2\n  up: {loss: 0.1}\n")
-    given = LinkConfig.model_validate({"delay_s": 0.2, "up": {"loss": 0.1}})
-    for name in ("link.yaml", "run.yaml"):
-        assert read_link(str(tmp_path / name), {}, ENDS) == given
-    changed = read_link(str(tmp_path / "run.yaml"), {"up.loss": 0.3, "rate_bps": 1e6}, ENDS)
-    assert (changed.toward("up").loss, changed.toward("down").loss) == (0.3, 0.0)
-    assert read_link("drive-to-event", {}, ENDS) == read_link(None, {}, ENDS) == LinkConfig()
-
-
-def test_mistakes_are_told_at_their_place_in_a_scenario(tmp_path):
-    (tmp_path / "run.yaml").write_text(
-        "model: full\nlink:\n  partitions:\n    - {from_s: 0, for_s: 1, source: robot-1}\n"
-    )
-    with pytest.raises(ConfigError) as error:
-        read_link(str(tmp_path / "run.yaml"), {}, ENDS)
-    assert not unnamed(str(error.value), "run.yaml:3:3", "robot-1", "near", "far")
 
 
 def test_a_table_has_a_row_for_each_direction_and_says_what_its_columns_mean(tmp_path):

@@ -9,7 +9,7 @@ from dva_sim.experiments.report.figures.trial import draw_trial, trial_figure
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import find
 from dva_sim.kernel.yaml_files import load_yaml
-from dva_sim.recordings.pictures import Wanted
+from dva_sim.options.runs import EpisodeOptions
 from dva_sim.simulation.models import model_for
 from dva_sim.simulation.task import build, trace_of
 
@@ -48,10 +48,10 @@ def test_a_block_is_told_with_its_conditions_and_what_they_come_to():
     assert "bit/s" in text
 
 
-@pytest.mark.parametrize("wanted", [{"video": Path("x.gif")}, {"strip": Path("x.png")}])
+@pytest.mark.parametrize("wanted", [{"video": Path("x.gif")}, {"still": Path("x.png"), "at": 3.0}])
 def test_a_task_has_no_film(wanted):
     with pytest.raises(ConfigError, match="only --still"):
-        EpisodeRequest("tasks/corner", pictures=Wanted(**wanted)).scenarios()
+        EpisodeRequest(EpisodeOptions("tasks/corner", **wanted)).scenarios()
 
 
 def test_a_table_on_80_columns_cuts_no_head_tells_units_and_says_how_many_rows_are_left_out():
@@ -67,7 +67,7 @@ def test_a_table_on_80_columns_cuts_no_head_tells_units_and_says_how_many_rows_a
 @pytest.mark.parametrize(
     ("name", "changes", "unit", "title"),
     [
-        ("tilt-position", {"trials": 15}, "mm", "amplitude 21.25 mm, width 6.8 mm, trial 1 of 135"),
+        ("fitts-tilt", {"trials": 15}, "mm", "amplitude 21.25 mm, width 6.8 mm, trial 1 of 135"),
         ("corner", {}, "m", "length 6 m, width 1.2 m, trial 1 of 6"),
     ],
 )

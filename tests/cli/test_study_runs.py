@@ -3,6 +3,7 @@
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from helpers.studies import small_study as kit
@@ -10,8 +11,13 @@ from helpers.wording import unnamed
 
 from dva_sim.cli import study_runs
 from dva_sim.cli.study_runs import RunPace, duration
+from dva_sim.experiments.execution.checkpoint import Checkpoint, RunOutcome
 from dva_sim.experiments.execution.dry_run import DryRun, _spread, dry_run
 from dva_sim.experiments.execution.runner import RunRequest, run_study
+from dva_sim.experiments.results.manifest import manifest_of
+from dva_sim.experiments.study.cell_grid import StudyJob
+from dva_sim.experiments.study.plan import StudyPlan
+from dva_sim.options.studies import RunOptions
 
 
 @pytest.mark.parametrize(
@@ -42,6 +48,36 @@ def test_a_dry_run_of_a_fresh_folder_tries_some_runs_and_keeps_none(tmp_path):
     assert plan.tried == 5  # the reference and four cells; both parts share them
     assert plan.estimate_s is not None
     assert not (tmp_path / "out").exists()
+
+
+def test_an_estimate_is_of_the_clock_and_rests_on_several_persons(tmp_path, monkeypatch):
+    spent, persons = {"cpu": 0.0, "wall": 0.0}, []
+
+    def slow(job: StudyJob) -> kit.Tables:
+        persons.append(job.person)
+        spent["cpu"] += 2.0
+        spent["wall"] += 10.0
+        return kit.cheap(job)
+
+    module = "dva_sim.experiments.execution.dry_run"
+    monkeypatch.setattr(f"{module}.clock_of", lambda _: lambda: spent["cpu"])
+    monkeypatch.setattr(f"{module}.time", SimpleNamespace(monotonic=lambda: spent["wall"]))
+    monkeypatch.setattr(f"{module}.executors.cores", lambda: 2)
+    plan = dry_run(kit.study_in(tmp_path), tmp_path / "out", jobs=8, probe=slow)
+    assert plan.cpu_s == 2.0 * kit.RUNS
+    assert plan.estimate_s == pytest.approx(5 * plan.cpu_s / 2)  # on two cores, not eight
+    assert len(set(persons)) > 1
+
+
+def test_what_is_done_tells_the_pace_of_the_rest(tmp_path):
+    study, out = kit.study_in(tmp_path), tmp_path / "out"
+    out.mkdir()
+    jobs = list(StudyPlan.of(study).jobs)
+    with Checkpoint(out, manifest_of(StudyPlan.of(study))["hash"]) as checkpoint:
+        checkpoint.add([RunOutcome(jobs[0].key, "{}", 2.0)], wall_s=3.0)
+    plan = dry_run(study, out, jobs=2)
+    assert plan.cpu_s == 2.0 * (kit.RUNS - 1)
+    assert plan.estimate_s == pytest.approx(1.5 * plan.cpu_s)
 
 
 def test_a_probe_ends_when_its_time_is_up_but_not_after_one_or_two(tmp_path, monkeypatch):
@@ -80,6 +116,7 @@ def test_a_run_that_fails_when_tried_is_told(tmp_path):
         ((42, 7, 9, 1, 2, 30.0, 0, ""), ["about 30 s", "2 processes,", "done already"]),
         ((42, 0, 9, 1, 2, 7200.0, 1, "", True), ["more than 2 h 0 min", "1 run tried", "stopped"]),
         ((42, 0, 9, 1, 2, 30.0, 4, "", False, "ValueError: no"), ["4 runs", "failed: ValueError"]),
+        ((42, 0, 9, 1, 2, 122.0, 7, "", False, "", 114.0), ["about 2 min", "(2 min of CPU time)"]),
     ],
 )
 def test_an_estimate_says_what_it_rests_on(plan, names):
@@ -109,7 +146,7 @@ def test_what_is_stopped_names_the_command_that_goes_on(tmp_path, monkeypatch, c
         raise KeyboardInterrupt("interrupted after 7 of 42 runs")
 
     monkeypatch.setattr("dva_sim.experiments.execution.runner.run_study", stop)
-    code = study_runs.run(RunRequest(study, tmp_path / "out", jobs=1))
+    code = study_runs.run(RunRequest(RunOptions(study, tmp_path / "out", jobs=1)))
     assert code == 130
     *_, what, how = capsys.readouterr().out.splitlines()
     assert "7 of 42 runs" in what

@@ -8,8 +8,6 @@ from helpers.network.transports import (
     LOSSY,
     NODES,
     VIRTUAL,
-    WITH_MQTT,
-    MqttWorld,
     SocketWorld,
     VirtualWorld,
     World,
@@ -20,7 +18,6 @@ from dva_sim.network.keys import KeyRing, create_keys
 SOCKETS = [
     pytest.param(kind, marks=pytest.mark.system) for kind in ("sockets", "sockets with keys")
 ]
-MQTT = [pytest.param(kind, marks=pytest.mark.system) for kind in WITH_MQTT]
 
 
 @pytest.fixture(scope="session")
@@ -30,7 +27,7 @@ def ring(tmp_path_factory: pytest.TempPathFactory) -> KeyRing:
     return KeyRing(folder)
 
 
-@pytest.fixture(params=[*VIRTUAL, LOSSY, *SOCKETS, *MQTT])
+@pytest.fixture(params=[*VIRTUAL, LOSSY, *SOCKETS])
 def world(request: pytest.FixtureRequest) -> Iterator[World]:
     made = _world(request)
     yield made
@@ -47,8 +44,6 @@ def sockets(request: pytest.FixtureRequest) -> Iterator[SocketWorld]:
 def _world(request: pytest.FixtureRequest) -> World:
     if request.param == LOSSY:
         return VirtualWorld(VIRTUAL["virtual segments"](), loss=0.05)
-    if request.param == "mqtt":
-        return MqttWorld()
     make = VIRTUAL.get(request.param)
     return VirtualWorld(make()) if make else SocketWorld(_ring(request))
 

@@ -14,7 +14,6 @@ from helpers.network.transports import (
     Asker,
     Meddled,
     Meddler,
-    MqttWorld,
     Plan,
     SocketWorld,
     World,
@@ -37,7 +36,7 @@ SESSION = 7
 
 def tells_senders(world: World) -> bool:
     """By keys, or by a broker that lets its clients write only what is from themselves."""
-    return isinstance(world, MqttWorld) or (isinstance(world, SocketWorld) and bool(world.ring))
+    return isinstance(world, SocketWorld) and bool(world.ring)
 
 
 def code_of(reply: bytes | None) -> int:

@@ -117,6 +117,34 @@ def test_what_a_device_was_asked_before_it_was_forgotten_has_failed(world, monke
     assert not site.dva.device._requesters
 
 
+@pytest.mark.invariant("S2")
+@pytest.mark.parametrize(
+    ("answers", "is_over"),
+    [
+        (m.OK, True),
+        (m.UNKNOWN_DEVICE, True),  # whoever knows nothing of a session obeys nobody in it
+        (m.BAD_MESSAGE, False),
+    ],
+)
+def test_a_robot_that_could_not_read_that_its_session_is_over_is_told_again(
+    answers, is_over, world, monkeypatch
+):
+    site, robot = site_with(ROBOT, world, monkeypatch)
+    codes = [answers]
+    told: list[int] = []
+
+    def reply(message: m.Message) -> m.Reply:
+        code = codes.pop() if codes and isinstance(message.body, m.PermissionRevocation) else m.OK
+        if isinstance(message.body, m.PermissionRevocation):
+            told.append(code)
+        return m.Reply(message.message_id, code, "")
+
+    robot.serve(reply)
+    site.dva.core.sessions.tell_robot(m.PermissionRevocation(ROBOT, PHONE, 5))
+    world.run_until(lambda: not site.dva.core.sessions.has_unacknowledged(ROBOT))
+    assert told == ([answers] if is_over else [answers, m.OK])
+
+
 FILES = Path("/proc/self/fd")
 
 

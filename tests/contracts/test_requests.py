@@ -8,7 +8,6 @@ from helpers.network.transports import (
     NODES,
     ROBOT,
     STRANGER,
-    WITH_MQTT,
     Asker,
     Tap,
     World,
@@ -23,7 +22,6 @@ pytestmark = pytest.mark.contract
 WORLDS = [("virtual messages", 1), ("virtual messages", 4), ("virtual segments", 4)]
 WORLDS += [("virtual datagrams", 1), (LOSSY, 4)]
 REAL = [("sockets", 1), ("sockets with keys", 4)]
-REAL += [(kind, window) for kind in WITH_MQTT for window in (1, 4)]
 WINDOWS = pytest.mark.parametrize(
     ("world", "window"),
     [*WORLDS, *(pytest.param(*each, marks=pytest.mark.system) for each in REAL)],

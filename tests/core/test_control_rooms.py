@@ -18,8 +18,7 @@ from helpers.wording import unnamed
 from dva_sim.core.assignments import Rules
 from dva_sim.core.audit import Fact
 from dva_sim.core.event_status import status_of
-from dva_sim.core.events import Event, State
-from dva_sim.core.handling import Choice, Handling
+from dva_sim.core.events import Choice, Event, Handling, State
 from dva_sim.core.questions import Questions
 from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m

@@ -1,5 +1,7 @@
 """The event table: reports become events, each in one state, its times in order."""
 
+import operator
+
 import pytest
 from helpers.dva.dispatch_office import (
     DETECTOR,
@@ -11,10 +13,21 @@ from helpers.dva.dispatch_office import (
     Office,
     east,
 )
+from helpers.paths import ROOT
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.event_status import status_of
-from dva_sim.core.events import KEPT_CLOSED, MOST_SOURCES, EventTable, State
+from dva_sim.core.events import (
+    KEPT_CLOSED,
+    LOOKING,
+    MOST_SOURCES,
+    TRANSITIONS,
+    Cause,
+    Event,
+    EventTable,
+    OrderEnd,
+    State,
+)
 from dva_sim.protocol import messages as m
 
 
@@ -203,22 +216,14 @@ def test_an_event_that_waits_again_has_not_been_departed_for(office):
     assert set(office.event().times) == {"detected", "assigned"}  # to the same again
 
 
-def test_a_step_that_does_not_exist_is_refused():
-    events = EventTable()
-    event = events.add("fire", HERE, 0.5, 0.0)
-    events.move(event, State.ESCALATED, 1.0)
-    with pytest.raises(ValueError, match="escalated to confirmed"):
-        events.move(event, State.CONFIRMED, 2.0)
-
-
 @pytest.mark.invariant("S6")
 def test_each_event_is_in_one_state_and_the_counts_add_up_to_all():
     events = EventTable()
     for number in range(6):
         events.add("fire", east(100 * number), 0.5, 0.0)
-    events.move(events.open[2], State.ASSIGNED, 1.0)
-    events.move(events.open[3], State.EXPIRED, 1.0)
-    events.move(events.open[4], State.CONFIRMED, 1.0)
+    events.move(events.open[2], Cause.ORDERED, 1.0)
+    events.move(events.open[3], Cause.WITHDRAWN, 1.0)
+    events.move(events.open[4], Cause.CONFIRMED, 1.0)
     assert {s.value: n for s, n in events.counts.items() if n} == {
         "pending": 3,
         "assigned": 1,
@@ -231,10 +236,127 @@ def test_each_event_is_in_one_state_and_the_counts_add_up_to_all():
 def test_the_last_1000_closed_events_are_kept():
     events = EventTable()
     for _ in range(KEPT_CLOSED + 1):
-        events.move(events.add("fire", HERE, 0.5, 0.0), State.ESCALATED, 1.0)
+        events.move(events.add("fire", HERE, 0.5, 0.0), Cause.WAITED, 1.0)
     assert events.get(1) is None
     assert events.get(2) is not None
     assert len(events.closed) == 1000
+
+
+# --- the transition table ------------------------------------------------------------------
+
+NAME = operator.attrgetter("name")
+PATHS: dict[State, tuple[Cause, ...]] = {
+    State.PENDING: (),
+    State.ASSIGNED: (Cause.ORDERED,),
+    State.ON_SCENE: (Cause.ORDERED, Cause.ARRIVED),
+    State.CONFIRMED: (Cause.ORDERED, Cause.ARRIVED, Cause.CONFIRMED),
+    State.CONTAINED: (Cause.CONFIRMED, Cause.CONTAINED),
+    State.REFUTED: (Cause.REFUTED,),
+    State.ESCALATED: (Cause.WAITED,),
+    State.EXPIRED: (Cause.WITHDRAWN,),
+}
+"""Causes that bring a new event into each state."""
+
+
+def event_in(state: State, contain: bool = True) -> tuple[Office, Event]:
+    """An office with one event, brought into a state by the table."""
+    office = Office(rules=Rules(containment=contain))
+    event = office.core.events.add("fire", HERE, 0.5, 0.0, contain)
+    for cause in PATHS[state]:
+        if cause is Cause.ORDERED:
+            office.core.orders.confirm(event, ROBOT, OPERATOR, 1.0)
+        else:
+            office.core.orders.transition(event, cause, 1.0)
+    assert event.state is state
+    return office, event
+
+
+@pytest.mark.invariant("S6", "S7")
+@pytest.mark.parametrize("state", State)
+@pytest.mark.parametrize("cause", Cause, ids=NAME)
+def test_each_cause_in_each_state_is_a_transition_of_the_table_or_refused(state, cause):
+    office, event = event_in(state)
+    events, transition = office.core.events, TRANSITIONS[cause]
+    before = repr(event), dict(events.counts), office.working
+    if state in transition.starts:
+        office.core.orders.transition(event, cause, 2.0)
+        assert event.state is transition.end
+        assert (event.number in events.open) is event.open
+        assert ("closed" in event.times) is not event.open
+        assert list(event.times.values()) == sorted(event.times.values())
+    else:
+        with pytest.raises(ValueError, match=f"event 1 is {state}: no transition for: {cause}"):
+            office.core.orders.transition(event, cause, 2.0)
+        assert (repr(event), events.counts, office.working) == before
+    assert sum(events.counts.values()) == events.counts[event.state] == 1
+
+
+@pytest.mark.parametrize("cause", Cause, ids=NAME)
+def test_without_containment_an_event_is_over_once_it_is_confirmed(cause):
+    office, event = event_in(State.CONFIRMED, contain=False)
+    with pytest.raises(ValueError, match="event 1 is confirmed"):
+        office.core.orders.transition(event, cause, 2.0)
+
+
+def test_every_state_is_reached_and_every_open_one_can_be_left():
+    assert set(TRANSITIONS) == set(Cause)
+    assert {row.end for row in TRANSITIONS.values()} == set(State)
+    open_states = {State.PENDING, *LOOKING, State.CONFIRMED}
+    assert {state for row in TRANSITIONS.values() for state in row.starts} == open_states
+
+
+@pytest.mark.parametrize("state", LOOKING)
+@pytest.mark.parametrize(
+    "cause", [cause for cause, row in TRANSITIONS.items() if {*LOOKING} <= {*row.starts}], ids=NAME
+)
+def test_the_order_to_look_ends_and_its_device_and_session_with_it_as_the_table_says(cause, state):
+    office, event = event_in(state)
+    office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"), 1.0)
+    sends = office.core.orders.transition(event, cause, 2.0)
+    end = TRANSITIONS[cause].order
+    assert (ROBOT in office.working) is (end is OrderEnd.LEFT)
+    recalled = [send.to for send in sends if isinstance(send.body, m.OrderProgress)]
+    assert recalled == [OPERATOR] * (end is OrderEnd.RECALLED)
+    holds = ROBOT in office.core.sessions.permissions.grants
+    assert holds is (end in (OrderEnd.LEFT, OrderEnd.FREED))
+
+
+@pytest.mark.parametrize("last", [False, True])
+@pytest.mark.parametrize(
+    "cause", [cause for cause, row in TRANSITIONS.items() if row.retries], ids=NAME
+)
+def test_an_order_that_failed_is_followed_by_another_unless_it_was_the_last(cause, last):
+    office, event = event_in(State.ASSIGNED)
+    event.attempts = office.core.orders.rules.max_attempts if last else 1
+    office.core.orders.transition(event, cause, 2.0)
+    assert event.state is (State.ESCALATED if last else State.PENDING)
+
+
+@pytest.mark.parametrize("cause", Cause, ids=NAME)
+def test_the_audit_log_has_an_entry_of_each_decision_of_a_rule(cause):
+    row = TRANSITIONS[cause]
+    office, event = event_in(row.starts[0])
+    office.core.orders.transition(event, cause, 2.0)
+    logged = [(fact.label, fact.cause) for fact in office.core.trail.take()]
+    assert logged == [("rule", row.log)] * bool(row.log)
+
+
+def test_the_page_about_runs_shows_the_table():
+    rows = [
+        (
+            cause.value,
+            ", ".join(row.starts),
+            row.end.value + ", or escalated if it was the last order" * row.retries,
+            row.order.value if set(LOOKING) & set(row.starts) else "",
+            row.log,
+        )
+        for cause, row in TRANSITIONS.items()
+    ]
+    table = "\n".join(
+        ["| --- | --- | --- | --- | --- |", *(f"| {' | '.join(row)} |" for row in rows)]
+    )
+    page = ROOT / "docs/explanation/how-a-run-works.md"
+    assert f"\n{table}\n\n" in page.read_text(), f"write the table into {page.name}:\n{table}"
 
 
 # --- findings ------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dva_sim.core.registration_limit import BURST, MOST_PEERS, RATE, RegistrationLimit
+from dva_sim.core.registry import BURST, MOST_PEERS, RATE, RegistrationLimit
 
 
 @pytest.mark.parametrize(

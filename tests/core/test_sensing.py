@@ -15,7 +15,8 @@ from helpers.wording import counted
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import State
-from dva_sim.core.sensing import IN_A_ROW, NO_NEWS, REACH, RENEW, Sensing, SensorAlarm
+from dva_sim.core.reports import NO_NEWS, REACH
+from dva_sim.core.sensing import IN_A_ROW, RENEW, Sensing, SensorAlarm
 from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode

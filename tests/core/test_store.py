@@ -70,7 +70,9 @@ def test_the_next_life_knows_events_devices_permissions_and_who_works_on_what(fi
     memory.close()
     before = snapshot(office.core)
     assert set(before["engaged"]) == {(OPERATOR, 1), (ROBOT, 1), (GUARD, 2)}
-    assert snapshot(next_life(office, file, 5.0)) == before
+    core = next_life(office, file, 5.0)
+    assert snapshot(core) == before
+    assert (core.events.changes(), core.registry.changes()) == ([], {})  # the file has all that
 
 
 @pytest.mark.parametrize("seed", range(20))

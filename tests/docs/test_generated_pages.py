@@ -28,7 +28,7 @@ from dva_sim.simulation.run_measures import PLUGINS as COVARIATES
 from dva_sim.simulation.scenario.assumptions import all_assumptions
 from dva_sim.testing.files import schema_text
 from dva_sim.testing.promises import TRIALS
-from dva_sim.worlds.drawn_features import KINDS
+from dva_sim.worlds.geojson import KINDS
 from dva_sim.worlds.site_parts import QUALITIES
 
 

@@ -138,7 +138,7 @@ def test_advice_that_an_environment_was_not_made_for_is_refused():
 
 def test_the_learnt_policy_lets_events_wait_less_than_min_eta_on_shifts_it_has_not_seen():
     env = made("min_eta", intensity=6.9)
-    learnt = load_policy("linear.py:Linear")
+    learnt = load_policy("docs/examples/linear.py:Linear")
     unseen = range(30_000, 30_004)
     ours, theirs = (
         [play(env, policy, seed)["return"] for seed in unseen]

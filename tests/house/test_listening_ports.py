@@ -45,7 +45,6 @@ LISTENERS = {
     "cli/link.py": "--publish, on loopback: passes bytes on to a program of the user",
     "console/pages/processes.py": "tries whether a port is free, and closes it",
     "console/robots/robot_station.py": "tries whether two ports are free, and closes them",
-    "network/carriers.py": "tries whether a port is free, and closes it",
     "network/emulator/crossing.py": "inside the emulated link, which nothing else reaches",
     "network/emulator/publishing.py": "serves the sockets of --publish",
     "network/emulator/relay.py": "on loopback, for a measurement; its peer is the other process",
@@ -55,7 +54,7 @@ LISTENERS = {
     "network/middleware/zenoh.py": "inside the emulated link of a measurement",
     "network/middleware/webrtc.py": "inside the emulated link of a measurement",
     "network/middleware/zeromq.py": "inside the emulated link of a measurement",
-    "network/mqtt_broker.py": "tries whether a port is free; mosquitto listens itself",
+    "network/middleware/mqtt.py": "tries whether a port is free; mosquitto listens itself",
     "network/security.py": "inproc: between threads of one process",
     "testing/transports.py": "tries whether a port is free, and closes it",
     "validation/network/real_side/programs.py": "on loopback, for a measurement",
@@ -291,7 +290,9 @@ def test_foreign_pages_foreign_names_and_clients_without_a_token_are_refused(por
 
 def listening_calls(source: str) -> set[str]:
     """Functions called, and modules imported, that make a listener."""
-    names = set()
+    names: set[str] = set()
+    if not any(name in source for name in IMPORTS | CALLS | OWN_CALLS):
+        return names  # none is named, so there is nothing to parse
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.ImportFrom | ast.Import):
             modules = [getattr(node, "module", None), *(alias.name for alias in node.names)]

@@ -23,6 +23,21 @@ class Outer(Config):
     items: tuple[Inner, ...] = ()
 
 
+class Pair(Config):
+    one: int
+    other: int
+    size: tuple[int, int] = (1, 1)
+
+
+def test_keys_that_are_missing_are_told_together():
+    with pytest.raises(ConfigError) as told:
+        validate(Pair, {})
+    assert told.value.problem == "missing keys 'one' and 'other'"
+    with pytest.raises(ConfigError) as told:
+        validate(Pair, {"one": 1, "other": 2, "size": [1]})
+    assert told.value.problem == "size: should have at least 2 items"
+
+
 def test_simultaneous_events_run_in_the_order_they_were_scheduled():
     clock, seen = Clock(), []
     clock.call_at(0.3, seen.append, "first")

@@ -9,9 +9,9 @@ from helpers.wording import unnamed
 from dva_sim.cli import call
 from dva_sim.kernel.errors import RunsFailed
 from dva_sim.live import process
-from dva_sim.live.options import LiveOptions
 from dva_sim.live.process import NobodyThere, run_part
 from dva_sim.network.realtime import LiveClock
+from dva_sim.options.runs import LiveOptions
 
 pytestmark = pytest.mark.system
 
@@ -54,7 +54,7 @@ def test_a_dva_that_serves_others_outlasts_the_scenario(
     monkeypatch.setattr(LiveClock, "run", lambda _, until=math.inf: asked.append(until))
     monkeypatch.setattr(process, "_refuse_to_be_alone", lambda *_: None)
     monkeypatch.setattr(process, "ending_when_asked", lambda *_: nullcontext(NotAsked()))
-    options = LiveOptions("drive-to-event", ("horizon_s=40",), **changes)
+    options = LiveOptions("drive-to-event", set=("horizon_s=40",), **changes)
     run_part(part, options, lambda _: None, supervised=supervised)
     assert asked[-2] == lasts
 

@@ -15,7 +15,7 @@ from helpers.processes.command_line import call
 from helpers.wording import unnamed
 
 import dva_sim
-from dva_sim.console.replay.console import ReplayOptions
+from dva_sim.console.replay.console import player_of
 from dva_sim.console.replay.player import playing
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import EventTable
@@ -336,7 +336,7 @@ def test_lines_that_were_left_are_read_like_a_recording_and_stay(tmp_path):
     ended = call("replay", str(keeper.path))
     assert (ended.returncode, unnamed(ended.stderr, "S1", "S7")) == (ExitCode.NOT_JUDGED, [])
     assert unnamed(ended.stdout, "mode Idle", "run.mcap.part", " 2 s ") == []
-    with playing(ReplayOptions(file=keeper.path).player()) as player:
+    with playing(player_of(keeper.path, None)) as player:
         assert player.run is not None
         assert player.run.name == "run.mcap.part"
     assert [path.name for path in tmp_path.iterdir()] == ["run.mcap.part"]

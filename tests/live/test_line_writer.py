@@ -4,8 +4,8 @@ import threading
 
 from helpers.processes.patience import PATIENCE_S
 
-from dva_sim.live import line_writer
-from dva_sim.live.line_writer import LineWriter
+from dva_sim.live import ros_robot
+from dva_sim.live.ros_robot import LineWriter
 
 
 def test_lines_are_said_in_their_order():
@@ -18,10 +18,10 @@ def test_lines_are_said_in_their_order():
 
 
 def test_an_output_that_nobody_reads_stops_nobody(monkeypatch):
-    monkeypatch.setattr(line_writer, "LAST_LINES", 0.01)
+    monkeypatch.setattr(ros_robot, "LAST_LINES", 0.01)
     goes_on = threading.Event()
     lines = LineWriter(lambda _: goes_on.wait(PATIENCE_S))
-    for number in range(2 * line_writer.MOST_WAITING):
+    for number in range(2 * ros_robot.MOST_WAITING):
         lines(str(number))
     lines.close()
     goes_on.set()

@@ -50,7 +50,7 @@ def test_a_mistake_ends_in_one_line_before_anything_is_started(
         folder.mkdir(exist_ok=True)
         (folder / name).write_text("of an earlier run")
     (tmp_path / "full.mcap.part").symlink_to("/dev/full")
-    monkeypatch.setattr(supervisor.subprocess, "Popen", lambda *_, **__: pytest.fail("started"))
+    monkeypatch.setattr(supervisor, "Child", lambda *_, **__: pytest.fail("started"))
     ended = call("live", "drive-to-event", "--for", "60", *words, cwd=tmp_path)
     assert ended.returncode == 2
     (line,) = ended.stderr.splitlines()

@@ -11,8 +11,9 @@ from helpers.processes.programs import wait_until
 from helpers.wording import unnamed
 
 from dva_sim.cli.program import call
-from dva_sim.live.options import LiveOptions, changes_by_link
+from dva_sim.live.options import check, scenario_of
 from dva_sim.network.link import LinkConfig
+from dva_sim.options.runs import LiveOptions
 from dva_sim.simulation.scenario import contradictions
 
 SCRIPTED = ("live", "drive-to-event", "--operators", "scripted")
@@ -51,12 +52,12 @@ def test_the_link_becomes_that_of_the_scenario(tmp_path):
         ([str(file)], 0.2, LinkConfig().rate_bps, 0.1),
         (["delay_s=0.4", str(file)], 0.4, LinkConfig().rate_bps, 0.1),
     ):
-        options = LiveOptions("drive-to-event", (*own, *changes_by_link(given)), emulated=True)
-        link = options.check().link
+        options = LiveOptions("drive-to-event", set=own, link=tuple(given))
+        link = check(options).link
         assert (link.delay_s, link.rate_bps, link.toward("up").loss) == (delay, rate, loss)
     law = '{"law": "gamma", "sd_s": 0.05}'
     assert json.loads(law) == link.model_dump(exclude_defaults=True)["delay_law"]
-    assert not any("modelled" in entry for entry in contradictions(options.read()))
+    assert not any("modelled" in entry for entry in contradictions(scenario_of(options)))
 
 
 @pytest.mark.parametrize(

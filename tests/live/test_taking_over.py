@@ -2,14 +2,12 @@
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from helpers.network.scripted_session import OPERATOR, PATIENT, ROBOT, _quick_network
 from helpers.network.scripted_session import Scene as AnyScene
-from helpers.network.transports import WITH_MQTT, MqttWorld
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.operator.scripted import Ask, Pause, Script, ScriptedOperator
@@ -17,7 +15,6 @@ from dva_sim.core.events import State
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.keys import KeyRing, create_keys
 from dva_sim.network.messaging import Transport
-from dva_sim.network.mqtt import MqttNetwork
 from dva_sim.network.real_network import RealNetwork
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
@@ -32,14 +29,10 @@ ROOM = id_of("control-room", 1)
 SHOWS_SMOKE = {"robot.sensors": [{"name": "smoke", "low": 0.5}], "dva.sensors": ["smoke"]}
 
 
-@pytest.fixture(params=["virtual", "sockets", "sockets with keys", *WITH_MQTT])
+@pytest.fixture(params=["virtual", "sockets", "sockets with keys"])
 def network(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Transport]:
     if request.param == "virtual":
         yield _quick_network()
-        return
-    if request.param == "mqtt":
-        with closing(MqttWorld(nodes=())) as world:
-            yield world.network
         return
     ring = None
     if request.param == "sockets with keys":
@@ -204,7 +197,7 @@ def test_nobody_plays_the_supervisor_where_the_sender_is_told(network):
     impostor.outbox.source = SUPERVISOR
     impostor.ask(DVA, request("force").body, second.append)
     scene.until(lambda: second)
-    reported = isinstance(network, MqttNetwork) or bool(getattr(network, "_ring", None))
+    reported = bool(getattr(network, "_ring", None))
     assert second[0].code == (m.NOT_PERMITTED if reported else m.BUSY)
     assert (ROBOT in scene.dva.core.sessions.reserved) is not reported
 

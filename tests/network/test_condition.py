@@ -44,6 +44,8 @@ def test_every_setting_changes_the_hash():
 def test_a_label_says_what_is_unusual_and_no_more():
     assert ASKING.label == "req10_d100_j0_l5_r64_p5_T2500"
     assert PUBLISHING.label == "pub50_d0_j0_l0_r0_p5_conflateboth_hwm1_sndbuf4096_q20"
+    overtaken = Condition("pub", 10, jitter_frac=0.5, reorder=True, cc="reno", wait_hs=False)
+    assert overtaken.label == "pub10_d0_j50_l0_r0_p5_reorder_reno_nowait"
 
 
 def test_only_a_publisher_waits_for_a_subscription_after_its_handshake():

@@ -3,6 +3,7 @@
 import os
 import shutil
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -48,6 +49,22 @@ def test_keys_survive_writing_and_reading(folder):
 def test_the_files_are_certificates_as_others_read_them(folder):
     assert zmq.auth.load_certificate(folder / SECRET) == KeyRing(folder).pair(ROBOT)
     assert zmq.auth.load_certificate(folder / PUBLIC) == (KeyRing(folder).public(ROBOT), None)
+
+
+@pytest.fixture
+def usual_umask() -> Iterator[None]:
+    before = os.umask(0o022)
+    yield
+    os.umask(before)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="file modes of POSIX")
+def test_public_keys_are_for_all_to_read_and_for_nobody_to_run(usual_umask, tmp_path):
+    create_keys(tmp_path, [ROBOT])
+    assert mode(tmp_path / PUBLIC) == 0o644
+    (tmp_path / PUBLIC).unlink()
+    create_keys(tmp_path, [ROBOT])
+    assert mode(tmp_path / PUBLIC) == 0o644
 
 
 @pytest.mark.skipif(os.name != "posix", reason="file modes of POSIX")

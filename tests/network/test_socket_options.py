@@ -7,10 +7,11 @@ import zmq
 from helpers.processes.patience import PATIENCE_S
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.live.options import LiveOptions
+from dva_sim.live.options import scenario_of
 from dva_sim.network.connections import ZeromqConfig
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
+from dva_sim.options.runs import LiveOptions
 
 PICTURE, COUNT = b"x" * 60_000, 200
 SMALL = ZeromqConfig(high_water_mark=2, send_buffer_bytes=4096, receive_buffer_bytes=4096)
@@ -73,9 +74,23 @@ def test_every_socket_has_what_is_asked_for(network, wanted):
         assert found == wanted
 
 
+@pytest.mark.parametrize("network", [None], indirect=True)
+def test_a_peer_without_power_is_given_up_after_half_a_minute(network):
+    """The kernel probes after a silence, and then so often, before it ends a connection."""
+    for kind in (zmq.REQ, zmq.DEALER, zmq.SUB):
+        socket = network.client(kind, "phone", "robot")
+        silence, pause, probes = (
+            socket.getsockopt(option)
+            for option in (zmq.TCP_KEEPALIVE_IDLE, zmq.TCP_KEEPALIVE_INTVL, zmq.TCP_KEEPALIVE_CNT)
+        )
+        assert socket.getsockopt(zmq.TCP_KEEPALIVE) == 1
+        assert silence + pause * probes == 32
+        assert socket.getsockopt(zmq.TCP_MAXRT) == 30_000
+
+
 def refusal(*changes: str) -> str:
     with pytest.raises(ConfigError) as error:
-        LiveOptions("drive-to-event", changes).read()
+        scenario_of(LiveOptions("drive-to-event", set=changes))
     return str(error.value)
 
 
@@ -86,5 +101,5 @@ def test_a_live_run_refuses_what_only_virtual_time_has():
 
 def test_a_live_run_takes_marks_and_buffers():
     changes = ("zeromq.high_water_mark=2", "zeromq.send_buffer_bytes=4096")
-    zeromq = LiveOptions("drive-to-event", changes).read().zeromq
+    zeromq = scenario_of(LiveOptions("drive-to-event", set=changes)).zeromq
     assert (zeromq.high_water_mark, zeromq.send_buffer_bytes) == (2, 4096)

@@ -57,6 +57,32 @@ def test_the_period_under_request_reply_is_round_trip_plus_service(depth, delay,
     assert periods == pytest.approx([2 * delay + service] * len(periods), abs=0.003)
 
 
+@pytest.mark.parametrize(
+    ("conflate", "heard"), [("none", [1, 2, 3, 9]), ("subscriber", [3, 9]), ("both", [3, 9])]
+)
+def test_a_conflating_subscriber_is_handed_the_newest_of_what_comes_in_one_piece(conflate, heard):
+    """ZeroMQ decodes all that TCP delivers at once before the program wakes up."""
+    net = network("message", {"conflate": conflate}, delay_s=0.05, rate_bps=1e12)
+    found: list[int] = []
+    net.subscribe("robot", "phone", "r|", found.append)
+    for number in (1, 2, 3):
+        net.clock.call_at(1.0, net.publish, "phone", "r|", number, 400)
+    net.clock.call_at(2.0, net.publish, "phone", "r|", 9, 400)
+    net.clock.run(3.0)
+    assert found == heard
+
+
+def test_a_conflating_subscriber_that_left_meanwhile_is_handed_nothing():
+    net, found = network("message", {"conflate": "subscriber"}, delay_s=0.05), list[int]()
+    heard = net.subscribe("robot", "phone", "r|", found.append)
+    net.clock.call_at(1.0, net.publish, "phone", "r|", 1, 400)
+    while heard._newest is None:
+        net.clock.step()
+    heard.close()
+    net.clock.run(2.0)
+    assert found == []
+
+
 @DEPTHS
 def test_plain_publishing_to_a_slow_robot_queues_without_bound_and_latest_wins_does_not(depth):
     """10 commands a second, 0.5 s each: after 10 s a stop comes 40 s late."""
@@ -226,3 +252,37 @@ def test_a_requester_forgets_the_deadlines_of_what_was_answered():
     net.clock.run(5.0)
     assert len(answered) > 900
     assert len(requester._deadlines) < 100
+
+
+# --- what is held up on the way -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("of", ["request", "subscription"])
+@pytest.mark.parametrize(
+    ("between", "arrives"),
+    [("nothing", True), ("it is closed", False), ("the connection is another", False)],
+)
+def test_what_interference_releases_late_is_dropped_with_its_connection(of, between, arrives):
+    net, got, held = network("message", delay_s=0.05), list[bytes](), list[Any]()
+
+    def interfere(_: str, receiver: str, data: Any, take: Any) -> None:
+        held.append((data, take)) if receiver == "phone" else take(data)
+
+    net.interference = interfere
+    if of == "request":
+        Robot(net, 0.0)
+        client: Any = Requester(net, "phone", "robot", timeout=60.0)
+        client.request(b"go", got.append)
+    else:
+        client = net.subscribe("phone", "robot", "r|", got.append)
+        net.clock.call_at(1.0, net.publish, "robot", "r|", b"go", 100)
+    net.clock.run(2.0)
+    [(data, take)] = held
+    if between == "it is closed":
+        client.close()
+    elif between == "the connection is another":
+        net.leave("robot")
+        net.come_back("robot")
+        net.clock.run(4.0)
+    take(data)
+    assert bool(got) is arrives

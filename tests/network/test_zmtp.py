@@ -8,7 +8,7 @@ from helpers.network.links import links
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.tcp import TcpOptions
-from dva_sim.network.zmtp import BATCH, Pipe, ReceivePipe, ZmtpConnection, ZmtpOptions, framed
+from dva_sim.network.zmtp import BATCH, Pipe, ZmtpConnection, ZmtpOptions, framed
 
 SMALL_BUFFER = TcpOptions(send_buffer=4096)
 
@@ -142,18 +142,25 @@ def test_a_receiver_that_pauses_gets_everything_later_in_order():
 def test_a_receiver_that_takes_nothing_fills_its_pipe_the_window_and_the_senders_pipe():
     small = TcpOptions(send_buffer=4096, receive_buffer=4096)
     pair = Pair(ZmtpOptions(mark=10, tcp=small), ZmtpOptions(tcp=small), delay_s=0.01)
-    pipe = ReceivePipe[int](10)
-    pipe.flow = pair.connection.peer
-    pair.connection.peer._deliver = pipe.put
+    waiting: list[object] = []
+
+    def deliver(message: object) -> None:
+        waiting.append(message)
+        if len(waiting) == 10:
+            pair.connection.peer.pause()
+
+    pair.connection.peer._deliver = deliver
     pair.open()
     for number in range(400):
         pair.clock.call_at(5.0 + 0.01 * number, pair.send, number)
     pair.clock.run(20.0)
-    assert len(pipe) == 10
+    assert len(waiting) == 10
     assert pair.send("one more") == [False]
     taken = []
-    while (message := pipe.take()) is not None:
-        taken.append(message)
+    while waiting:
+        taken.append(waiting.pop(0))
+        if len(waiting) == 5:
+            pair.connection.peer.resume()
         pair.run_for(0.2)
     assert taken[:40] == list(range(40))
     assert len(taken) < 120
@@ -208,6 +215,22 @@ def test_who_is_left_hears_of_it_half_a_round_trip_later():
     assert ended == [pytest.approx(5.1, abs=1e-3)]
 
 
+def test_who_pauses_hears_of_the_end_when_it_goes_on():
+    pair = Pair(delay_s=0.1)
+    pair.open()
+    ended: list[float] = []
+    peer = pair.connection.peer
+    peer.on_end = lambda: ended.append(pair.clock.now)
+    peer.pause()
+    pair.send("last")
+    pair.run_for(1.0)
+    pair.connection.close()
+    pair.run_for(5.0)
+    assert (pair.at_peer, ended) == ([], [])
+    peer.resume()
+    assert (pair.at_peer, ended) == (["last"], [pair.clock.now])
+
+
 def test_nothing_is_delivered_after_a_connection_broke():
     pair = Pair(delay_s=0.1)
     pair.open()
@@ -260,26 +283,3 @@ def test_what_conflates_keeps_the_newest_and_is_never_full():
     pipe = Pipe[int](1, conflate=True)
     assert all(pipe.put(number) for number in range(5))
     assert (len(pipe), pipe.superseded, pipe.take(), pipe.take()) == (1, 4, 4, None)
-
-
-class Flow:
-    def __init__(self) -> None:
-        self.calls: list[str] = []
-
-    def pause(self) -> None:
-        self.calls.append("pause")
-
-    def resume(self) -> None:
-        self.calls.append("resume")
-
-
-def test_a_full_receiver_lets_its_connection_wait_until_half_is_read():
-    pipe, flow = ReceivePipe[int](4), Flow()
-    pipe.flow = flow
-    for number in range(4):
-        pipe.put(number)
-    assert flow.calls == ["pause"]
-    pipe.take()
-    assert flow.calls == ["pause"]
-    pipe.take()
-    assert flow.calls == ["pause", "resume"]

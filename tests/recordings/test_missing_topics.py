@@ -80,7 +80,7 @@ SUBSETS = [(), *((topic,) for topic in NEEDED_BY), ("/observed/heard", "/tf"), t
 def test_a_rule_is_judged_where_all_its_topics_are_there(
     whole: Path, tmp_path: Path, counts: bool
 ) -> None:
-    for topics in SUBSETS:
+    for topics in SUBSETS if counts else SUBSETS[::4]:
         opened = read_recording(filtered(whole, tmp_path / "part.mcap", topics, counts))
         found = {verdict.rule: verdict for verdict in judged_recording(opened)}
         lacking = {rule for topic in topics for rule in NEEDED_BY[topic]} if counts else {*ALL}

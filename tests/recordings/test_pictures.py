@@ -1,7 +1,6 @@
 import math
 import sys
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +13,7 @@ from PIL import Image, ImageColor
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import TrackPoint
+from dva_sim.options.runs import PictureOptions
 from dva_sim.recordings.pictures import Wanted, colours, style
 from dva_sim.recordings.pictures.bodies import DrawnBody
 from dva_sim.recordings.pictures.film import Film
@@ -22,7 +22,7 @@ from dva_sim.recordings.pictures.moments import Moments
 from dva_sim.recordings.pictures.name_labels import Box, Names
 from dva_sim.recordings.pictures.run_endings import verdicts
 from dva_sim.recordings.pictures.scene import Scene
-from dva_sim.recordings.pictures.stills import best_time, even_times, still, strip
+from dva_sim.recordings.pictures.stills import still, time_of_still
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import Ending, simulate
 
@@ -354,30 +354,22 @@ def test_the_picture_a_camera_takes_changes_as_the_robot_moves(drive):
         moments.eye("robot-9", 1.0)
 
 
-# --- stills and strips ---------------------------------------------------------------------
+# --- stills -------------------------------------------------------------------------------
 
 
-def test_a_strip_has_a_panel_for_each_moment_with_its_clock(drive):
-    figure = strip([drive], even_times([drive], 3))
-    clocks = [ax.get_title(loc="right") for ax in figure.axes]
-    assert clocks == ["10.0 s", "20.0 s", "30.0 s"]
+def test_a_still_has_its_clock_and_a_key(drive):
+    figure = still([drive], 10.0)
+    assert [ax.get_title(loc="right") for ax in figure.axes] == ["10.0 s"]
     assert len(figure.legends) == 1
-
-
-def test_a_strip_of_two_runs_has_a_column_for_each(race):
-    figure = strip(race, even_times(race, 2))
-    clocks = [ax.get_title(loc="right") for ax in figure.axes]
-    assert clocks == ["10.0 s", "10.0 s", "20.0 s", "12.0 s"]
-    assert len({ax.get_position().x0 for ax in figure.axes}) == 2
 
 
 def test_a_still_of_two_runs_shows_the_moment_when_the_first_one_is_done(race):
     late, early = (replace(run, endings=[]) for run in race)
-    assert best_time([late, early]) == 20.0  # nobody is
+    assert time_of_still([late, early], None) == 20.0  # nobody is
     late.endings, early.endings = [Ending("confirmed", 19.5)], [Ending("confirmed", 11.25)]
-    assert best_time([late, early]) == 11.25
-    assert best_time([late]) == 20.0
-    figure = still([late, early], best_time([late, early]))
+    assert time_of_still([late, early], None) == 11.25
+    assert time_of_still([late], None) == 20.0
+    figure = still([late, early], time_of_still([late, early], None))
     reports = [
         line.get_text() for ax in figure.axes for line in scene_lines(ax) if line.get_visible()
     ]
@@ -387,16 +379,12 @@ def test_a_still_of_two_runs_shows_the_moment_when_the_first_one_is_done(race):
 
 
 def test_everything_wanted_is_written_and_named(drive, tmp_path):
-    wanted = Wanted(
-        still=tmp_path / "eye.png", strip=tmp_path / "strip.pdf", at="20", camera="robot-1"
-    )
-    assert list(wanted.write([drive])) == [
-        f"Still: {tmp_path / 'eye.png'}",
-        f"Strip: {tmp_path / 'strip.pdf'}",
-    ]
+    wanted = Wanted(still=tmp_path / "eye.png", at=20.0, camera="robot-1")
+    assert list(wanted.write([drive])) == [f"Still: {tmp_path / 'eye.png'}"]
     with Image.open(tmp_path / "eye.png") as eye:
         assert eye.size == (640, 480)
-    assert (tmp_path / "strip.pdf").read_bytes().startswith(b"%PDF")
+    list(Wanted(still=tmp_path / "still.pdf").write([drive]))
+    assert (tmp_path / "still.pdf").read_bytes().startswith(b"%PDF")
 
 
 @pytest.mark.parametrize(
@@ -405,39 +393,37 @@ def test_everything_wanted_is_written_and_named(drive, tmp_path):
         ({"video": "film.avi"}, "'film.avi' should end in .gif or .mp4"),
         ({"still": "a.gif"}, ".png, .pdf or .svg"),
         ({"still": "a.pdf", "camera": "robot-1"}, ".png or .jpg"),
-        ({"strip": "no/a.png"}, "folder 'no' for the strip"),
+        ({"still": "no/a.png"}, "folder 'no' for the still"),
         ({"camera": "robot-1"}, "--camera needs --still"),
         ({"inset": True}, "--inset needs --video"),
-        ({"at": "3"}, "--at needs --still or --strip"),
+        ({"at": 3.0}, "--at needs --still"),
         ({"still": "a.png", "at": "soon"}, "--at 'soon' should be seconds"),
-        ({"still": "a.png", "at": "1,2"}, "--still shows one moment"),
-        ({"strip": "a.png", "panels": 0}, "--panels 0 should be from 1 to 24"),
+        ({"still": "a.png", "at": "1,2"}, "--at '1,2' should be seconds"),
     ],
 )
 def test_what_cannot_be_drawn_is_said_before_the_run(options, expected):
-    paths = {key: Path(options[key]) for key in ("video", "still", "strip") if key in options}
-    with pytest.raises(ConfigError, match=expected.replace("[", r"\[")):
-        Wanted(**(options | paths))
+    with pytest.raises(ConfigError, match=expected):
+        Wanted.of(PictureOptions(**options))
 
 
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
         ({"camera": "robot-9"}, "'robot-9' is unknown; known: robot-1, robot-2"),
-        ({"at": "121"}, "--at 121 .* 120 s"),
-        ({"at": "-1"}, "--at -1 is not"),
-        ({"at": "nan"}, "--at nan is not"),
+        ({"at": 121.0}, "--at 121 .* 120 s"),
+        ({"at": -1.0}, "--at -1 is not"),
+        ({"at": math.nan}, "--at nan is not"),
     ],
 )
 def test_what_no_run_of_a_scenario_has_is_said_before_the_run(options, expected, tmp_path):
     drill = scenarios.build(scenarios.load("fire-drill"), {"horizon_s": 120, "robot.count": 2})
-    Wanted(still=tmp_path / "a.png", at="120", camera="robot-2").check(drill)
+    Wanted(still=tmp_path / "a.png", at=120.0, camera="robot-2").check(drill)
     with pytest.raises(ConfigError, match=expected):
         Wanted(still=tmp_path / "a.png", **options).check(drill)
 
 
 def test_a_moment_after_the_end_is_refused(drive, tmp_path):
-    wanted = Wanted(still=tmp_path / "a.png", at="99")
+    wanted = Wanted(still=tmp_path / "a.png", at=99.0)
     with pytest.raises(ConfigError, match=r"--at 99 .*30 s"):
         list(wanted.write([drive]))
 
@@ -462,9 +448,7 @@ def test_what_is_told_below_a_map_is_no_wider_than_the_map(race):
         for moment in (5.0, 20.0):
             figure = still([run, other], moment)
             lines = [t for ax in figure.axes[:2] for t in scene_lines(ax) if t.get_visible()]
-            shown = strip([run, other], [moment]).axes[:2]
-            lines += [t for ax in shown for t in scene_lines(ax) if t.get_visible()]
-            assert len(lines) == 4
+            assert len(lines) == 2
             for box in boxes_of(lines, figure.axes[0]):
                 assert box.x1 - box.x0 < figure.axes[0].bbox.width * 1.02
     finally:

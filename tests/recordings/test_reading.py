@@ -14,7 +14,7 @@ from dva_sim import __version__
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.recordings import writing
 from dva_sim.recordings.pictures.stills import still
-from dva_sim.recordings.reading import read_lapse, read_recording
+from dva_sim.recordings.reading import read_recording
 from dva_sim.recordings.writing import write_recording
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import simulate
@@ -204,17 +204,6 @@ def test_a_picture_from_the_file_is_the_picture_from_the_run(opened, tmp_path):
 def pixels(path):
     with Image.open(path) as picture:
         return np.asarray(picture, float)
-
-
-def test_a_figure_gets_its_columns(folder):
-    lapse = read_lapse(folder / "evacuation.mcap")
-    columns = lapse.tracks
-    assert list(columns) == ["agent", "t_s", "x_m", "y_m", "heading_rad", "mode"]
-    assert {"robot-1", "guard-1", "bystander-1"} <= set(columns["agent"])
-    assert len({len(column) for column in columns.values()}) == 1
-    assert "fire breaks out" in lapse.story["what"]
-    assert lapse.incidents[0].kind == "fire"
-    assert lapse.site.name == evacuation().site.name
 
 
 # --- damage ----------------------------------------------------------------------------------

@@ -7,7 +7,8 @@ from helpers.wording import unnamed
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import available
-from dva_sim.live.ros_robot import RosRobotOptions, run_ros_robot
+from dva_sim.live.ros_robot import run_ros_robot
+from dva_sim.options.runs import RobotOptions
 from dva_sim.ros.profile import DEFAULT, FOLDER, load_ros_profile
 from dva_sim.ros.websocket import PORT, WebSocketUrl
 
@@ -63,7 +64,7 @@ def test_a_profile_that_makes_no_sense_is_refused_with_file_and_key(tmp_path, ch
 def test_a_call_that_makes_no_sense_is_refused_before_anything_is_opened(given, named):
     words = {"ros": "ws://127.0.0.1:9090", "dva": "127.0.0.1:5600"} | given
     with pytest.raises(ConfigError) as refused:
-        run_ros_robot(RosRobotOptions(**words), print)
+        run_ros_robot(RobotOptions(**words), print)
     assert unnamed(refused.value, named) == []
 
 

@@ -1,6 +1,8 @@
 """Eviction of connections: those without a token first, higher roles last."""
 
-from dva_sim.serving.port_connections import IDLE, SILENT, PortConnections
+import pytest
+
+from dva_sim.serving.port_connections import IDLE, NEWCOMERS, SILENT, PortConnections
 
 NOBODY, LOOK, DRIVE, SUPERVISE = 0, 1, 3, 5  # ranks
 
@@ -21,6 +23,36 @@ def test_when_all_places_are_taken_the_oldest_silent_connection_makes_room():
     entered(places, 4.0, cut, "newcomer")
     assert cut == ["at 1.0"]
     assert len(places.taken) == 3
+
+
+def test_when_all_places_are_taken_each_newcomer_has_its_turn_before_it_makes_room():
+    places, cut = PortConnections(most=50, most_served=40), []
+    for n in range(50):
+        assert places.wait(0.0) == 0.0
+        entered(places, 0.0, cut, n)
+    assert places.wait(0.0) == 50 / NEWCOMERS
+    assert places.wait(0.04) == pytest.approx(50 / NEWCOMERS - 0.04)
+    assert places.wait(50 / NEWCOMERS) == 0.0
+    entered(places, 50 / NEWCOMERS, cut, "newcomer")
+    assert cut == [0]
+
+
+def test_requests_without_a_token_keep_no_place_from_a_newcomer():
+    places, cut = PortConnections(most=2, most_served=1), []
+    stubborn = entered(places, 0.0, cut, "stubborn")
+    entered(places, 0.5, cut, "silent")
+    stubborn.begin(NOBODY, 0.9)
+    assert places.wait(1.0) == 0.0
+    entered(places, 1.0, cut, "newcomer")
+    assert cut == ["stubborn"]
+
+
+def test_an_idle_page_makes_room_at_once():
+    places, cut = PortConnections(most=1, most_served=0), []
+    page = entered(places, 0.0, cut, "page")
+    page.begin(LOOK, 0.0)
+    page.end(0.0)
+    assert places.wait(0.0) == 0.0
 
 
 def test_connections_in_the_middle_of_a_handshake_do_not_outlive_a_newcomer():

@@ -7,7 +7,6 @@ from dva_sim.kernel.config import titled_keys
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import listing, number, percent
 from dva_sim.simulation.labels import (
-    absent_at_zero,
     brief,
     factor_name,
     level_name,
@@ -108,8 +107,6 @@ def test_a_key_is_called_as_its_field_says():
     assert factor_name("link.up.delay_s") == "delay of commands"
     assert stated_conditions(["full"])["link.jitter_s"] == "jitter (half-width)"
     assert "link.up" not in stated_conditions(["task"])
-    assert absent_at_zero("link.delay_s") == "delay"
-    assert absent_at_zero("link.rate_bps") == ""
 
 
 def test_a_measure_is_called_as_its_column_says():

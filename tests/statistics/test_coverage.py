@@ -8,7 +8,6 @@ from dva_sim.statistics import (
     adjusted,
     band,
     effect_size,
-    factorial_effects,
     mean_interval,
     quantile_interval,
     share_interval,
@@ -265,15 +264,3 @@ def test_an_interval_of_a_quantile_holds_in_93_to_98_of_100_studies(q, icc, true
     runs = clustered(normal, icc, STUDIES, np.random.default_rng(2018)).reshape(STUDIES, -1)
     held = np.mean([holds(quantile_interval(own, WHO, q), true) for own in runs])
     assert 0.93 <= held <= 0.98
-
-
-@pytest.mark.soak
-def test_nothing_is_found_in_a_factorial_without_effects_in_3_to_7_of_100_skewed_studies():
-    rng = np.random.default_rng(2019)
-    one, two = (np.repeat(x, PERSONS) for x in (list("aaabbb"), [0, 1, 2, 0, 1, 2]))
-    person = np.tile(np.arange(PERSONS), 6)
-    alarms = 0
-    for values in skewed((2000, 6 * PERSONS), rng):
-        found = factorial_effects({"x": one, "y": two}, values, person, resamples=1000)
-        alarms += any(effect.is_found for effect in found)
-    assert 0.03 <= alarms / 2000 <= 0.07

@@ -15,11 +15,9 @@ from dva_sim.protocol.codec import encode
 from dva_sim.simulation.full.observations import Right
 from dva_sim.simulation.full.stage import DVA
 from dva_sim.simulation.full.takeovers import Takeovers
-from dva_sim.storms.answers import ANSWERED_WITHIN, AnswerWatch
-from dva_sim.storms.bounds import MOST, oversized
+from dva_sim.storms.checkers import ANSWERED_WITHIN, MOST, AnswerWatch, RefusedDrivers, oversized
 from dva_sim.storms.interference import PassingMessage
 from dva_sim.storms.plan import StormPlan
-from dva_sim.storms.refused_drivers import RefusedDrivers
 from dva_sim.storms.storm import Storm, play
 
 ROBOT, DRIVER, OTHER = "02:00:00:01:00:01", "02:00:00:03:00:01", "02:00:00:03:00:02"

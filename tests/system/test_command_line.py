@@ -92,8 +92,14 @@ def test_the_list_of_all_is_made_without_what_simulates_and_analyses():
     )
     loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     rooms = {".".join(name.split(".")[:3]) for name in loaded.stdout.split()}
-    assert "dva_sim.worlds.hazards" in rooms
-    heavy = {"simulation.full", "simulation.models", "experiments.analysis", "protocol.messages"}
+    assert "dva_sim.cli.names" in rooms
+    heavy = {
+        "worlds.hazards",
+        "simulation.full",
+        "simulation.models",
+        "experiments.analysis",
+        "protocol.messages",
+    }
     assert rooms & {f"dva_sim.{name}" for name in heavy} == set()
 
 
@@ -184,4 +190,6 @@ def test_a_map_and_a_cellular_trace_of_ones_own_carry_a_whole_study(tmp_path):
     settings = (f"site.map={MAPS / 'hall.yaml'}", "factors.link.delay_s=[0]", "horizon_s=12", *ways)
     ended = run(tmp_path, "1", *(word for s in settings for word in ("--set", s)))
     assert ended.returncode == 0, ended.stderr + ended.stdout
-    assert b"Ways taken" in bytes_of(tmp_path / "1")["report.html"]
+    written = bytes_of(tmp_path / "1")
+    assert {"runs.parquet", "tracks.parquet"} <= set(written)
+    assert b"hall.yaml" in written["report.html"]

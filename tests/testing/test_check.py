@@ -78,7 +78,7 @@ def test_all_that_is_shipped_is_valid(check, most, monkeypatch):
     agents |= {"robot of ROS"}
     agents |= {"bands of operators", "tuned values"}
     runs = {"study", "scenario", "timed scenario", "validation cases", "targets", "split", "task"}
-    runs |= {"transports", "middleware", "measurements", "own scenario"}
+    runs |= {"transports", "middleware", "measurements"}
     assert kinds == {"site", "plan", "message"} | runs | agents
 
 

@@ -9,7 +9,9 @@ from dva_sim.agents.tilt.filters import MovingMedian
 from dva_sim.cli import checks
 from dva_sim.core.dispatch import MinEta
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.testing.docstring_words import from_docstrings
 from dva_sim.testing.promises import TRIALS, plural
+from dva_sim.testing.shipped_words import shipped_words
 
 
 class Greedy(MinEta):
@@ -31,6 +33,11 @@ def test_every_kind_has_plugins_and_a_function_that_tries_it(kind):
     assert trial.group == plugins.group
     assert trial.words().keys() == plugins.shipped.keys() - plugins.hidden
     assert "2 " in trial.ways(testing.Outcome((), (), 2, 0.001))
+
+
+def test_the_words_of_shipped_plugins_are_their_docstrings():
+    """`python -m dva_sim.testing.docstring_words` writes them again."""
+    assert shipped_words() == from_docstrings()
 
 
 SHIPPED = {

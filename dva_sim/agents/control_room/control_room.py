@@ -116,10 +116,12 @@ class ControlRoomAgent:
 
     def _note(self, status: m.EventStatus) -> None:
         """Note the state of an event; replies may overtake publications."""
-        number, known = status.event_id, self.events.get(status.event_id)
+        number = status.event_id
+        known = self.events.get(status.event_id)
         if known is not None and (status.age, status.decisions) < (known.age, known.decisions):
             return
-        self.events[number], self.received_at[number] = status, self.device.clock.now
+        self.events[number] = status
+        self.received_at[number] = self.device.clock.now
         self._forget_the_oldest()
         self.on_event(status)
 
@@ -141,7 +143,8 @@ class ControlRoomAgent:
 
     def _on_request(self, message: m.Message) -> m.Reply:
         """Answer a request of the DVA to a holder of robots: it has asked for nothing."""
-        body, answer = message.body, m.Reply(message.message_id, m.OK, "")
+        body = message.body
+        answer = m.Reply(message.message_id, m.OK, "")
         if message.source != self.device.dva:
             text = "only the DVA says such things"
             return m.Reply(message.message_id, m.NOT_PERMITTED, text)

@@ -51,7 +51,8 @@ class ScriptedDispatcher:
         profile: DispatcherProfile,
         streams: Callable[[str], np.random.Generator],
     ) -> None:
-        self.room, self.profile = room, profile
+        self.room = room
+        self.profile = profile
         self._streams = streams
         self._known: dict[int, Turned] = {}
         self._waiting: deque[int] = deque()
@@ -84,7 +85,8 @@ class ScriptedDispatcher:
 
     def _done(self) -> None:
         """Turn to the next; to the same again if something has come up meanwhile."""
-        number, self._busy = self._busy, None
+        number = self._busy
+        self._busy = None
         if number is not None:
             self._seen(self.room.events[number])
         self._next()
@@ -131,7 +133,8 @@ class ScriptedDispatcher:
         self.room.ask(wish, lambda reply: self._answered(number, wish, reply), self._done)
 
     def _answered(self, number: int, wish: m.Body, reply: m.Reply) -> None:
-        turned, device = self._known[number], self.room.device
+        turned = self._known[number]
+        device = self.room.device
         what = type(wish).__name__.lower()
         if reply.code == m.OK:
             turned.tries = 0
@@ -143,7 +146,9 @@ class ScriptedDispatcher:
 
     def _wish(self, status: m.EventStatus, proposal: m.Proposal) -> m.Body | None:
         """Return what it wants done; None if the policy has done it, or nothing can be done."""
-        number, seen, task = status.event_id, status.decisions, proposal.task
+        number = status.event_id
+        seen = status.decisions
+        task = proposal.task
         rule = self._rule(status, proposal)
         if rule is None:
             if status.proposed is None or proposal.device is None:

@@ -94,8 +94,11 @@ class Attention:
     def __init__(
         self, clock: Clock, switch: float, habits: AttentionHabits, noise: Iterator[float]
     ) -> None:
-        self._clock, self._switch, self._habits = clock, switch, habits
-        self._noise, self._glance = noise, habits.glance_s
+        self._clock = clock
+        self._switch = switch
+        self._habits = habits
+        self._noise = noise
+        self._glance = habits.glance_s
         self._screens: list[Screen] = []
         self._seen: list[float] = []
         self._current: Screen | None = None
@@ -146,13 +149,15 @@ class Attention:
         self._look(self._screens[place], self._clock.now + self._switch)
 
     def _look(self, screen: Screen, since: float) -> None:
-        self._current, self._since = screen, since
+        self._current = screen
+        self._since = since
         habits = self._habits
         self._glance = habits.glance_s * math.exp(habits.glance_spread * next(self._noise))
         screen.log.looks_since = since
 
     def _turn_away(self) -> None:
-        now, left = self._clock.now, self._current
+        now = self._clock.now
+        left = self._current
         assert left is not None
         if now > self._since:
             left.log.attended.append((self._since, now))
@@ -220,9 +225,13 @@ class DriverSeat:
         rng: np.random.Generator,
         looks: Callable[[str], np.random.Generator],
     ) -> None:
-        self.device, self.person, self.phone = device, person, phone
-        self.strategy, self.reach = strategy, reach
-        self.planner, self.setup = planner, setup
+        self.device = device
+        self.person = person
+        self.phone = phone
+        self.strategy = strategy
+        self.reach = reach
+        self.planner = planner
+        self.setup = setup
         habits = person.habits
         self.delay = DelayEstimate(0.0, habits.delay.first_guess_s, habits=habits.delay)
         glances = _normals(looks("glances"), block=64)
@@ -230,7 +239,8 @@ class DriverSeat:
         self._readings = _normals(looks("readings"), block=64)
         self._timing = Timing(habits.aiming, looks("timing"))
         self._errors = _normals(rng)
-        self._looks, self._times = looks, Counter[int]()
+        self._looks = looks
+        self._times = Counter[int]()
 
     def judged_delay(self, now: float) -> float:
         """The delay as the person judges it at a moment [s]."""
@@ -247,7 +257,8 @@ class DriverSeat:
 
     def judge(self, seen: Observation) -> Observation:
         """A frame as the person takes it: place and heading with an error."""
-        person, error = self.person, self._errors
+        person = self.person
+        error = self._errors
         return make_observation(
             tick=seen.tick,
             x=seen.x + person.position_error * next(error),

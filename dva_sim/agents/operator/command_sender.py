@@ -69,18 +69,28 @@ class CommandSender:
         on_refused: Callable[[str], object],
         heeds: bool = True,
     ) -> None:
-        self._device, self.clock, self._pattern = device, device.clock, pattern
-        self.drive, self._session, self._phone = drive, session, phone
-        self.rate_hz, self.timeout, self.attempts, self.window = rate_hz, timeout, attempts, window
-        self._seen_tick, self._on_lost = seen_tick, on_lost
+        self._device = device
+        self.clock = device.clock
+        self._pattern = pattern
+        self.drive = drive
+        self._session = session
+        self._phone = phone
+        self.rate_hz = rate_hz
+        self.timeout = timeout
+        self.attempts = attempts
+        self.window = window
+        self._seen_tick = seen_tick
+        self._on_lost = on_lost
         self._topic = command_topic(drive.robot)
         self._requester: Requester | None = None
-        self._on_refused, self._heeds = on_refused, heeds
+        self._on_refused = on_refused
+        self._heeds = heeds
         self.refusals = Refusals(device.id_tag, drive.refused)
         self._holder: Subscription | None = None
         self._on = self._is_held = False
         self._looked_at = 0.0
-        self.failures, self.first_failure = 0, ""
+        self.failures = 0
+        self.first_failure = ""
 
     def start(self) -> None:
         """Begin to send."""
@@ -88,7 +98,8 @@ class CommandSender:
         self._let(self._pattern.begin, self)
         self._phone.pick_up(self.clock.now)
         if self._heeds and not self._pattern.answered:
-            me, robot = self._device.id_tag, self.drive.robot
+            me = self._device.id_tag
+            robot = self.drive.robot
             self._holder = self._device.network.subscribe(me, robot, HOLDER, self._on_holder)
         self._look()
 
@@ -126,7 +137,8 @@ class CommandSender:
         """A reply has come, or none will: an app that waited for it looks again."""
         if not (self._is_held and self._on) or self._is_asking:
             return
-        self._is_held, now = False, self.clock.now
+        self._is_held = False
+        now = self.clock.now
         self._phone.release(now)
         due = self._looked_at + 1.0 / self.rate_hz
         if self._phone.keeps_alive and due > now:
@@ -140,16 +152,19 @@ class CommandSender:
         Nobody drives before the first picture: without its tick the robot could not bound
         the age of a command that waits for a connection to open.
         """
-        now, tick = self.clock.now, self._seen_tick()
+        now = self.clock.now
+        tick = self._seen_tick()
         if tick is None:
             return None
         command = self._phone.look(now)
-        self.drive.samples, self.drive.values = self._phone.samples, self._phone.values
+        self.drive.samples = self._phone.samples
+        self.drive.values = self._phone.values
         return None if command is None else _make_made(command, now, tick)
 
     def _message(self, made: Made) -> Message:
         """A command that is sent now; its tick is of when it was made."""
-        now, command = self.clock.now, made.command
+        now = self.clock.now
+        command = made.command
         body = make_set_tele_op(command.speed, command.turn_rate, made.seen_tick)
         message = self._device.outbox.message(self.drive.robot, body, now, self._session)
         issued = make_issued(made.time, now, command.sample_age, command.captured)
@@ -170,7 +185,9 @@ class CommandSender:
         """The robot says who holds it, for those whom nobody answers."""
         message = self._device.read(data, self.drive.robot) if self._on else None
         if message is not None and isinstance(body := message.body, RobotHolder):
-            now, sent, was_late = self.clock.now, self.drive.sent, self.refusals.late
+            now = self.clock.now
+            sent = self.drive.sent
+            was_late = self.refusals.late
             self._heed(self.refusals.held(body.holder, body.code, now, sent))
             if self._on and self.refusals.late and not was_late:
                 self._device.recorder.counters["alerts: every command comes late"] += 1

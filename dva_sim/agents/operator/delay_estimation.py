@@ -52,7 +52,8 @@ class DelayEstimate:
         self._hand = hand
         scale = scale or (habits.speed_scale_mps, habits.turn_scale_rad_s)
         self._start = self._next_look = start
-        self._step, self._period = step, LOOK_STEPS * step
+        self._step = step
+        self._period = LOOK_STEPS * step
         self._last: float | None = None
         self._motion = np.zeros((2, 1))
         self._lags = np.arange(1, round(habits.remembers_s / step) + 1) * step
@@ -86,7 +87,8 @@ class DelayEstimate:
         self._remember(now)
         steps = min(max(1, round(over / self._step)), len(self._lags)) if over else 1
         motion = self._motion
-        motion[0, 0], motion[1, 0] = one, other
+        motion[0, 0] = one
+        motion[1, 0] = other
         errors = self._past(steps) - motion
         np.abs(errors, out=errors)
         errors *= self._weights
@@ -123,7 +125,8 @@ class DelayEstimate:
             return
         while due >= self._asked.shape[1]:
             self._asked = np.hstack([self._asked, np.zeros_like(self._asked)])
-        since, steps = slice(self._filled, due), due - self._filled
+        since = slice(self._filled, due)
+        steps = due - self._filled
         self._filled = due
         if not self._hand:
             self._asked[0, since], self._asked[1, since] = self._intent
@@ -188,7 +191,8 @@ class PeriodEstimate:
         """
         self._delay = delay
         for channel, motion in zip(self._channels, (one, other), strict=True):
-            moves, move = abs(motion) >= 0.5 * self._habits.noticed, channel.move
+            moves = abs(motion) >= 0.5 * self._habits.noticed
+            move = channel.move
             channel.moves = moves
             if move is not None:
                 channel.move = self._learn(move, now, delay, moves=moves)
@@ -267,7 +271,8 @@ class _Channel:
             delay: After which the last move should have been seen [s].
             asks: True if motion is requested.
         """
-        lost, last = 0.0, self.move
+        lost = 0.0
+        last = self.move
         if asks and not self._asks:
             if last is not None and last.ended is not None and last.seen is None:
                 lost = last.ended - last.begun if now >= last.ended + delay else 0.0
@@ -292,14 +297,16 @@ class Timing:
     """
 
     def __init__(self, habits: AimingHabits, rng: np.random.Generator) -> None:
-        self._habits, self._rng = habits, rng
-        self._last, self._state = 0.0, float(rng.normal())
+        self._habits = habits
+        self._rng = rng
+        self._last = 0.0
+        self._state = float(rng.normal())
 
     def at(self, now: float) -> float:
         """Return the perceived length of a time at `now` [s], as a multiple of it."""
         keep = math.exp(-max(now - self._last, 0.0) / self._habits.recalls_s)
         fresh = math.sqrt(1.0 - keep * keep)
-        self._state = keep * self._state + fresh * float(self._rng.normal())
+        self._state = keep * self._state + fresh * float(self._rng.standard_normal())
         self._last = now
         return math.exp(self._habits.misjudges * self._state)
 

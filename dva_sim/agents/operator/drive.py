@@ -59,9 +59,11 @@ class CloseQuarters:
     """
 
     def __init__(self, person: Person, reach: Reach) -> None:
-        self._person, self._reach = person, reach
+        self._person = person
+        self._reach = reach
         self._habits = person.habits.close_quarters
-        self._held, self._last_look = 0.0, math.inf
+        self._held = 0.0
+        self._last_look = math.inf
         self._from: tuple[float, float] | None = None
         self._turning = self._again = False
 
@@ -79,7 +81,8 @@ class CloseQuarters:
             asked: Speed that the person asks for [m/s].
             delay: Whole delay as the person perceives it [s].
         """
-        here, habits = (seen.x, seen.y), self._habits
+        here = (seen.x, seen.y)
+        habits = self._habits
         if self._from is not None and math.dist(here, self._from) > habits.clear_m:
             self._from = None
         if seen.speed >= habits.held_still_mps:
@@ -90,7 +93,8 @@ class CloseQuarters:
         if self._held <= habits.understood_after_s + 2.0 * delay:
             return False
         self._again = self._from is not None
-        self._held, self._from = 0.0, here
+        self._held = 0.0
+        self._from = here
         return True
 
     def way(self, here: Point, goal: Point, planner: Planner) -> Floats | None:
@@ -101,7 +105,9 @@ class CloseQuarters:
 
     def drive(self, route: Route, seen: Observation, delay: float, stop_before: float) -> Intent:
         """See `Strategy`: turn on the spot towards a point close by on the way, then go there."""
-        habits, look, most = self._habits, self._habits.look_m, self._reach.turn_rate
+        habits = self._habits
+        look = self._habits.look_m
+        most = self._reach.turn_rate
         ahead = route.ahead(seen.x, seen.y, seen.heading, look)
         gain = gain_at(self._person.crossover, self._person.margin, delay)
         turn = min(max(gain * ahead.bearing, -most), most)
@@ -127,7 +133,9 @@ class Teleoperation(Work):
     """
 
     at_once = 1  # two hands, one phone
-    level, verb, wish = "teleoperation", "drives", "drive"
+    level = "teleoperation"
+    verb = "drives"
+    wish = "drive"
 
     def __init__(
         self,
@@ -158,11 +166,13 @@ class Teleoperation(Work):
         if isinstance(self._strategy, Strategy):
             what = "lets go, as its strategy fails"
             self._plugged_in.append((self._strategy, "an operator", what))
-        self._least_left, self._nearer_at = math.inf, 0.0
+        self._least_left = math.inf
+        self._nearer_at = 0.0
 
     def begin(self) -> None:
         """The robot has agreed to be driven: look, and tilt."""
-        seat, now = self._seat, self._clock.now
+        seat = self._seat
+        now = self._clock.now
         super().begin()
         self.log.hand_lag = seat.phone.hand_lag
         self._device.recorder.drive_begins(self._device.id_tag)
@@ -223,7 +233,8 @@ class Teleoperation(Work):
 
     def _perceive(self, observation: Observation) -> None:
         """A frame has reached the person's mind."""
-        seat, now = self._seat, self._clock.now
+        seat = self._seat
+        now = self._clock.now
         if self.over or not isinstance(self._strategy, Strategy):
             return
         seat.delay.see(now, observation.speed, observation.turn_rate)
@@ -232,7 +243,8 @@ class Teleoperation(Work):
         route = self._consider(judged)
         if route is not None:
             # The guess is made when a frame is perceived, so it holds the perceptual delay.
-            drive, delay = self._strategy.drive, seat.judged_delay(now)
+            drive = self._strategy.drive
+            delay = seat.judged_delay(now)
             view = make_view(now, judged, delay)
             usual = lambda keep: drive(route, view, keep)  # noqa: E731
             self._intend(self._steer(judged, delay, usual), judged.tick)
@@ -244,7 +256,8 @@ class Teleoperation(Work):
                 self._note(whose, plugged_in, what)
 
     def _note(self, whose: str, plugged_in: Phone | CommandSender | Strategy, what: str) -> None:
-        known, failures = self._failures.get(whose, 0), plugged_in.failures
+        known = self._failures.get(whose, 0)
+        failures = plugged_in.failures
         self._failures[whose] = failures
         if failures > known:
             count = self._device.recorder.counters
@@ -261,7 +274,8 @@ class Teleoperation(Work):
             usual: The person's usual way of driving, given where to stop before the end of the
                 route.
         """
-        careful, keep = self._close_quarters, self._keep_off(seen)
+        careful = self._close_quarters
+        keep = self._keep_off(seen)
         if careful is None:
             return usual(keep)
         if careful.notice(self._clock.now, seen, self._intent.speed, delay):
@@ -341,7 +355,8 @@ class Teleoperation(Work):
             return False
         nearer = self._stuck.nearer_m
         if left < self._least_left - nearer:
-            self._least_left, self._nearer_at = left, now
+            self._least_left = left
+            self._nearer_at = now
         return left > nearer and now - self._nearer_at > self._seat.person.patience
 
     def _is_stuck(self, seen: Observation) -> bool:
@@ -351,8 +366,11 @@ class Teleoperation(Work):
         included. How long is too long is of the delay when motion was last seen, since a guess
         learns nothing from a picture that stands.
         """
-        now, intent, habits = self._clock.now, self._intent, self._stuck
-        passed, self._stuck_look = now - self._stuck_look, now
+        now = self._clock.now
+        intent = self._intent
+        habits = self._stuck
+        passed = now - self._stuck_look
+        self._stuck_look = now
         if abs(seen.speed) >= habits.still or abs(seen.turn_rate) >= habits.still:
             self._without_effect = 0
             self._stuck_after = self._stuck.plans_after_s + 2.0 * self._seat.delay.value
@@ -360,7 +378,8 @@ class Teleoperation(Work):
             return False
         if intent.speed > habits.asked_mps or abs(intent.turn_rate) > habits.asked_rad_s:
             if self._asked_since is None:
-                self._asked_since, self._asked_for = now, 0.0
+                self._asked_since = now
+                self._asked_for = 0.0
             else:
                 self._asked_for += passed
         if self._asked_since is None or self._asked_for < habits.asked_for_s:

@@ -50,7 +50,8 @@ class Gathered:
     """
 
     def __init__(self, count: int, on_result: OnResult) -> None:
-        self._left, self._on_result = count, on_result
+        self._left = count
+        self._on_result = on_result
         self._good: list[str] = []
         self._bad: list[str] = []
         self.failed: Callable[[], object] = lambda: None

@@ -67,11 +67,17 @@ class HeldRobot:
         let_go: Callable[[HeldRobot], object],
         wanted: Callable[[str], bool],
     ) -> None:
-        self.device, self.robot, self._console = device, robot, console
-        self._alert, self._let_go, self._wanted = alert, let_go, wanted
+        self.device = device
+        self.robot = robot
+        self._console = console
+        self._alert = alert
+        self._let_go = let_go
+        self._wanted = wanted
         self.phase: HeldPhase = "asking"
-        self.session, self.event = 0, 0
-        self._address, self._has_answered = "", False
+        self.session = 0
+        self.event = 0
+        self._address = ""
+        self._has_answered = False
         self._granted_at = -math.inf
         self._starting: OnResult | None = None
         self.log: DriveLog | None = None
@@ -81,14 +87,17 @@ class HeldRobot:
         self._drawn_tick: int | None = None
         self._ticks: dict[int, int] = {}  # of the newest pictures, by when they were taken [ms]
         self.last = Input(0, 0.0, 0.0, 0.0)
-        self._tilt, self.app = tilt, tilt()
+        self._tilt = tilt
+        self.app = tilt()
         self.level = "teleoperation"
         self._wished = self.last
         self._inputs: deque[Input] = deque(maxlen=MOST_INPUTS)
         self._sender: CommandSender | None = None
         self._picture: Subscription | None = None
         self._status: Subscription | None = None
-        self._heard, self._tick = -math.inf, -math.inf  # of the newest status [s], [ms]
+        # of the newest status [s], [ms]
+        self._heard = -math.inf
+        self._tick = -math.inf
         self._stopped_at = -math.inf
         self.on_frame: Callable[[HeldRobot, CameraFrame], object] = lambda *_: None
 
@@ -114,7 +123,8 @@ class HeldRobot:
                     steps.give_back(self.device, self.robot, reply.content.session)
                 on_result(False, "given back meanwhile")
             elif isinstance(reply.content, m.Permission):
-                self.session, self.phase = reply.content.session, "held"
+                self.session = reply.content.session
+                self.phase = "held"
                 self._granted_at = self.device.clock.now
                 self._address = reply.content.address or ""
                 self._watch()
@@ -165,7 +175,8 @@ class HeldRobot:
 
     def _watch(self) -> None:
         def seen(picture: Subscription) -> None:
-            self._picture, self._has_answered = picture, True
+            self._picture = picture
+            self._has_answered = True
 
         def blind(url: str) -> None:
             self._has_answered = True
@@ -182,7 +193,8 @@ class HeldRobot:
             wanted=lambda: self.phase != "gone",
             unreachable=self._unreachable,
         )
-        network, me = self.device.network, self.device.id_tag
+        network = self.device.network
+        me = self.device.id_tag
         self._status = network.subscribe(me, self.robot, STATUS, self._on_status)
         self.device.clock.call_after(self._lost_after, self._unanswered)
 
@@ -200,7 +212,8 @@ class HeldRobot:
         """The robot is there; with its tick one may drive it in sight, without a picture."""
         message = self.device.read(data, self.robot) if self.phase != "gone" else None
         if message is not None and isinstance(message.body, m.RobotStatus):
-            self._heard, self._tick = self.device.clock.now, message.body.tick
+            self._heard = self.device.clock.now
+            self._tick = message.body.tick
 
     def drew(self, captured_ms: int | None) -> None:
         """The person's page says which picture of the robot it has drawn last.
@@ -214,10 +227,12 @@ class HeldRobot:
         if not self._ticks:
             return  # a robot without a camera is driven in sight
         if self._drawn_tick is None:
-            self._drawn_tick, self.drawn = self._newest_tick, self.device.clock.now
+            self._drawn_tick = self._newest_tick
+            self.drawn = self.device.clock.now
         tick = None if captured_ms is None else self._ticks.get(captured_ms)
         if tick is not None and captured_ms is not None:
-            self._drawn_tick, self.drawn = tick, captured_ms / 1000
+            self._drawn_tick = tick
+            self.drawn = captured_ms / 1000
             self._ticks = {at: known for at, known in self._ticks.items() if at >= captured_ms}
 
     @property
@@ -247,7 +262,8 @@ class HeldRobot:
         if frame is None or self.phase == "gone":
             return
         now = self.device.clock.now
-        self.frame, self.arrived = frame, now
+        self.frame = frame
+        self.arrived = now
         self._ticks[round(1000 * frame.captured)] = frame.observation.tick
         if len(self._ticks) > MOST_PICTURES:
             del self._ticks[next(iter(self._ticks))]
@@ -311,8 +327,10 @@ class HeldRobot:
         )
 
     def _begin(self, log: DriveLog) -> None:
-        setup, device = self._console().setup, self.device
-        self.phase, log.started = "driving", device.clock.now
+        setup = self._console().setup
+        device = self.device
+        self.phase = "driving"
+        log.started = device.clock.now
         if self.event:
             device.progress(self.event, "departed")
         device.tell(f"drives {self.label}", "drive")
@@ -340,7 +358,8 @@ class HeldRobot:
 
     def want(self, number: int, speed: float, turn: float) -> None:
         """Set what the person wants from now on, as shares of what the robot can do."""
-        now, reach = self.device.clock.now, self._console().reach(self.robot)
+        now = self.device.clock.now
+        reach = self._console().reach(self.robot)
         self._wished = Input(number, now, speed, turn)
         self.steered(self._wished)
         if self.phase == "driving":
@@ -350,7 +369,8 @@ class HeldRobot:
 
     def tilted(self, number: int, at: float) -> None:
         """So many samples of the person's phone have come, the newest taken at a time [s]."""
-        reach, (level, turn) = self._console().reach(self.robot), self.app.shown
+        reach = self._console().reach(self.robot)
+        (level, turn) = self.app.shown
         speed = level * SPEED_PER_LEVEL / reach.speed
         self.steered(Input(number, at, speed, math.radians(turn) / reach.turn_rate))
 
@@ -412,7 +432,8 @@ class HeldRobot:
 
     def end(self, outcome: str) -> None:
         """A drive is over, however it ended, or its start."""
-        on_started, self._starting = self._starting, None
+        on_started = self._starting
+        self._starting = None
         if on_started is not None:
             on_started(False, f"{self.label} was not started: {outcome}")
         if self._sender is not None:

@@ -71,7 +71,9 @@ class Evidence:
     def __init__(
         self, sensitivity: float, look: float, normals: Iterator[float], habits: LookingHabits
     ) -> None:
-        self._sensitivity, self._normals, self._habits = sensitivity, normals, habits
+        self._sensitivity = sensitivity
+        self._normals = normals
+        self._habits = habits
         self.criterion = 0.5 * sensitivity * look
         self.level = 0.0
 
@@ -127,10 +129,14 @@ class Looking:
         normals: Iterator[float],
         arrived: Callable[[], object],
     ) -> None:
-        self._kind, self._place, self._planner, self._person = kind, place, planner, person
+        self._kind = kind
+        self._place = place
+        self._planner = planner
+        self._person = person
         self._habits = habits = person.habits.looking
         self._evidence = Evidence(person.sensitivity, person.confirm_look, normals, habits)
-        self._tell_arrived, self._arrived = arrived, False
+        self._tell_arrived = arrived
+        self._arrived = False
         self._last: float | None = None
         self._searched = self._blind = 0.0
         self.at_place = False
@@ -156,7 +162,8 @@ class Looking:
 
     def look_away(self) -> None:
         """The person looks at something else: what is not seen counts for nothing."""
-        self._last, self.at_place = None, False
+        self._last = None
+        self.at_place = False
 
     def has_place_before_it(self, seen: Observation, within: float) -> bool:
         """Return True if the place is near [m], and no wall of the map stands between."""
@@ -168,7 +175,8 @@ class Looking:
         """The event, if it is in the picture."""
         if not seen.hazards:
             return None
-        place, within = self._place, self._habits.same_place_m
+        place = self._place
+        within = self._habits.same_place_m
         near = (h for h in seen.hazards if math.dist((h.x, h.y), place) < within)
         return next((h for h in near if h.kind == self._kind), None)
 

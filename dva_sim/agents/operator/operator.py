@@ -41,7 +41,10 @@ class OperatorAgent:
     """
 
     def __init__(self, seat: DriverSeat, kind: type[Work] = Teleoperation, span: int = 1) -> None:
-        self.device, self._seat, self._kind, self._span = seat.device, seat, kind, span
+        self.device = seat.device
+        self._seat = seat
+        self._kind = kind
+        self._span = span
         self.works: dict[str, Work] = {}
         self._waiting: list[tuple[float, m.Order]] = []  # since when [s]; oldest first
         self._again: tuple[m.Order | None, int] = (None, 0)  # what was refused, and how often
@@ -176,7 +179,8 @@ class OperatorAgent:
                 if isinstance(reply.content, m.Permission):
                     self._give_back(drive.robot, reply.content.session)
             elif isinstance(reply.content, m.Permission):
-                known, drive.granted = drive.granted, True
+                known = drive.granted
+                drive.granted = True
                 drive.session = reply.content.session
                 if not known:
                     self._turn_on_picture(drive)
@@ -230,9 +234,11 @@ class OperatorAgent:
 
     def _finish(self, drive: Work, outcome: str, why: str) -> None:
         """A drive is over: stop the robot, tell the DVA, be free again."""
-        device, order = self.device, drive.order
+        device = self.device
+        order = drive.order
         device.tell(f"{AS_SEEN.get(outcome, outcome)}{': ' + why if why else ''}", "drive")
-        found, by_dva = outcome in ("confirmed", "refuted"), outcome in BY_DVA
+        found = outcome in ("confirmed", "refuted")
+        by_dva = outcome in BY_DVA
         if found:
             body = m.EventReport(order.event_id, order.kind, order.position, 0.5, 0.95, outcome)
             device.report_finding(body)

@@ -47,7 +47,8 @@ class PersonAgent:
         console: Console,
         tilt: Callable[[], GivenTilt | TiltSources] | None = None,
     ) -> None:
-        self.device, self.console = device, console
+        self.device = device
+        self.console = console
         self.steer_by(tilt)
         self.attended = False
         self.order: m.Order | None = None
@@ -84,7 +85,8 @@ class PersonAgent:
 
     def sit_down(self) -> None:
         """Somebody takes the seat."""
-        self.attended, self.alert = True, ""
+        self.attended = True
+        self.alert = ""
 
     def take(
         self, robots: Sequence[str], on_result: OnResult, level: str = "teleoperation"
@@ -232,7 +234,8 @@ class PersonAgent:
     def _on_order(self, order: m.Order) -> None:
         if order == self.order:
             return  # the DVA says again what it has said before
-        self.order, self._arrived = order, False
+        self.order = order
+        self._arrived = False
         robot = self.device.label_of(order.device or "")
         self.device.tell(f"shall drive {robot} to event {order.event_id}", "order")
         for held in self.robots.values():
@@ -263,7 +266,8 @@ class PersonAgent:
     def _end_order(self, why: str, outcome: str) -> None:
         """With an order the DVA ends the right to drive its robot."""
         assert self.order is not None
-        held, self.order = self.robots.get(self.order.device or ""), None
+        held = self.robots.get(self.order.device or "")
+        self.order = None
         if held is not None:
             held.taken_back(outcome)
             why += f"; to drive {held.label} on, take control again"
@@ -271,7 +275,8 @@ class PersonAgent:
 
     def _on_frame(self, held: HeldRobot, frame: CameraFrame) -> None:
         """The app says by itself when the robot is where it was sent."""
-        order, seen = self.order, frame.observation
+        order = self.order
+        seen = frame.observation
         if order is None or self._arrived or not (held.event and held.phase == "driving"):
             return
         goal = self.device.frame.to_xy(order.position.latitude, order.position.longitude)

@@ -19,7 +19,8 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import load_yaml
 
 FOLDER = "experiments/validation"
-TARGETS, SPLIT = "operators", "operators-split"
+TARGETS = "operators"
+SPLIT = "operators-split"
 
 LineKind = Literal["exact", "fitted", "held-out", "remembered", "beside"]
 Share = Annotated[float, Field(ge=0, le=1)]

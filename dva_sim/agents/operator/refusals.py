@@ -74,11 +74,15 @@ class Refusals:
             sent: Number of commands sent so far; without any, nothing new can be concluded.
         """
         code = m.OK if code is None else code
-        ours, goes_on, self._sent = holder == self.me, sent > self._sent, sent
+        ours = holder == self.me
+        goes_on = sent > self._sent
+        self._sent = sent
         if ours and (code == m.OK or code in PASSES):
-            self._confirmed, self._doubtful = True, 0
+            self._confirmed = True
+            self._doubtful = 0
             if code == m.OK:
-                self._late, self.late = 0, False
+                self._late = 0
+                self.late = False
             if code == m.OK or not goes_on:
                 return ""
             why = self._too_late(code, now, SAYS_LATE_FOR)

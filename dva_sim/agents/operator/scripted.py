@@ -65,7 +65,8 @@ class ScriptedOperator:
 
     def watch_status(self, robot: str) -> None:
         """Read the ticks of a robot, to echo them in commands."""
-        network, me = self.device.network, self.device.id_tag
+        network = self.device.network
+        me = self.device.id_tag
         network.subscribe(me, robot, STATUS, lambda data: self._on_status(robot, data))
 
     def tell(self, what: str) -> None:
@@ -154,7 +155,8 @@ def _drive(
         operator.tell(f"cannot start {name}")
         return False
     operator.tell(f"starts {name} and sends {commands} commands")
-    obeyed, refusals = 0, Refusals(operator.device.id_tag)
+    obeyed = 0
+    refusals = Refusals(operator.device.id_tag)
     for number in range(commands):
         reply = yield Ask(robot, _swaying(number, operator.seen_tick), session)
         code = None if reply is None else reply.code

@@ -56,9 +56,15 @@ class Work:
         log: DriveLog,
         on_end: Callable[[Work, str, str], object],
     ) -> None:
-        self._seat, self._device, self._clock = seat, seat.device, seat.device.clock
-        self.order, self.log, self.robot, self._on_end = order, log, log.robot, on_end
-        self.session, self.granted = 0, False
+        self._seat = seat
+        self._device = seat.device
+        self._clock = seat.device.clock
+        self.order = order
+        self.log = log
+        self.robot = log.robot
+        self._on_end = on_end
+        self.session = 0
+        self.granted = False
         self.picture: Subscription | None = None
         self.over = False
         self.waits_since: float | None = None
@@ -112,7 +118,8 @@ class Work:
         if self.over:
             return
         self.over = True
-        self.log.ended, self.log.outcome = self._clock.now, outcome
+        self.log.ended = self._clock.now
+        self.log.outcome = outcome
         self._put_down()
         self._seat.attention.end(self)
         if self.picture is not None:
@@ -145,7 +152,9 @@ class Supervision(Work):
     `Teleoperation`: only who steers differs.
     """
 
-    level, verb, wish = "missions", "watches", "send"
+    level = "missions"
+    verb = "watches"
+    wish = "send"
 
     def beginning(self) -> m.Body:
         """Return the request that begins it."""
@@ -169,7 +178,8 @@ class Supervision(Work):
     def _perceive(self, observation: Observation) -> None:
         if self.over:
             return
-        now, judged = self._clock.now, self._seat.judge(observation)
+        now = self._clock.now
+        judged = self._seat.judge(observation)
         self._device.recorder.view(now, self.robot, judged.x, judged.y, judged.heading)
         found = self._looking.look(now, judged)
         if found is not None:

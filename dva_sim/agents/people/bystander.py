@@ -36,8 +36,12 @@ from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import Site
 from dva_sim.worlds.site_parts import Room
 
-WORKING, WALKING, ALARMED = "working", "walking", "alarmed"
-EVACUATING, SAFE, DOWN = "evacuating", "safe", "incapacitated"
+WORKING = "working"
+WALKING = "walking"
+ALARMED = "alarmed"
+EVACUATING = "evacuating"
+SAFE = "safe"
+DOWN = "incapacitated"
 
 NOTICED: Final = Conditions(
     temperature=40.0,
@@ -107,10 +111,15 @@ class BystanderAgent(OnFoot):
             extinction=own.smoke_per_m,
             water=own.water_m,
         )
-        self.name, self._clock, self._occupant = name, clock, occupant
+        self.name = name
+        self._clock = clock
+        self._occupant = occupant
         self._way_out = WayOut(clock, planner, walking, self.exposure, lambda: refuges)
-        self._places, self._rng = places, rng
-        self._sees, self._leaves, self._tell = sees, leaves, tell
+        self._places = places
+        self._rng = rng
+        self._sees = sees
+        self._leaves = leaves
+        self._tell = tell
         self.activity = WORKING
         self.leaves_at = self.out_at = math.inf
 
@@ -187,7 +196,8 @@ class BystanderAgent(OnFoot):
             self._way_out.leave(self._is_out)
 
     def _is_out(self) -> None:
-        self.activity, self.out_at = SAFE, self._clock.now
+        self.activity = SAFE
+        self.out_at = self._clock.now
         self.exposure.end()
         self._tell("is out")
         self._leaves()

@@ -214,12 +214,16 @@ class Exposure:
     """
 
     def __init__(self, clock: Clock, walking: Walking, air: AirAt = clean_air) -> None:
-        self._clock, self._walking, self._air = clock, walking, air
+        self._clock = clock
+        self._walking = walking
+        self._air = air
         own = walking.habits.leaving
         warm = {"temperature": own.untenable_c, "water": own.untenable_water_m}
         hot = {"temperature": own.deadly_c, "water": own.deadly_water_m}
-        self._untenable, self._deadly = UNTENABLE._replace(**warm), DEADLY._replace(**hot)
-        self.dose, self.conditions = Dose(), CLEAR
+        self._untenable = UNTENABLE._replace(**warm)
+        self._deadly = DEADLY._replace(**hot)
+        self.dose = Dose()
+        self.conditions = CLEAR
         self._over = self._is_outdoors = False
 
     def start(self, then: Callable[[], object] = do_nothing) -> None:
@@ -297,16 +301,21 @@ class WayOut:
         exposure: Exposure,
         refuges: Callable[[], Sequence[Point]],
     ) -> None:
-        self._clock, self._planner, self._walking = clock, planner, walking
-        self._exposure, self._refuges = exposure, refuges
+        self._clock = clock
+        self._planner = planner
+        self._walking = walking
+        self._exposure = exposure
+        self._refuges = refuges
         self._arrived: Callable[[], object] = do_nothing
         self._habits = habits = walking.habits.leaving
-        self._chosen, self._pause = -math.inf, habits.chooses_again_s
+        self._chosen = -math.inf
+        self._pause = habits.chooses_again_s
         self._choices = 0
 
     def leave(self, arrived: Callable[[], object]) -> None:
         """Set out; `arrived` is called at a safe place."""
-        self._arrived, self._pause = arrived, self._habits.chooses_again_s
+        self._arrived = arrived
+        self._pause = self._habits.chooses_again_s
         self._choose()
 
     def end(self) -> None:
@@ -328,10 +337,13 @@ class WayOut:
 
     def _choose(self) -> None:
         """Set out for the refuge that is best now; if none can be reached, wait."""
-        self._chosen, self._choices = self._clock.now, self._choices + 1
-        habits, pause = self._habits, self._pause
+        self._chosen = self._clock.now
+        self._choices += 1
+        habits = self._habits
+        pause = self._pause
         self._pause = min(2.0 * pause, habits.at_latest_s)
-        here, limits = self._walking.place, self._exposure.limits
+        here = self._walking.place
+        limits = self._exposure.limits
         escape = choose_escape(self._planner, here, self._refuges(), limits, habits)
         if escape is None or not self._walking.go(
             escape.goal,
@@ -358,7 +370,8 @@ class OnFoot:
     """
 
     def __init__(self, walking: Walking, exposure: Exposure) -> None:
-        self.walking, self.exposure = walking, exposure
+        self.walking = walking
+        self.exposure = exposure
 
     @property
     def x(self) -> float:

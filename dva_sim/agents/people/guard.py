@@ -29,7 +29,9 @@ from dva_sim.worlds.hazards import KINDS
 from dva_sim.worlds.planning import Planner
 
 STATUS_PERIOD, FIRST_STATUS = 2.0, 0.5  # design: of where a guard is [s]
-CONFIRMED, REFUTED, CONTAINED = "confirmed", "refuted", "contained"
+CONFIRMED = "confirmed"
+REFUTED = "refuted"
+CONTAINED = "contained"
 
 Point = tuple[float, float]
 
@@ -63,13 +65,18 @@ class GuardAgent(OnFoot):
         smoke: Callable[[Point, Point], float] = no_smoke,
     ) -> None:
         super().__init__(walking, Exposure(device.clock, walking, air))
-        self.device, self._walker, self._planner = device, walker, planner
+        self.device = device
+        self._walker = walker
+        self._planner = planner
         self._habits = walker.habits.work
         device.meanwhile = "an order in hand goes on"
-        self._post, self._refuges = walking.place, refuges
+        self._post = walking.place
+        self._refuges = refuges
         self._way_out = WayOut(device.clock, planner, walking, self.exposure, self._safe_places)
         self.activity = "waiting"
-        self._is_there, self._contain, self._smoke = is_there, contain, smoke
+        self._is_there = is_there
+        self._contain = contain
+        self._smoke = smoke
         self._protocol = GuardProtocol(device.dva, walker.mobilisation, self._is_at)
         self.exposure.start(self._felt)
         device.serve(self._on_request)
@@ -125,7 +132,8 @@ class GuardAgent(OnFoot):
         if errand is not self._protocol.errand:
             return
         goal, is_far_enough = self._goal(errand)
-        arrived, blocked = partial(self._arrive, errand), self._cannot_pass
+        arrived = partial(self._arrive, errand)
+        blocked = self._cannot_pass
         self.activity = "walking"
         if not self.walking.go(goal, arrived, blocked, is_far_enough):
             self.device.tell("finds no way there", "event")
@@ -175,7 +183,8 @@ class GuardAgent(OnFoot):
     # --- what is done there ------------------------------------------------------------
 
     def _arrive(self, errand: Errand) -> None:
-        order, clock = errand.order, self.device.clock
+        order = errand.order
+        clock = self.device.clock
         if order is None:
             self._post = self.walking.place
             self._finish()
@@ -207,7 +216,8 @@ class GuardAgent(OnFoot):
             self._begin_to_contain(errand)
 
     def _begin_to_contain(self, errand: Errand) -> None:
-        walker, order = self._walker, errand.order
+        walker = self._walker
+        order = errand.order
         extinguished = order is not None and _is_extinguished(order.kind)
         takes = walker.extinguish if extinguished else walker.contain
         self.activity = "containing"
@@ -265,7 +275,8 @@ class GuardAgent(OnFoot):
 
     def _give_back(self, unfit: str) -> None:
         """Be of no more use, for that reason, to whatever the guard was on."""
-        order, self._protocol.unfit = self._protocol.order, unfit
+        order = self._protocol.order
+        self._protocol.unfit = unfit
         if order is None:
             self._finish()
         elif order.task == "confirm" and self._has_seen(order):
@@ -274,7 +285,9 @@ class GuardAgent(OnFoot):
             self._finish("failed")
 
     def _has_seen(self, order: m.Order) -> bool:
-        at, place, within = self.walking.place, self._xy(order.position), self._habits.in_sight_m
+        at = self.walking.place
+        place = self._xy(order.position)
+        within = self._habits.in_sight_m
         return self._sees(order.kind, at, place, within) and self._is_there(order.kind, *place)
 
     def _safe_places(self) -> list[Point]:
@@ -284,7 +297,8 @@ class GuardAgent(OnFoot):
 
     def _is_safe(self) -> None:
         """At a refuge: fit for service again, unless hurt; who is at an exit steps out."""
-        here, near = self.walking.place, self._habits.is_there_m
+        here = self.walking.place
+        near = self._habits.is_there_m
         if any(math.dist(here, place) < near for place in self._refuges):
             self.exposure.step_out()
         self._protocol.unfit = "is hurt" if self.exposure.is_hurt else ""

@@ -128,7 +128,8 @@ class GuardProtocol:
         if self.errand is None:
             is_there = order is not None and order.event_id == self._at_event
             self.ready_at = now if is_there else now + self.mobilisation
-        self.errand, self._at_event = errand, None
+        self.errand = errand
+        self._at_event = None
         return GuardDecision(m.OK, changed=True)
 
     # --- auctions ----------------------------------------------------------------------

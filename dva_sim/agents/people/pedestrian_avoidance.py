@@ -94,11 +94,17 @@ def is_clear(
 
     Asked first, since mostly it is so, and it costs little.
     """
-    vx, vy = speed * math.cos(heading), speed * math.sin(heading)
+    vx = speed * math.cos(heading)
+    vy = speed * math.sin(heading)
     berth = habits.berth_m
     for x, y, ovx, ovy, radius in others:
-        px, py, wx, wy = x - me.x, y - me.y, vx - ovx, vy - ovy
-        near, square, closing = me.radius + berth + radius, px * px + py * py, px * wx + py * wy
+        px = x - me.x
+        py = y - me.y
+        wx = vx - ovx
+        wy = vy - ovy
+        near = me.radius + berth + radius
+        square = px * px + py * py
+        closing = px * wx + py * wy
         if closing > 0.0 and closing**2 >= (wx * wx + wy * wy) * (square - near * near):
             return False
     return True
@@ -169,7 +175,8 @@ class Courtesy:
     """
 
     def __init__(self, doors: list[Door], habits: WalkingHabits = USUAL) -> None:
-        self._doors, self._habits = doors, habits
+        self._doors = doors
+        self._habits = habits
         self._since: float | None = None  # when it began to wait [s]
 
     def waits_for(self, me: Body, gone: float, near: Sequence[Body], now: float) -> Door | None:
@@ -182,7 +189,8 @@ class Courtesy:
             now: [s]
         """
         habits = self._habits
-        first, last = habits.gives_way_from_m, habits.gives_way_to_m
+        first = habits.gives_way_from_m
+        last = habits.gives_way_to_m
         door = next((d for d in self._doors if first < d.along - gone < last), None)
         comer = None if door is None else _comes_through(door, me, near, habits)
         if comer is None:
@@ -218,7 +226,8 @@ def beside(
         habits: Habits of the person.
     """
     _, (ux, uy) = _towards(door, me)
-    back, side = habits.waits_before_m, habits.waits_aside_m
+    back = habits.waits_before_m
+    side = habits.waits_aside_m
     spots = [(door.x - back * ux + s * uy, door.y - back * uy - s * ux) for s in (side, -side)]
     fits = room(np.array(spots)) >= me.radius
     return next((s for s, fit in zip(spots, fits, strict=True) if fit), (me.x, me.y))
@@ -242,7 +251,8 @@ def past(
         room: Distance to the nearest wall at many points `(n, 2)` [m].
         sideways: Half the depth of the person [m].
     """
-    (ux, uy), off = along, robot.radius + sideways
+    (ux, uy) = along
+    off = robot.radius + sideways
     sides = [(-1.0, uy, -ux), (1.0, -uy, ux)]  # right and left
     gaps = np.array([(robot.x + off * nx, robot.y + off * ny) for _, nx, ny in sides])
     wide = room(gaps)

@@ -68,9 +68,12 @@ class PersonGuard(OnFoot):
         air: AirAt = clean_air,
     ) -> None:
         super().__init__(walking, Exposure(device.clock, walking, air))
-        self.device, self._walker, self._planner = device, walker, planner
+        self.device = device
+        self._walker = walker
+        self._planner = planner
         device.meanwhile = "an order in hand goes on"
-        self._put, self._contain = put, contain
+        self._put = put
+        self._contain = contain
         self.attended = self.answered = self._needs_help = False
         self.alert = ""
         self._stage = ""  # of the order: departed, arrived
@@ -115,7 +118,8 @@ class PersonGuard(OnFoot):
 
     def join(self) -> None:
         """Somebody plays this guard from now on."""
-        self.attended, self.alert = True, ""
+        self.attended = True
+        self.alert = ""
 
     def leave(self) -> None:
         """Nobody does any more: an order that is open is given back."""
@@ -232,7 +236,8 @@ class PersonGuard(OnFoot):
     # --- what the DVA says -------------------------------------------------------------------
 
     def _on_request(self, message: m.Message) -> m.Reply:
-        had, now = self.order, self.device.clock.now
+        had = self.order
+        now = self.device.clock.now
         answer = self._protocol.handle(message, now)
         if answer.changed:
             self._changed(had, self._protocol.errand)
@@ -242,7 +247,9 @@ class PersonGuard(OnFoot):
 
     def _changed(self, had: m.Order | None, errand: Errand | None) -> None:
         """There is another errand, or none any more."""
-        self.answered, self._stage, self._order_at = False, "", self.walking.place
+        self.answered = False
+        self._stage = ""
+        self._order_at = self.walking.place
         if errand is None:
             self.alert = f"event {had.event_id} is settled, or another's" if had else ""
         elif errand.order is None:
@@ -273,7 +280,9 @@ class PersonGuard(OnFoot):
 
     def _end(self, at_event: bool = False) -> None:
         self._protocol.is_over(at_event)
-        self.answered, self._stage, self._needs_help = False, "", False
+        self.answered = False
+        self._stage = ""
+        self._needs_help = False
 
     def _felt(self) -> None:
         """Half a second more in this air: it is for the person to leave."""

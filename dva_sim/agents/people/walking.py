@@ -108,9 +108,13 @@ class Walking:
     ) -> None:
         self.habits = habits or OnFootHabits()
         self._own = own = self.habits.walking
-        self._clock, self._planner, self._ground = clock, planner, ground
-        self.body, self.speed = body, speed
-        self.heading, self.pace = 0.0, 1.0
+        self._clock = clock
+        self._planner = planner
+        self._ground = ground
+        self.body = body
+        self.speed = speed
+        self.heading = 0.0
+        self.pace = 1.0
         self._doors = middles_of(doors, own.narrow_m)
         self._walk: Walk | None = None
         self._reach = own.reach_m  # less in a crowd
@@ -152,7 +156,8 @@ class Walking:
             return False
         now = self._clock.now
         courtesy = Courtesy(doors_on(points, self._doors), self._own)
-        route, keep_off = Route(points), tuple(avoid)
+        route = Route(points)
+        keep_off = tuple(avoid)
         walk = Walk(
             goal,
             arrived=arrived,
@@ -162,7 +167,8 @@ class Walking:
             courtesy=courtesy,
             avoid=keep_off,
         )
-        walk.nearer_at, walk.looks_around = now, now + self._own.tired_s
+        walk.nearer_at = now
+        walk.looks_around = now + self._own.tired_s
         self._walk = walk
         self._clock.call_after(0.0, self._step, walk)
         return True
@@ -171,7 +177,8 @@ class Walking:
         """Places that it will come to next on its way, so far apart and up to so far off [m]."""
         if self._walk is None:
             return []
-        route, gone = self._walk.route, self._walk.gone
+        route = self._walk.route
+        gone = self._walk.gone
         count = int(min(reach, route.length - gone) / every)
         return [route.point_at(gone + every * k) for k in range(1, count + 1)]
 
@@ -185,7 +192,8 @@ class Walking:
     def _step(self, walk: Walk) -> None:
         if walk is not self._walk:
             return
-        here, own = self.place, self._own
+        here = self.place
+        own = self._own
         x, y = here
         ahead = walk.route.ahead(x, y, 0.0, own.look_ahead_m)
         walk.gone = walk.route.length - ahead.remaining
@@ -205,9 +213,12 @@ class Walking:
 
     def _is_held_up(self, walk: Walk, ahead: Ahead) -> bool:
         """Return True if others keep it from a goal that is near; notes progress."""
-        now, own = self._clock.now, self._own
+        now = self._clock.now
+        own = self._own
         if ahead.remaining < walk.least - own.nearer_m:
-            walk.least, walk.nearer_at, walk.looks_around = ahead.remaining, now, now + own.tired_s
+            walk.least = ahead.remaining
+            walk.nearer_at = now
+            walk.looks_around = now + own.tired_s
         return ahead.remaining < own.crowded_m and now - walk.nearer_at > own.tired_s
 
     def _push_on(self, walk: Walk, ahead: Ahead) -> bool:
@@ -216,15 +227,18 @@ class Walking:
         near = self._others()
         if near and self._clock.now >= walk.looks_around:
             self._look_around(walk, near)
-        heading, slot = ahead.bearing, self._slot(walk, near)
+        heading = ahead.bearing
+        slot = self._slot(walk, near)
         if slot is not None:
             heading = math.atan2(slot[1] - self.body.y, slot[0] - self.body.x)
             aside = self._own.sideways_mps
-            vx, vy = aside * math.cos(heading), aside * math.sin(heading)
+            vx = aside * math.cos(heading)
+            vy = aside * math.sin(heading)
         elif near:
             heading, vx, vy = self._among(walk, ahead, speed, near)
         else:
-            vx, vy = speed * math.cos(heading), speed * math.sin(heading)
+            vx = speed * math.cos(heading)
+            vy = speed * math.sin(heading)
         self.heading = heading
         self.body.walk(vx, vy)
         return bool(near)
@@ -233,7 +247,9 @@ class Walking:
         self, walk: Walk, ahead: Ahead, speed: float, near: Sequence[Body]
     ) -> tuple[float, float, float]:
         """Return where to look [rad] and how to walk [m/s] among others."""
-        body, heading, own = self.body, ahead.bearing, self._own
+        body = self.body
+        heading = ahead.bearing
+        own = self._own
         me = Mover(body.x, body.y, *body.velocity, body.radius)
         movers = [Mover(o.x, o.y, *o.velocity, o.radius) for o in near]
         door = walk.courtesy.waits_for(body, walk.gone, near, self._clock.now)
@@ -249,7 +265,8 @@ class Walking:
 
     def _past_others(self, walk: Walk, ahead: Ahead) -> float:
         """Return the direction from farther off; who stepped aside does not turn back [rad]."""
-        x, y = self.body.x, self.body.y
+        x = self.body.x
+        y = self.body.y
         far = walk.route.point_at(walk.gone + self._own.look_past_m)
         if not self._planner.line_of_sight((x, y), far):
             return ahead.bearing
@@ -267,7 +284,8 @@ class Walking:
 
     def _slot(self, walk: Walk, near: Sequence[Body]) -> Point | None:
         """Return where to squeeze past a robot that blocks the way; sideways until it is passed."""
-        body, own = self.body, self._own
+        body = self.body
+        own = self._own
         squeezes = body.radius == own.sideways_m
         robots = (o for o in near if isinstance(o, RobotBody))
         robot = next((r for r in robots if _gap(r, body) < own.beside_m), None)
@@ -303,7 +321,8 @@ class Walking:
             return False
         walk.route = Route(points)
         walk.courtesy = Courtesy(doors_on(points, self._doors), self._own)
-        walk.planned, walk.gone = self._clock.now, 0.0
+        walk.planned = self._clock.now
+        walk.gone = 0.0
         return True
 
 

@@ -119,7 +119,8 @@ class Avoidance:
         base = np.array([route.point_at(along + s) for s in way.tolist()])
         left = _to_the_left(base)
         # Written out: a product of arrays is rounded as the processor's library likes.
-        east, north = here[0] - float(base[0, 0]), here[1] - float(base[0, 1])
+        east = here[0] - float(base[0, 0])
+        north = here[1] - float(base[0, 1])
         offset = east * float(left[0, 0]) + north * float(left[0, 1])
         places = self._foreseen(way, here, others)
         if last == 0.0:  # then nothing is better than the planned way
@@ -248,7 +249,8 @@ def _gradient(points: Floats) -> Floats:
     """Differentiate along a line `(n, 2)` as NumPy does, in a fifth of the time."""
     between = np.empty_like(points)
     between[1:-1] = (points[2:] - points[:-2]) / 2.0
-    between[0], between[-1] = points[1] - points[0], points[-1] - points[-2]
+    between[0] = points[1] - points[0]
+    between[-1] = points[-1] - points[-2]
     return between
 
 

@@ -46,7 +46,8 @@ class Battery:
     """
 
     def __init__(self, profile: BatteryProfile, mass: float, share: float = 1.0) -> None:
-        self.profile, self._weight = profile, mass * G
+        self.profile = profile
+        self._weight = mass * G
         self._full = profile.capacity_wh * JOULES
         self.energy = share * self._full
         self._time = self._distance = self._work = 0.0
@@ -72,8 +73,12 @@ class Battery:
             work: Done by the motors altogether, besides rolling [J].
             at_base: True if the robot has stood at a base all that time, and was charged.
         """
-        spent, rolled, worked = time - self._time, distance - self._distance, work - self._work
-        self._time, self._distance, self._work = time, distance, work
+        spent = time - self._time
+        rolled = distance - self._distance
+        worked = work - self._work
+        self._time = time
+        self._distance = distance
+        self._work = work
         profile = self.profile
         driving = (profile.rolling_resistance * self._weight * rolled + worked) / profile.efficiency
         gained = profile.charging_w * spent if at_base else -profile.idle_w * spent

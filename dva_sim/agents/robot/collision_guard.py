@@ -72,7 +72,8 @@ def who_is_near(
     for other, _ in world.neighbours(*here, within):
         if other is body:
             continue
-        x, y = other.x, other.y
+        x = other.x
+        y = other.y
         if sees(here, (x, y)):
             person = isinstance(other, PersonBody)
             kind, keep = ("person", PERSONAL) if person else ("robot", KEEP_ROBOT)

@@ -101,7 +101,9 @@ class FairQueue:
     """
 
     def __init__(self, limit: int, standing: StandingOf) -> None:
-        self._limit, self._standing, self.length = limit, standing, 0
+        self._limit = limit
+        self._standing = standing
+        self.length = 0
         self._lines: OrderedDict[LineOf, Line] = OrderedDict()
 
     def count(self, holders: bool) -> int:
@@ -117,7 +119,8 @@ class FairQueue:
 
     def put(self, letter: Letter) -> Letter | None:
         """Take a letter in; the one that finds no room, if any: another, or itself."""
-        gone, standing = None, self._standing(letter)
+        gone = None
+        standing = self._standing(letter)
         if standing is not HOLDER or self.length >= self._limit:
             gone = self._make_room(letter, standing)
             if gone is letter:
@@ -224,14 +227,21 @@ class CommandQueue:
         driven: Callable[[], bool] = lambda: False,
         refuse: Callable[[Letter], object] = _nobody_waits,
     ) -> None:
-        self._clock, self.service, self._handle = clock, service, handle
-        self.latest_wins, self._limit, self._read = latest_wins, limit, read
-        self._standing, self._driven, self._refuse = standing, driven, refuse
+        self._clock = clock
+        self.service = service
+        self._handle = handle
+        self.latest_wins = latest_wins
+        self._limit = limit
+        self._read = read
+        self._standing = standing
+        self._driven = driven
+        self._refuse = refuse
         self.flow: Flow | None = None
         self._paused = self._busy = self._waking = self._was_urgent = False
         self._emergencies: list[Letter] = []
         self._waiting = FairQueue(limit, standing)
-        self._last, self._turns = HOLDER, [DVA, OTHER]
+        self._last = HOLDER
+        self._turns = [DVA, OTHER]
         self._rested = -math.inf  # strangers are, from then on [s]
         self.longest = self.superseded = self.overflowed = 0
 
@@ -246,7 +256,8 @@ class CommandQueue:
 
     def request(self, request: Request) -> None:
         """A request has arrived; somebody waits for the answer."""
-        data, message = request.data, None
+        data = request.data
+        message = None
         looks_urgent = b"<EmergencyMsg" in data
         if looks_urgent and not self._has_room(request.peer):
             self._turn_away(Letter(data, self._clock.now, request))
@@ -255,9 +266,11 @@ class CommandQueue:
             message = self._read(request)
             if message is None:
                 return
-            urgent, moves = isinstance(message.body, Emergency), isinstance(message.body, SetTeleOp)
+            urgent = isinstance(message.body, Emergency)
+            moves = isinstance(message.body, SetTeleOp)
         else:
-            urgent, moves = looks_urgent and _is_emergency(data), b"<SetTeleOp>" in data
+            urgent = looks_urgent and _is_emergency(data)
+            moves = b"<SetTeleOp>" in data
         self._put(_make_letter(data, self._clock.now, request, message, moves), urgent)
 
     def _has_room(self, peer: Hashable) -> bool:
@@ -270,7 +283,8 @@ class CommandQueue:
         if self.latest_wins:
             self.superseded += self.forget_published()
         self._put(_make_letter(data, self._clock.now, None, message, True))
-        waiting, limit = self._waiting, self._limit
+        waiting = self._waiting
+        limit = self._limit
         is_full = waiting.length >= limit and waiting.count(holders=True) >= limit
         if is_full and self.flow is not None:
             self._paused = True
@@ -284,7 +298,8 @@ class CommandQueue:
         """Take a letter in; the holder's that finds nothing else here is worked on at once."""
         idle = not (self._busy or urgent or self._emergencies or self._waiting.length)
         if idle and self._standing(letter) is HOLDER:
-            self._last, self._was_urgent = HOLDER, False
+            self._last = HOLDER
+            self._was_urgent = False
             self.longest = self.longest or 1
             if self._begin([letter]):
                 self._work()
@@ -340,7 +355,8 @@ class CommandQueue:
         """The holder's after each of another; the DVA and strangers by turns."""
         if not self._waiting.length:
             return None
-        lines, others = self._waiting.next_lines(), self._turns
+        lines = self._waiting.next_lines()
+        others = self._turns
         for one in (*others, HOLDER) if self._last is HOLDER else (HOLDER, *others):
             if one not in lines or (one is OTHER and self._others_rest()):
                 continue

@@ -50,8 +50,11 @@ class Confirmations:
         conclude: Callable[[Letter], object],
         happened: Callable[[str], object],
     ) -> None:
-        self._device, self._inquiry = device, controller.inquiry
-        self._decide, self._conclude, self._happened = decide, conclude, happened
+        self._device = device
+        self._inquiry = controller.inquiry
+        self._decide = decide
+        self._conclude = conclude
+        self._happened = happened
         self._waiting: list[Waiting] = []
         self._will_ask = False
 

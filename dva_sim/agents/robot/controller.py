@@ -222,7 +222,8 @@ class RobotController:
         """
         self._idle("its computer was restarted")
         self.inquiry.restart(now)
-        self.grant, self.clock_offset = None, clock_offset
+        self.grant = None
+        self.clock_offset = clock_offset
         self.observers.clear()
         self.last_order_id = self.last_set_id = self._numbered = 0
 
@@ -324,7 +325,10 @@ class RobotController:
         if self.mode is MISSION and status.mission_state not in ENDS:
             left = status.waypoints_left
             self.mission_status = m.MissionStatus(status.mission_id, "failed", left, why)
-        self.mode, self.owner, self.mission, self.by_hand = IDLE, None, None, None
+        self.mode = IDLE
+        self.owner = None
+        self.mission = None
+        self.by_hand = None
 
     def _released(self, message: m.Message) -> Decision:
         """Accept a release as a reason to ask the DVA, which alone can say so."""
@@ -369,7 +373,8 @@ class RobotController:
         if isinstance(body.content, m.EmergencyRelease):
             self.latch.take_answer(body.content)
             return Decision(m.OK)
-        asked, permission = self.inquiry.answered(body), body.content
+        asked = self.inquiry.answered(body)
+        permission = body.content
         if asked is None:
             return Decision(m.OK, waits=True)
         if body.code != m.OK or not isinstance(permission, m.Permission):
@@ -391,11 +396,14 @@ class RobotController:
 
     def _is_held(self, grant: m.PermissionGrant | None) -> Decision:
         """Replace the holder, or leave the robot without one; the current driver is stopped."""
-        held, self.grant = self.grant, grant
+        held = self.grant
+        self.grant = grant
         if grant is not None and held is not None and grant.session == held.session:
             return Decision(m.OK)  # the holder may have moved
         if grant is not None and grant.session != self._numbered:
-            self.last_order_id, self.last_set_id, self._numbered = 0, 0, grant.session
+            self.last_order_id = 0
+            self.last_set_id = 0
+            self._numbered = grant.session
         if self.owner is None:  # also where it is in somebody's hand, who goes on
             return Decision(m.OK)
         self._idle("revoked")
@@ -559,7 +567,9 @@ class RobotController:
         refusal = self._begin(arrived, moving) or self._order(message)
         if refusal is not None:
             return refusal
-        self.mode, self.owner, self.mission = MISSION, message.source, body
+        self.mode = MISSION
+        self.owner = message.source
+        self.mission = body
         left = len(body.waypoints) if isinstance(body, m.GoTo | m.Patrol) else 1
         self.mission_status = m.MissionStatus(message.message_id, "under_way", left, "")
         return Decision(m.OK)

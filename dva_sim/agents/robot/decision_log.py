@@ -15,13 +15,17 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
 
-LEASE_ENDS, MISSION_ENDS = "lease ends", "mission ends"
-TAKEN_BY_HAND, LET_GO, PRESSED = "taken by hand", "let go", "emergency pressed"
+LEASE_ENDS = "lease ends"
+MISSION_ENDS = "mission ends"
+TAKEN_BY_HAND = "taken by hand"
+LET_GO = "let go"
+PRESSED = "emergency pressed"
 RELEASED_BY_HAND = "released by hand"
 RELEASES_UNKNOWN = "the DVA knows no releases"
 STANDS = "stands"
 HANGS = "hangs"
-ASKS, NO_ANSWER = "asks the DVA", "no answer of the DVA"
+ASKS = "asks the DVA"
+NO_ANSWER = "no answer of the DVA"
 HAND = "hand"  # whose that was is no matter of a trace
 
 
@@ -115,7 +119,8 @@ def replay(
         try:
             entry = json.loads(line)
             if controller is None:
-                controller, asked = _controller(entry), None
+                controller = _controller(entry)
+                asked = None
             else:
                 asked = _again(controller, entry)
         except _BROKEN as error:
@@ -152,7 +157,8 @@ def _again(
     """Let it happen once more; a message, and what is decided about it then and now."""
     if "message" in entry:
         return _ask_again(controller, entry)
-    now, happened = _value(entry, "now", float, int), _value(entry, "happened", str)
+    now = _value(entry, "now", float, int)
+    happened = _value(entry, "happened", str)
     if happened == LEASE_ENDS:
         controller.expire(now)
     elif happened == MISSION_ENDS:
@@ -185,10 +191,12 @@ def _ask_again(
 ) -> tuple[m.Message, Decision, Decision]:
     message = decode(_value(entry, "message", str).encode())
     arrived, time = (_value(entry, name, float, int) for name in ("arrived", "now"))
-    code, text = _value(entry, "code", int), _value(entry, "text", str)
+    code = _value(entry, "code", int)
+    text = _value(entry, "text", str)
     point = _value(entry, "set_point", list, type(None))
     then = Decision(code, text, None if point is None else TimedSetPoint(*point))
-    moving, waited = _value(entry, "moving", bool), bool(entry.get("waited"))
+    moving = _value(entry, "moving", bool)
+    waited = bool(entry.get("waited"))
     now = controller.handle(message, arrived, time, moving, waited)
     return message, then, now._replace(content=None, waits=False)
 

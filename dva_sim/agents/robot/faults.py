@@ -31,7 +31,8 @@ class RobotFaults:
     """
 
     def __init__(self, robot: RobotAgent, lost: Lost = lambda *_: None) -> None:
-        self._robot, self._lost = robot, lost
+        self._robot = robot
+        self._lost = lost
         self.processing_s: float | None = None
         self.drops_replies = self.frozen = self.camera_lost = False
         self._sound = dict(robot.sensors)
@@ -64,7 +65,8 @@ class RobotFaults:
         """Let all replies be lost on their way, or none."""
         if on is self.drops_replies:
             return
-        self.drops_replies, robot = on, self._robot
+        self.drops_replies = on
+        robot = self._robot
         service = self._lose_the_answer if on else robot.inbox.request
         robot.device.network.serve(robot.device.id_tag, service)
         self._tell("fault: its replies are dropped" if on else "its replies are no longer dropped")
@@ -78,7 +80,8 @@ class RobotFaults:
         """Hang its computer, or restart it: idle, without a driver, with the latest settings."""
         if on is self.frozen:
             return
-        self.frozen, robot = on, self._robot
+        self.frozen = on
+        robot = self._robot
         if on:
             self._tell("fault: its computer is frozen")
             robot.hang()

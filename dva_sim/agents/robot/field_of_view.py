@@ -61,7 +61,8 @@ class FieldOfView:
         """Return the hazards in a picture taken from a pose [m, rad]."""
         seen = []
         for hazard in hazards:
-            dx, dy = hazard.x - x, hazard.y - y
+            dx = hazard.x - x
+            dy = hazard.y - y
             distance = math.hypot(dx, dy)
             if distance - hazard.radius > self.range:
                 continue
@@ -69,7 +70,8 @@ class FieldOfView:
             half_width = math.atan2(hazard.radius, distance)
             if abs(bearing) - half_width > self.angle / 2:
                 continue
-            here, there = (x, y), (hazard.x, hazard.y)
+            here = (x, y)
+            there = (hazard.x, hazard.y)
             if not self.line_of_sight(here, there):
                 continue
             depth = 0.0 if hazard.shines else self.smoke(here, there)

@@ -62,7 +62,8 @@ class Inquiry:
         Args:
             claimed: Id of the device that is said to be the holder, or acts as if it were.
         """
-        self._holder, self._claimed = True, claimed or self._claimed
+        self._holder = True
+        self._claimed = claimed or self._claimed
 
     def about_reader(self, device: str) -> None:
         """Open the question which sensors a device may read."""
@@ -85,7 +86,8 @@ class Inquiry:
         """Take the next question, which is then under way, if one may be asked now."""
         if self.due(now) > now:
             return None
-        self._left, self._counted_at = self._allowed(now) - 1.0, now
+        self._left = self._allowed(now) - 1.0
+        self._counted_at = now
         if self._readers and (self._readers_next or not self._holder):
             self.asked = m.GetGrant(self._readers.popitem(last=False)[0], "sensors")
         else:
@@ -102,8 +104,10 @@ class Inquiry:
         It does not where the DVA must be asked again: it does not know the robot yet, or only
         questions about one device (before 1.6), or it may not have known that a session is over.
         """
-        asked, self.asked = self.asked, None
-        by_name, self._by_name = self._by_name, False
+        asked = self.asked
+        self.asked = None
+        by_name = self._by_name
+        self._by_name = False
         if asked is None:
             return None
         if reply.code in (m.BAD_MESSAGE, m.NOT_SUPPORTED):
@@ -122,7 +126,8 @@ class Inquiry:
 
     def unanswered(self) -> None:
         """Open the question under way again, since the DVA has not answered."""
-        asked, self.asked = self.asked, None
+        asked = self.asked
+        self.asked = None
         if asked is not None:
             self._again(asked)
 

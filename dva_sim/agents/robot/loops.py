@@ -36,7 +36,10 @@ class Surrounded:
     """
 
     def __init__(self, clock: Clock, world: World, body: RobotBody, planner: Planner) -> None:
-        self.clock, self.world, self.body, self.planner = clock, world, body, planner
+        self.clock = clock
+        self.world = world
+        self.body = body
+        self.planner = planner
         spec = body.spec
         self.guard = CollisionGuard(body.radius, spec.max_deceleration, planner.room_at)
         self.reach = Reach(spec.max_speed, spec.max_turn_rate)
@@ -55,7 +58,8 @@ class CollisionGuardedDrive:
     """
 
     def __init__(self, around: Surrounded, controller: RobotController) -> None:
-        self._around, self._controller = around, controller
+        self._around = around
+        self._controller = controller
         self._wanted = TimedSetPoint(0.0, 0.0, 0.0)
         self._looking = False
 
@@ -76,7 +80,8 @@ class CollisionGuardedDrive:
         return self._looking
 
     def _apply(self) -> None:
-        around, (speed, turn_rate, until) = self._around, self._wanted
+        around = self._around
+        (speed, turn_rate, until) = self._wanted
         around.world.advance_to(around.clock.now)
         slower = around.guard.limit(around.body.pose(), speed, turn_rate, around.nearby())
         around.body.drive(slower, turn_rate, until)
@@ -101,14 +106,18 @@ class MissionLoop:
         charge: Callable[[], float],
         on_news: Callable[[], object],
     ) -> None:
-        self._around, self._controller, self._observe = around, controller, observe
-        self._charge, self._on_news = charge, on_news
+        self._around = around
+        self._controller = controller
+        self._observe = observe
+        self._charge = charge
+        self._on_news = on_news
         self._base = around.body.x, around.body.y
         self._number = 0
 
     def begin(self, mission: Mission, frame: GeoFrame) -> None:
         """Drive a mission until it ends, or the robot gets another order."""
-        body, around = self._around.body, self._around
+        body = self._around.body
+        around = self._around
         errand = MissionGoal.of(mission, frame.to_xy, self._base)
         pilot = Pilot(
             errand,
@@ -130,7 +139,8 @@ class MissionLoop:
         around.clock.every(PERIOD, step)
 
     def _look(self) -> Sensed:
-        view, around = self._observe(), self._around
+        view = self._observe()
+        around = self._around
         return Sensed(around.clock.now, view, around.nearby(), around.body.jammed, self._charge())
 
     def _obey(self, step: PilotStep) -> None:

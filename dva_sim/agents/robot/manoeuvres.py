@@ -89,13 +89,17 @@ class JamRecovery(Manoeuvre):
         tried: Headings that did not help [rad].
     """
 
-    state, reason = "replanning", "jammed"
+    state = "replanning"
+    reason = "jammed"
 
     def __init__(
         self, seen: Sensed, guard: CollisionGuard, most_turn: float, tried: Sequence[float]
     ) -> None:
-        self._guard, self._turn, self._until = guard, most_turn, seen.now + LONGEST_RECOVERY
-        self._start, self._turned = seen.here, False
+        self._guard = guard
+        self._turn = most_turn
+        self._until = seen.now + LONGEST_RECOVERY
+        self._start = seen.here
+        self._turned = False
         self.heading = self._way_out(seen, tried)
 
     def _way_out(self, seen: Sensed, tried: Sequence[float]) -> float:
@@ -130,14 +134,20 @@ class Aside(Manoeuvre):
         most_turn: Highest turn rate [rad/s].
     """
 
-    state, reason = "waiting", "somebody is in the way"
+    state = "waiting"
+    reason = "somebody is in the way"
 
     def __init__(
         self, seen: Sensed, place: Point, way: Floats, radius: float, most_turn: float
     ) -> None:
-        self._place, self._way, self._radius = place, way, radius
-        self._turn, self._until = most_turn, seen.now + LONGEST_ASIDE
-        self._arrived, self._free_since, self._moved = False, math.inf, seen.now
+        self._place = place
+        self._way = way
+        self._radius = radius
+        self._turn = most_turn
+        self._until = seen.now + LONGEST_ASIDE
+        self._arrived = False
+        self._free_since = math.inf
+        self._moved = seen.now
 
     def step(self, seen: Sensed) -> Intent | None:
         """Drive there, stand, and go on when the way has been free for a moment."""
@@ -159,7 +169,8 @@ class Aside(Manoeuvre):
         """Return True if nobody is on the path ahead, or will be in a moment."""
         for other in seen.nearby:
             for ahead in (0.0, 1.0, 2.0):
-                x, y = other.x + ahead * other.vx, other.y + ahead * other.vy
+                x = other.x + ahead * other.vx
+                y = other.y + ahead * other.vy
                 gap = float(np.hypot(*(self._way - (x, y)).T).min())
                 if gap < self._radius + other.radius + PASSED:
                     return False
@@ -191,9 +202,13 @@ class Inspection:
         sees: Callable[[Point, Point], bool],
         most_turn: float,
     ) -> None:
-        self._event, self._place, self._sees, self._most = event, place, sees, most_turn
+        self._event = event
+        self._place = place
+        self._sees = sees
+        self._most = most_turn
         self._since = self._nothing_since = math.inf
-        self._turned, self._heading = 0.0, 0.0
+        self._turned = 0.0
+        self._heading = 0.0
 
     def begins(self, seen: Sensed) -> bool:
         """Return True once the robot is where it can look from."""

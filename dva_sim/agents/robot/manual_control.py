@@ -26,7 +26,8 @@ class ManualControl:
 
     def take(self, who: str) -> Decision:
         """Somebody takes the robot in hand, if it is idle and nobody holds it."""
-        robot, now = self._robot, self._robot.device.clock.now
+        robot = self._robot
+        now = self._robot.device.clock.now
         if robot.device.silent or not robot.body.powered:
             return Decision(m.BUSY, "its computer does not answer")
         before = self._controller.by_hand
@@ -41,7 +42,8 @@ class ManualControl:
 
     def drive(self, who: str, speed: float, turn_rate: float) -> Decision:
         """The hand wants a speed [m/s] and a turn rate [rad/s]."""
-        robot, now = self._robot, self._robot.device.clock.now
+        robot = self._robot
+        now = self._robot.device.clock.now
         if robot.device.silent:
             return Decision(m.BUSY, "its computer does not answer")
         decision = self._controller.drive_by_hand(who, speed, turn_rate, now)
@@ -51,7 +53,8 @@ class ManualControl:
 
     def let_go(self, who: str) -> Decision:
         """The hand gives the robot up, which stops it."""
-        robot, now = self._robot, self._robot.device.clock.now
+        robot = self._robot
+        now = self._robot.device.clock.now
         decision = self._controller.let_go(who)
         if decision.code != m.OK:
             return decision
@@ -63,7 +66,8 @@ class ManualControl:
 
     def press_emergency(self) -> None:
         """Press the button at the robot itself: it stands until it is released."""
-        robot, now = self._robot, self._robot.device.clock.now
+        robot = self._robot
+        now = self._robot.device.clock.now
         before = self._controller.mode
         decision = self._controller.stop(now)
         self._done("", "stops", decision, now)

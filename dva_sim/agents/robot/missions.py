@@ -115,8 +115,12 @@ class Pilot:
         reach: Reach,
         turning_radius: float = 0.0,
     ) -> None:
-        self._errand, self._planner, self._guard, self._reach = errand, planner, guard, reach
-        self._radius, self._sharpest = guard.radius, turning_radius
+        self._errand = errand
+        self._planner = planner
+        self._guard = guard
+        self._reach = reach
+        self._radius = guard.radius
+        self._sharpest = turning_radius
         self._avoidance = Avoidance(name, guard.radius, planner.room_at)
         self._driver = PurePursuit(AUTOPILOT, reach)
         self._inspection = self._make_inspection()
@@ -125,7 +129,8 @@ class Pilot:
         self._begin_leg()
 
     def _make_inspection(self) -> Inspection | None:
-        event, place = self._errand.event, self._errand.goals[0]
+        event = self._errand.event
+        place = self._errand.goals[0]
         if event is None:
             return None
         return Inspection(event, place, self._planner.line_of_sight, self._reach.turn_rate)
@@ -135,8 +140,10 @@ class Pilot:
         self._manoeuvre: Manoeuvre | None = None
         self._closed: list[Disc] = []
         self._tried: list[float] = []
-        self._side, self._jams = 0.0, 0
-        self._blocked_since, self._looked_around = math.inf, -math.inf
+        self._side = 0.0
+        self._jams = 0
+        self._blocked_since = math.inf
+        self._looked_around = -math.inf
         self._left_aside: str | None = None
         self._moved = -math.inf  # when who is in the way was last seen to move [s]
         self._progress = (math.inf, math.inf)  # the shortest way left [m], and since when [s]
@@ -193,7 +200,8 @@ class Pilot:
         lane = self._avoidance.lane(route, along, seen.here, seen.nearby, self._side)
         if isinstance(lane, Blocked):
             return self._wait(seen, route, along, lane)
-        self._side, self._blocked_since = lane.side, math.inf
+        self._side = lane.side
+        self._blocked_since = math.inf
         return self._move(seen, self._drive(Route(lane.points), seen), "under_way")
 
     def _drive(self, route: Route, seen: Sensed) -> Intent:
@@ -214,7 +222,8 @@ class Pilot:
 
     def _arrive(self) -> PilotStep:
         self._reached += 1
-        laps, goals = self._errand.laps, len(self._errand.goals)
+        laps = self._errand.laps
+        goals = len(self._errand.goals)
         if laps and self._reached >= laps * goals:
             return self._end("done")
         self._begin_leg()
@@ -256,7 +265,8 @@ class Pilot:
             return self._end("failed", "no way")
         if waited > SAY_AFTER and self._is_taken(route.length - along, blocked.by):
             return self._arrive()
-        crowded, person = blocked.gap < SQUEEZE, blocked.by.kind == "person"
+        crowded = blocked.gap < SQUEEZE
+        person = blocked.by.kind == "person"
         if waited > ASIDE_AFTER and crowded and not person and self._lets_pass(seen, blocked.by):
             aside = self._step_aside(seen, route, along, blocked.by)
             if aside is not None:
@@ -305,7 +315,8 @@ class Pilot:
 
     def _way_around(self, seen: Sensed) -> PilotStep | None:
         """Plan again with everybody in sight as part of the map."""
-        self._looked_around, before = seen.now, self._closed
+        self._looked_around = seen.now
+        before = self._closed
         self._closed = [Disc(o.x, o.y, o.radius + o.keep + AROUND) for o in seen.nearby]
         points = self._planner.path(seen.here, self._goal, self._closed)
         if points is None:
@@ -323,7 +334,8 @@ class Pilot:
             return self._end("failed", "jammed")
         heading = seen.view.heading
         nose = self._radius + 0.1
-        x, y = seen.view.x + nose * math.cos(heading), seen.view.y + nose * math.sin(heading)
+        x = seen.view.x + nose * math.cos(heading)
+        y = seen.view.y + nose * math.sin(heading)
         self._closed.append(Disc(x, y, 0.1))
         recovery = JamRecovery(seen, self._guard, self._reach.turn_rate, [heading, *self._tried])
         self._tried.append(recovery.heading)
@@ -333,6 +345,7 @@ class Pilot:
     def _go_on_with(self, manoeuvre: Manoeuvre, seen: Sensed) -> PilotStep:
         intent = manoeuvre.step(seen)
         if intent is None:
-            self._manoeuvre, self._route = None, None
+            self._manoeuvre = None
+            self._route = None
             return PilotStep(STAND, "under_way", self._left)
         return self._move(seen, intent, manoeuvre.state, manoeuvre.reason)

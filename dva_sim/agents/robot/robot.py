@@ -141,20 +141,26 @@ class RobotAgent:
         setup: RobotSetup,
         drive_of: Callable[[str], DriveLog | None],
     ) -> None:
-        self.device, self.controller = device, controller
+        self.device = device
+        self.controller = controller
         device.meanwhile = "it obeys its driver as before"
         device.clock.on_suspended(self._woke)
-        self.body, self._world, self._planner, self._setup = body, world, planner, setup
+        self.body = body
+        self._world = world
+        self._planner = planner
+        self._setup = setup
         self._drive_of = drive_of
         self.applied = self.refused = 0
         self.picture_age: float | None = None
         self.set_point = STAND
         self.filmed: Callable[[str, CameraFrame], object] | None = None
         self.trace: DecisionLog | None = None
-        self.unfit, self.takes_missions = "", True
+        self.unfit = ""
+        self.takes_missions = True
         self.refuses: int | None = None
         self.blind = self.drained = False
-        self._fared, self._held_since = m.OK, 0.0
+        self._fared = m.OK
+        self._held_since = 0.0
         # Who holds it, and how that fares, as was published last.
         self._last_published: tuple[str | None, int] = (None, m.WRONG_MODE)
         self.inbox = CommandQueue(
@@ -204,7 +210,9 @@ class RobotAgent:
         """Return what the camera sees now."""
         now = self.device.clock.now
         self._world.advance_to(now)
-        body, view, tick = self.body, self._setup.view, self.controller.tick(now)
+        body = self.body
+        view = self._setup.view
+        tick = self.controller.tick(now)
         x, y, heading = body.pose()
         hazards = view.look(x, y, heading, self._setup.hazards(now))
         visibility = view.visibility(x, y, heading)
@@ -302,7 +310,8 @@ class RobotAgent:
 
     def _stand(self) -> None:
         """Stand idle until a new order, and publish that."""
-        before, now = self.controller.mode, self.device.clock.now
+        before = self.controller.mode
+        now = self.device.clock.now
         decision = self.controller.stand(now)
         self.device.recorder.on_hand(ByHand(self.device.id_tag, "", "stands", now))
         self._happened(STANDS)
@@ -315,13 +324,15 @@ class RobotAgent:
 
     def return_to_service(self) -> None:
         """Take orders again: what made the robot unfit is over."""
-        self.unfit, self.device.withdrawn = "", False
+        self.unfit = ""
+        self.device.withdrawn = False
         self.device.tell("can be driven again", "mode")
 
     def power(self, on: bool) -> None:
         """Give motors, computer and radio power, or none: then it brakes, and is silent."""
         if on is not self.body.powered:
-            self.body.powered, self.device.silent = on, not on
+            self.body.powered = on
+            self.device.silent = not on
             self.device.tell("has power again" if on else "has no power left: it is silent", "link")
 
     # --- messages ----------------------------------------------------------------------
@@ -401,9 +412,12 @@ class RobotAgent:
         return m.Reply(message.message_id, decision.code, decision.text, decision.content)
 
     def _decide(self, message: m.Message, arrived: float, waited: bool = False) -> Decision:
-        now, moving = self.device.clock.now, self.is_moving
-        controller, is_command = self.controller, isinstance(message.body, m.SetTeleOp)
-        before, mission = controller.mode, controller.mission_status
+        now = self.device.clock.now
+        moving = self.is_moving
+        controller = self.controller
+        is_command = isinstance(message.body, m.SetTeleOp)
+        before = controller.mode
+        mission = controller.mission_status
         unable = self._unable(message)
         if unable is None:
             decision = controller.handle(message, arrived, now, moving, waited)
@@ -455,7 +469,8 @@ class RobotAgent:
 
     def _dva_answered(self, reply: m.Reply) -> Decision:
         """The DVA has answered what it was asked, over a connection of the robot's own."""
-        me, dva = self.device.id_tag, self.device.dva
+        me = self.device.id_tag
+        dva = self.device.dva
         answer = m.Message(me, 1, dva, "00:00:00", 0, reply)
         return self._decide(answer, self.device.clock.now)
 
@@ -484,7 +499,9 @@ class RobotAgent:
 
     def _publish_holder(self) -> None:
         """Say who holds the robot, to those who listen: who publishes commands gets no answer."""
-        network, me, fares = self.device.network, self.device.id_tag, self._fares
+        network = self.device.network
+        me = self.device.id_tag
+        fares = self._fares
         self._last_published = self._holder, fares if fares in m.OBEYS_NO_MORE else m.OK
         held = min(self.device.clock.now - self._held_since, LONGEST_HELD)
         if network.ready(me, HOLDER, WHATEVER_WAITS):
@@ -511,7 +528,8 @@ class RobotAgent:
         self._ask_for_release()
 
     def _publish_emergency(self) -> None:
-        network, me = self.device.network, self.device.id_tag
+        network = self.device.network
+        me = self.device.id_tag
         if network.ready(me, EMERGENCY, WHATEVER_WAITS):
             self.device.publish(EMERGENCY, self.controller.latch.message(self.device.clock.now))
 
@@ -553,7 +571,8 @@ class RobotAgent:
 
     def _bid(self, announced: m.TaskAnnouncement) -> None:
         """Offer to be driven there, by the robot's own map."""
-        place, pose = announced.position, self.body.pose()
+        place = announced.position
+        pose = self.body.pose()
         goal = self.device.frame.to_xy(place.latitude, place.longitude)
         way = self._planner.distance((pose.x, pose.y), goal)
         arrival = EXPECTED_READY + way / EXPECTED_SPEED
@@ -568,7 +587,8 @@ class RobotAgent:
         tick = message.body.seen_tick
         if tick is not None:
             self.picture_age = (self.controller.tick(now) - tick) / 1000
-        number, recorder = message.message_id, self.device.recorder
+        number = message.message_id
+        recorder = self.device.recorder
         recorder.on_accepted(
             make_accepted(
                 robot=self.device.id_tag,
@@ -613,7 +633,9 @@ class RobotAgent:
 
     def _take_frame(self) -> None:
         """Send a frame to the viewers; skip it while the last one still waits."""
-        network, me, size = self.device.network, self.device.id_tag, self._setup.frame_bytes
+        network = self.device.network
+        me = self.device.id_tag
+        size = self._setup.frame_bytes
         if self.device.silent or self.blind or self._encoding or not network.ready(me, FRAME, size):
             return
         frame = make_frame(self.observe(), self.device.clock.now)

@@ -86,7 +86,9 @@ class SensorSubscriptions:
         tick: Callable[[float], int],
         may_read: Callable[[str, str], bool],
     ) -> None:
-        self._device, self._sensors, self._tick_of = device, sensors, tick
+        self._device = device
+        self._sensors = sensors
+        self._tick_of = tick
         self._may_read = may_read
         self._subscribed: dict[tuple[str, str], _Subscribed] = {}
         self._ticking = False
@@ -271,15 +273,20 @@ class RobotSensor:
     """
 
     def __init__(self, config: SensorConfig, source: Source, streams: StreamsByName) -> None:
-        self.kind, self._rate = config.as_kind(), config.rate_hz
-        self._source, self._streams = source, streams
+        self.kind = config.as_kind()
+        self._rate = config.rate_hz
+        self._source = source
+        self._streams = streams
         times = {fault.kind: math.inf for fault in config.faults}
         for number, fault in enumerate(config.faults):
             when = fault.time(streams(f"fault {number}"))
             times[fault.kind] = min(times[fault.kind], when)
-        self._lost_at, self._stuck_at = times.get("lost", math.inf), times.get("stuck", math.inf)
-        self._sample, self._shown = -1, Values()
-        self._lagged, self._time = np.empty(0), -math.inf
+        self._lost_at = times.get("lost", math.inf)
+        self._stuck_at = times.get("stuck", math.inf)
+        self._sample = -1
+        self._shown = Values()
+        self._lagged = np.empty(0)
+        self._time = -math.inf
         self._noise: tuple[int, Floats] = -1, np.empty(0)
 
     def read(self, now: float) -> Values:
@@ -307,7 +314,8 @@ class RobotSensor:
         if len(self._lagged) != len(truth):
             self._lagged = truth
         share = math.exp(-(now - self._time) / self.kind.lag)
-        self._lagged, self._time = truth + share * (self._lagged - truth), now
+        self._lagged = truth + share * (self._lagged - truth)
+        self._time = now
         return self._lagged
 
     def _normals(self, sample: int, count: int) -> Floats:

@@ -131,7 +131,8 @@ class Accelerometer:
         self._warming = mg * part.offset_mg_per_k * warming
         self._drift = mg * part.drift_mg_per_sqrt_min * math.sqrt(self.period / 60.0)
         self._errors = self._drawn(noise, part.noise, block)
-        self._step, self._range = mg * part.resolution_mg, GRAVITY * part.range_g
+        self._step = mg * part.resolution_mg
+        self._range = GRAVITY * part.range_g
         intervals = _intervals(times, self.period, jitter, block) if jitter else repeat(self.period)
         self.interval: Callable[[], float] = intervals.__next__
         self.begin_session()
@@ -139,7 +140,9 @@ class Accelerometer:
     def begin_session(self) -> None:
         """Begin a session: the phone is warmer or colder than when it was calibrated."""
         x, y, z = self._sessions.normal(0.0, self._warming, 3).tolist()
-        self._x, self._y, self._z = self.offset[0] + x, self.offset[1] + y, self.offset[2] + z
+        self._x = self.offset[0] + x
+        self._y = self.offset[1] + y
+        self._z = self.offset[2] + z
 
     def sample(self, pitch: float, roll: float) -> Triple:
         """Return the reading of a phone at rest at these angles [rad]: x, y, z [m/s^2]."""
@@ -148,7 +151,8 @@ class Accelerometer:
         x += self._x + GRAVITY * sin(pitch)
         y += self._y + flat * sin(roll)
         z += self._z + flat * cos(roll)
-        step, most = self._step, self._range
+        step = self._step
+        most = self._range
         if step:
             x = (x / step + WHOLE - WHOLE) * step
             y = (y / step + WHOLE - WHOLE) * step
@@ -182,7 +186,8 @@ def _intervals(
     """
 
     def blocks() -> Iterator[list[float]]:
-        last, most = 0.0, 0.4 * period
+        last = 0.0
+        most = 0.4 * period
         while True:
             cut = np.clip(rng.normal(0.0, jitter * period, block), -most, most)
             late = np.round(cut / TICK) * TICK

@@ -76,7 +76,9 @@ class Trail:
         """A drive begins; what is behind the tilt until a picture is followed counts from now."""
         self._filter = self._make_filter()
         # Since the beginning, as empty slots of a filter hold a zero.
-        self._begun, self._asked, self._hand = now, 0.0, 0.0
+        self._begun = now
+        self._asked = 0.0
+        self._hand = 0.0
 
     def follow(self, captured: float) -> None:
         """From now on the hand follows what a picture captured at that time [s] led to."""
@@ -93,7 +95,9 @@ class Trail:
 
     def sample(self, count: int, decay: float) -> None:
         """So many samples; from each to the next the hand keeps the share `decay`."""
-        asked, hand, add = self._asked, self._hand, self._filter.add
+        asked = self._asked
+        hand = self._hand
+        add = self._filter.add
         for _ in range(count):
             hand = asked + (hand - asked) * decay
             add((hand, hand))
@@ -139,10 +143,14 @@ class TiltApp:
     def __init__(
         self, profile: PhoneProfile, reference: Triple, period: float, decay: float = 0.0
     ) -> None:
-        self._profile, self._period, self._decay = profile, period, decay
-        self._ideal, self.keeps_alive = profile.ideal, profile.send == "keep_alive"
+        self._profile = profile
+        self._period = period
+        self._decay = decay
+        self._ideal = profile.ideal
+        self.keeps_alive = profile.send == "keep_alive"
         self.waits = profile.while_open != "take"
-        self._queues, self._on_sample = profile.while_open == "queue", profile.values_at == "sample"
+        self._queues = profile.while_open == "queue"
+        self._on_sample = profile.values_at == "sample"
         self._app = calibrated(profile, reference)
         reading = self._app.reading
         before = profile.limits == "before_filter"
@@ -162,7 +170,8 @@ class TiltApp:
         self.shown: Reading = (0.0, 0.0)
         self.samples = self.values = 0
         self._last_key: tuple[int, int] | None = None
-        self._fresh, self._held = 0, False
+        self._fresh = 0
+        self._held = False
         self._queue: deque[tuple[float, Reading, float]] = deque()
         self._heard_at = now
         self._taken_at = self._stems_from = self._sampled_at = self._captured = now
@@ -211,7 +220,8 @@ class TiltApp:
         if self._batch is None or self._ideal:
             return now + min(self._app.max_delay, BATCH * self._period)
         self._advance(now)
-        coming, due = self._next_sample, self._due
+        coming = self._next_sample
+        due = self._due
         if self._on_sample and math.isfinite(due):
             due = coming + max(0, math.ceil((due - TIE - coming) / self._period)) * self._period
         complete = coming + (self._batch - self._fresh - 1) * self._period
@@ -270,7 +280,8 @@ class TiltApp:
         """Put a sample of that time [s] into the filter."""
         self._filter.add(reading)
         self._fresh += 1
-        passed, self._sampled_at = at - self._sampled_at, at
+        passed = at - self._sampled_at
+        self._sampled_at = at
         if self._watches:
             self._watch(passed)
 
@@ -297,10 +308,13 @@ class TiltApp:
 
     def _take_value(self, at: float) -> None:
         """A batch is complete, or its time is over."""
-        self.samples, self.values = self.samples + self._fresh, self.values + 1
+        self.samples += self._fresh
+        self.values += 1
         reading = self._filter.value()
         self._stems_from = self._sampled_at - self._filter.age * self._period
         self._captured = self._trail.captured()
         # A real phone's samples may come after the moment until which a value stood.
         self.shown = self._mapping.command(*reading, max(0.0, at - self._taken_at))
-        self._taken_at, self._due, self._fresh = at, at + self._app.max_delay, 0
+        self._taken_at = at
+        self._due = at + self._app.max_delay
+        self._fresh = 0

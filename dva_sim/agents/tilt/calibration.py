@@ -38,10 +38,12 @@ class Calibration:
         turn_step: float = 0.12,
         max_delay: float = 0.5,
     ) -> None:
-        self.reference, self.max_delay = reference, max_delay
+        self.reference = reference
+        self.max_delay = max_delay
         self._x, self._y, z = reference
         self._z = z if abs(z) > SIDE_KNOWN else 0.0
-        self._speed_step, self._turn_step = speed_step, turn_step
+        self._speed_step = speed_step
+        self._turn_step = turn_step
 
     def reading(self, ax: float, ay: float, az: float) -> Reading:
         """Return level and turn [deg/s] of a sample; z only tells which side is up."""

@@ -39,7 +39,9 @@ def to_tilt_axes(measured: Triple, orientation: int = 0, ios: bool = False) -> T
     """
     x, y, z = measured
     if ios:
-        x, y, z = -x, -y, -z
+        x = -x
+        y = -y
+        z = -z
     right_x, right_y, top_x, top_y = _SCREEN[orientation]
     return -(top_x * x + top_y * y), right_x * x + right_y * y, z
 
@@ -48,5 +50,6 @@ def to_device_axes(tilt: Triple, orientation: int = 0, ios: bool = False) -> Tri
     """The inverse of `to_tilt_axes`: what a browser would tell."""
     forwards, left, z = tilt
     right_x, right_y, top_x, top_y = _SCREEN[orientation]
-    x, y = right_x * left - top_x * forwards, right_y * left - top_y * forwards
+    x = right_x * left - top_x * forwards
+    y = right_y * left - top_y * forwards
     return (-x, -y, -z) if ios else (x, y, z)

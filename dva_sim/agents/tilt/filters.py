@@ -89,9 +89,14 @@ class BatchMedian(Filter):
 
     def __init__(self, period: float, slots: int = BATCH, in_place: bool = False) -> None:
         super().__init__(period)
-        self._slots, self._in_place = slots, in_place
-        self._filled, self._taken, self._age = 0, 0, 0.0
-        self._speed, self._turn, self._rise = [0.0] * slots, [0.0] * slots, [0.0] * slots
+        self._slots = slots
+        self._in_place = in_place
+        self._filled = 0
+        self._taken = 0
+        self._age = 0.0
+        self._speed = [0.0] * slots
+        self._turn = [0.0] * slots
+        self._rise = [0.0] * slots
 
     @override
     def add(self, sample: Reading) -> None:
@@ -286,7 +291,8 @@ def check_filter(filter_: Filter) -> None:
     Raises:
         ConfigError: its `batch` is neither None nor from 1 to 1000, or its `age` is invalid.
     """
-    batch, age = filter_.batch, filter_.age
+    batch = filter_.batch
+    age = filter_.age
     if batch is not None and not (type(batch) is int and 1 <= batch <= MOST_BATCH):
         wanted = f"None or a whole number, 1 to {MOST_BATCH}"
         raise ConfigError(f"its batch is {batch!r}; should be {wanted}")
@@ -315,7 +321,8 @@ class GuardedFilter(Guard, Filter):
     def __init__(self, filter_: Filter, period: float) -> None:
         check_filter(filter_)
         super().__init__(period)
-        self._filter, self.batch = filter_, filter_.batch
+        self._filter = filter_
+        self.batch = filter_.batch
         self._took = True
 
     @override

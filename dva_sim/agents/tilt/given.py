@@ -54,7 +54,8 @@ class GivenTilt(TiltApp):
         # An ideal phone sends the desired command.
         if self._ideal:
             self.shown = self._wanted
-            self._stems_from, self._captured = now, self._trail.asked
+            self._stems_from = now
+            self._captured = self._trail.asked
         return super().look(now)
 
     def _advance(self, now: float) -> None:

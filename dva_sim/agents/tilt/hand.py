@@ -57,8 +57,11 @@ class Hand:
         tremor_width: float = 2.0,
         block: int = 256,
     ) -> None:
-        self._lag, self._noise, self._tremor = lag, motor_noise, tremor
-        self._max_tilt, self._max_speed = max_tilt, max_speed
+        self._lag = lag
+        self._noise = motor_noise
+        self._tremor = tremor
+        self._max_tilt = max_tilt
+        self._max_speed = max_speed
         self._damping = math.pi * tremor_width
         self._draws = _draws(rng, block)
         self._shake_pitch, self._shake_roll, self._off_pitch, self._off_roll = next(self._draws)

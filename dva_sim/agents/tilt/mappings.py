@@ -77,7 +77,8 @@ class AbsoluteMapping(Mapping):
         self._gain = options.number("gain", gain, above=0)
         self._speed_gain = options.number("speed_gain", speed_gain, above=0)
         share = options.number("dead_zone", dead_zone, least=0, below=1)
-        self._dead_level, self._dead_turn = share * LEVELS, share * MAX_TURN_DEG
+        self._dead_level = share * LEVELS
+        self._dead_turn = share * MAX_TURN_DEG
 
     @override
     def command(self, level: float, turn: float, dt: float) -> Reading:
@@ -280,7 +281,8 @@ class GuardedMapping(Guard, Mapping):
     @override
     def begin(self) -> None:
         # Failures are counted by drive.
-        self.failures, self.first_failure = 0, ""
+        self.failures = 0
+        self.first_failure = ""
         try:
             self._mapping.begin()
         except FAILURES as error:

@@ -119,7 +119,8 @@ class Phone(TiltApp):
         super().pick_up(now)
         self._accelerometer.begin_session()
         self._hand.rest()
-        self._wanted, self._aim = (0.0, 0.0), (0.0, 0.0)
+        self._wanted = (0.0, 0.0)
+        self._aim = (0.0, 0.0)
         self._perceived = deque([self.shown], maxlen=self._late + 1)
         self._step = self._interval()
         self._sample_at = now + self._step
@@ -144,7 +145,8 @@ class Phone(TiltApp):
         # An ideal phone sends the desired command.
         if self._ideal:
             self.shown = limited(*self._wanted)
-            self._stems_from, self._captured = now, self._trail.asked
+            self._stems_from = now
+            self._captured = self._trail.asked
         return super().look(now)
 
     @property
@@ -180,10 +182,18 @@ class Phone(TiltApp):
 
     def _sample_until(self, end: float) -> None:
         """Samples that are due, or until a batch is complete: hand, part, calibration, filter."""
-        step, sample, interval = self._hand.step, self._accelerometer.sample, self._interval
-        read, add, watches, batch = self._read, self._filter.add, self._watches, self._batch
-        (rest_pitch, rest_roll), (pitch, roll) = self._rest, self._aim
-        at, dt, fresh = self._sample_at, self._step, self._fresh
+        step = self._hand.step
+        sample = self._accelerometer.sample
+        interval = self._interval
+        read = self._read
+        add = self._filter.add
+        watches = self._watches
+        batch = self._batch
+        (rest_pitch, rest_roll) = self._rest
+        (pitch, roll) = self._aim
+        at = self._sample_at
+        dt = self._step
+        fresh = self._fresh
         while at <= end and fresh != batch:
             if watches:
                 pitch, roll = self._aim_at(self._perceived[0])
@@ -197,7 +207,9 @@ class Phone(TiltApp):
             at += dt
         if fresh != self._fresh:
             self._trail.sample(fresh - self._fresh, self._decay)
-        self._sample_at, self._step, self._fresh = at, dt, fresh
+        self._sample_at = at
+        self._step = dt
+        self._fresh = fresh
 
     def _miss_until(self, end: float) -> None:
         """Samples that come while a request is open: the hand moves on, and the app is busy."""

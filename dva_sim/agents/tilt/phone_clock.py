@@ -25,7 +25,9 @@ class PhoneClock:
 
     def __init__(self) -> None:
         self.offset = math.inf
-        self._last_stamp, self._came, self._last = -math.inf, -math.inf, -math.inf
+        self._last_stamp = -math.inf
+        self._came = -math.inf
+        self._last = -math.inf
 
     def is_old(self, stamp: float) -> bool:
         """Return True if what was told for a time [s] is obsolete."""
@@ -42,7 +44,8 @@ class PhoneClock:
             self.offset = math.inf
         grown = self.offset + DRIFT * (came - self._came)
         self.offset = min(came - stamps[-1], grown)
-        self._last_stamp, self._came = stamps[-1], came
+        self._last_stamp = stamps[-1]
+        self._came = came
         return [self._set(one, came) for one in stamps]
 
     def _set(self, stamp: float, came: float) -> float:

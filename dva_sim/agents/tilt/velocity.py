@@ -20,11 +20,13 @@ class GivenVelocity(GivenTilt):
 
     @override
     def ask(self, now: float, speed: float, turn_rate: float) -> None:
-        self._velocity, self._given_at = (speed, turn_rate), now
+        self._velocity = (speed, turn_rate)
+        self._given_at = now
 
     @override
     def look(self, now: float) -> TiltCommand | None:
-        velocity, self._velocity = self._velocity, None
+        velocity = self._velocity
+        self._velocity = None
         if velocity is None:
             return None
         self.samples += 1

@@ -72,8 +72,11 @@ class ActionDispatcher:
         elsewhere: str,
         audited: Callable[[], AuditedActions | None] = lambda: None,
     ) -> None:
-        self._tell, self._elsewhere, self._audited = tell, elsewhere, audited
-        self._answers, self._doers = Answers(), doers_of(holders)
+        self._tell = tell
+        self._elsewhere = elsewhere
+        self._audited = audited
+        self._answers = Answers()
+        self._doers = doers_of(holders)
         declared = {name for name, one in _KNOWN.items() if place in one.at}
         if declared != self._doers.keys():
             differ = ", ".join(sorted(declared ^ self._doers.keys()))
@@ -81,7 +84,9 @@ class ActionDispatcher:
 
     def take(self, line: Asked) -> None:
         """Do what a line asks for; nothing that it can hold does any harm."""
-        what, client, number = str(line.get("do", "")), str(line.get("client", "")), line.get("id")
+        what = str(line.get("do", ""))
+        client = str(line.get("client", ""))
+        number = line.get("id")
         known = _KNOWN.get(what)
         if known is not None and not known.has_answer:
             self._hear(what, client, line)
@@ -111,7 +116,8 @@ class ActionDispatcher:
         do = self._doers.get(what)
         if do is None:
             raise Refused(self._elsewhere.format(what=what))
-        asked, audited = _checked(line), self._audited()
+        asked = _checked(line)
+        audited = self._audited()
         if audited is not None:
             on_result = audited.answered(what, client, asked, on_result)
         answering(partial(do, client, asked), on_result)

@@ -91,7 +91,8 @@ class Seats:
         seat = self.taken.get(client)
         if seat is None:
             return False
-        seat.heard, seat.holds = now, holds
+        seat.heard = now
+        seat.holds = holds
         return True
 
     def silent(self, now: float) -> list[str]:

@@ -95,9 +95,11 @@ def positions(
         if status is None:
             continue
         x, y = frame.to_xy(status.position.latitude, status.position.longitude)
-        heading, speed = 0.0, 0.0
+        heading = 0.0
+        speed = 0.0
         if isinstance(status, m.RobotStatus):
-            heading, speed = math.remainder(status.heading, 2.0 * math.pi), status.speed
+            heading = math.remainder(status.heading, 2.0 * math.pi)
+            speed = status.speed
         whole = round(100 * x), round(100 * y), round(1000 * heading), round(1000 * speed)
         rows.append([numbers[id_tag], *whole])
     return rows
@@ -118,7 +120,8 @@ def robot_row(
     device_state: DeviceState, number: int, now: float, labels: Mapping[str, str]
 ) -> RobotRow:
     """A robot, as it says itself."""
-    status, holder = device_state.status, device_state.holder
+    status = device_state.status
+    holder = device_state.holder
     known = status if isinstance(status, m.RobotStatus) else None
     holding, since = holder if holder is not None else (None, now)
     held = holding is not None and holding.holder is not None
@@ -161,7 +164,9 @@ def _reading(sensor: m.Sensor, device_state: DeviceState, now: float) -> str:
 def device_row(device_state: DeviceState, now: float, is_fake: bool, may_revoke: bool) -> DeviceRow:
     """A device, as the DVA lists it and as it is heard here."""
     is_stopped = emergency_of(device_state, now, {}) is not None
-    device, status, holding = device_state.device, device_state.status, device_state.holder
+    device = device_state.device
+    status = device_state.status
+    holding = device_state.holder
     silent = now - device_state.listed > SILENT_AFTER
     heard = None if device_state.heard is None else now - device_state.heard
     doing = status.mode if isinstance(status, m.RobotStatus) else None

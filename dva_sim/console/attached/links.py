@@ -6,11 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from dva_sim.agents.device import do_nothing
-from dva_sim.console.attached.options import AttachOptions
+from dva_sim.console.attached.options import listening_address, own_id
 from dva_sim.kernel.recorder import Recorder
-from dva_sim.network.connections import ZeromqConfig
+from dva_sim.network.keys import KeyRing
 from dva_sim.network.messaging import Transport
 from dva_sim.network.realtime import PacedClock
+from dva_sim.network.sockets import SocketNetwork
+from dva_sim.options.runs import ConsoleOptions
 from dva_sim.simulation.full.stage import DVA
 
 
@@ -39,22 +41,25 @@ class AttachedLinks:
         self.recorder.tell(self.clock.now, "console", text, "link")
 
 
-def over_sockets(options: AttachOptions) -> AttachedLinks:
-    """By ZeroMQ, with keys if they are wanted, or by MQTT.
+def over_sockets(options: ConsoleOptions) -> AttachedLinks:
+    """Open a place by ZeroMQ, with keys if there are any.
 
     Raises:
         ConfigError: keys cannot be read.
         NetworkError: no port can be had.
     """
-    ring = options.ring()
-    own, clock, recorder = options.own_id(ring), PacedClock(), Recorder()
+    ring = None if options.keys is None else KeyRing(options.keys)
+    dva = str(options.dva)
+    own = own_id(ring)
+    clock = PacedClock()
+    recorder = Recorder()
 
     def note(text: str) -> None:
         recorder.tell(clock.now, "console", text, "link")
 
-    network = options.carrier.open(clock, ring, note, ZeromqConfig(), options.dva)
-    network.introduce(DVA, options.dva)
-    address = network.join(own, options.listen)
+    network = SocketNetwork(clock, ring, note)
+    network.introduce(DVA, dva)
+    address = network.join(own, listening_address(dva))
     return AttachedLinks(
         clock=clock,
         recorder=recorder,

@@ -5,13 +5,14 @@ While the DVA does not answer, what it last said stays shown, with a word that s
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
+from dva_sim.agents.robot.controller import Mode
 from dva_sim.cameras.lines import Show
 from dva_sim.console.attached import lines
-from dva_sim.console.attached.alarm_facts import RemoteAlarmFacts
 from dva_sim.console.attached.audit import AttachedAudit
+from dva_sim.console.attached.lines import SILENT_AFTER
 from dva_sim.console.attached.people import AttachedPeople
 from dva_sim.console.attached.sensing import WatchedSensors
 from dva_sim.console.attached.system import AttachedSystem
@@ -24,7 +25,7 @@ from dva_sim.console.views.news import News, clock_shown
 from dva_sim.console.wire.events import SiteEventShown
 from dva_sim.console.wire.lines import Tell
 from dva_sim.console.wire.rows import DoingShown, RobotRow, ServerShown
-from dva_sim.core.registry import ROBOT
+from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.protocol import messages as m
 
 POSITIONS, ROWS, DEVICES, SOON = 0.2, 0.5, 1.0, 0.1  # from one line to the next, real time [s]
@@ -48,16 +49,20 @@ class AttachedPages:
     """
 
     def __init__(self, system: AttachedSystem, audit: AuditKeeper) -> None:
-        self.system, self.clock = system, system.clock
+        self.system = system
+        self.clock = system.clock
         self.tell: Tell = lambda *_: None
         self.show: Show = lambda *_: None
         self.dropped: Callable[[], int] = lambda: 0
-        self.looked, self.people = False, AttachedPeople()
+        self.looked = False
+        self.people = AttachedPeople()
         self.sensors = WatchedSensors(system.device, system.state, system.id_of)
         self.alarms = ConsoleAlarms(RemoteAlarmFacts(system))
         self.audited = AttachedAudit(audit, system, self.people.author)
         system.on_record = self.audited.heard
-        self._answers, self._news, self._is_shown = False, News(lambda: self.tell), False
+        self._answers = False
+        self._news = News(lambda: self.tell)
+        self._is_shown = False
         system.on_devices = self._tell_scene
 
     # --- see `ConsoleSubject` --------------------------------------------------------------
@@ -94,7 +99,7 @@ class AttachedPages:
             return
         things = lines.things_of(system.state.devices.values(), system.numbers)
         self._is_shown = True
-        self.tell(lines.attached_scene(things, system.options.dva, system.site, system.frame))
+        self.tell(lines.attached_scene(things, str(system.options.dva), system.site, system.frame))
 
     def _tell_positions(self) -> None:
         system = self.system
@@ -126,13 +131,15 @@ class AttachedPages:
 
     def _tell_alarms(self) -> None:
         """Tell alarms; while the state of events is unknown, alarms stay as they are."""
-        system, now_ms = self.system, self.system.now_ms
+        system = self.system
+        now_ms = self.system.now_ms
         is_known = system.has_all_events and system.answers
         known = self.alarms.look(self._events(), [], now_ms) if is_known else None
         self._news.tell(known or self.alarms.hold(now_ms))
 
     def _robots(self) -> list[RobotRow]:
-        now, numbers = self.clock.now, self.system.numbers
+        now = self.clock.now
+        numbers = self.system.numbers
         labels = {i: entry.device.label for i, entry in self.system.state.devices.items()}
         labels[self.system.device.id_tag] = self.system.device.label
         return [
@@ -153,7 +160,7 @@ class AttachedPages:
         system = self.system
         return {
             "listens": system.answers,
-            "address": system.options.dva,
+            "address": str(system.options.dva),
             "port": None,
             "modelled": False,
             "own": False,
@@ -162,7 +169,8 @@ class AttachedPages:
 
     def _tell_news(self) -> None:
         """Events, how orders are given, and the story, as soon as they change."""
-        system, now_ms = self.system, self.system.now_ms
+        system = self.system
+        now_ms = self.system.now_ms
         if system.has_all_events:
             self._news.tell({"k": "events", "t": now_ms, "events": self._events()})
         dispatch = dispatch_shown(system.agent.dispatch, 0.0)
@@ -173,12 +181,17 @@ class AttachedPages:
             self.tell(line)
 
     def _events(self) -> list[SiteEventShown]:
-        system, agent = self.system, self.system.agent
+        system = self.system
+        agent = self.system.agent
         labels = {i: entry.device.label for i, entry in system.state.devices.items()}
         return [
             {
                 **lines.event_row(
-                    *(status, agent.received_at[number], labels, system.site, system.frame)
+                    status,
+                    received_at=agent.received_at[number],
+                    labels=labels,
+                    site=system.site,
+                    frame=system.frame,
                 ),
                 **about_event(agent.events, agent.received_at, number),
             }
@@ -187,9 +200,47 @@ class AttachedPages:
 
     def _tell_devices(self) -> None:
         if self.looked:
-            now, may = self.clock.now, self.system.role == "supervise"
+            now = self.clock.now
+            may = self.system.role == "supervise"
             rows = [
                 lines.device_row(entry, now, self.system.is_fake(id_tag), may)
                 for id_tag, entry in self.system.state.devices.items()
             ]
             self.tell({"k": "devices", "t": self.system.now_ms, "devices": rows})
+
+
+class RemoteAlarmFacts:
+    """Alarm facts from messages alone; a robot's watchdog shows only as silence.
+
+    Args:
+        system: System to which the console is attached.
+    """
+
+    def __init__(self, system: AttachedSystem) -> None:
+        self._system = system
+
+    def lost(self, robots: Sequence[RobotRow]) -> Iterator[tuple[str, str]]:
+        """Robots of which nothing is heard since they were driven."""
+        for entry in self._system.state.devices.values():
+            status = entry.status
+            driven = isinstance(status, m.RobotStatus) and status.mode == Mode.TELEOPERATION.value
+            if driven and entry.heard is not None and self._is_long_ago(entry.heard):
+                yield entry.device.label, "nothing is heard of it"
+
+    def broken(self) -> tuple[()]:
+        """None is known: the rules are judged where robots and DVA are."""
+        return ()
+
+    def is_somebody_free(self) -> bool:
+        """Return True if somebody is listed who is assigned to no open event."""
+        events = self._system.agent.events.values()
+        engaged = {status.responder for status in events if status.closed_for is None}
+        return any(
+            entry.device.device_type in (ROBOT, GUARD)
+            and not self._is_long_ago(entry.listed)
+            and id_tag not in engaged
+            for id_tag, entry in self._system.state.devices.items()
+        )
+
+    def _is_long_ago(self, when: float) -> bool:
+        return self._system.clock.now - when > SILENT_AFTER

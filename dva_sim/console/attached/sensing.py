@@ -28,7 +28,9 @@ class SensorWatch:
     """
 
     def __init__(self, device: AgentDevice, device_state: DeviceState) -> None:
-        self._device, self._state, self._robot = device, device_state, device_state.device.id_tag
+        self._device = device
+        self._state = device_state
+        self._robot = device_state.device.id_tag
         self._session: int | None = None
         self._over = False
         self._subscriptions: dict[str, Subscription] = {}
@@ -107,7 +109,9 @@ class WatchedSensors:
     def __init__(
         self, device: AgentDevice, state: SystemState, id_of: Callable[[int], str | None]
     ) -> None:
-        self._device, self._state, self._id_of = device, state, id_of
+        self._device = device
+        self._state = state
+        self._id_of = id_of
         self._watches: dict[str, SensorWatch] = {}
         self._looked: list[int] = []
 

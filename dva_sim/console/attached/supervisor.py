@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from contextlib import suppress
 
-from dva_sim.cameras.children import ChildFailed
 from dva_sim.console.attached.actions import AttachedActions
 from dva_sim.console.attached.links import over_sockets
-from dva_sim.console.attached.options import AttachOptions
+from dva_sim.console.attached.options import check
 from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import auditing
 from dva_sim.console.pages.processes import ConsoleProcesses, Say
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live.process import ending_when_asked
+from dva_sim.options.runs import ConsoleOptions
+from dva_sim.serving.processes import ChildFailed
 
 
-def attach(options: AttachOptions, say: Say) -> None:
-    """Show what runs at a DVA until Ctrl-C, SIGTERM, or the end of the web process.
+def attach(options: ConsoleOptions, say: Say) -> None:
+    """Show what runs at a DVA until Ctrl-C, SIGTERM, SIGHUP, or the end of the web process.
 
     Args:
         options: Addresses of the DVA and of the page.
@@ -28,7 +29,7 @@ def attach(options: AttachOptions, say: Say) -> None:
         NetworkError: no port can be had.
         ChildFailed: the web process could not begin, or has ended by itself.
     """
-    options.check()
+    check(options)
     system = AttachedSystem(options, over_sockets(options))
     processes = ConsoleProcesses(options, say)
     about = {"dva": options.dva, "scenario": options.scenario}

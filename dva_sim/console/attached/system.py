@@ -11,11 +11,12 @@ from typing import Final
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice, do_nothing
 from dva_sim.console.attached.links import AttachedLinks
-from dva_sim.console.attached.options import AttachOptions
+from dva_sim.console.attached.options import site_shown
 from dva_sim.console.attached.system_state import SystemState
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.run.real_links import start_of_day
 from dva_sim.core.registry import CONTROL_ROOM, ROBOT
+from dva_sim.options.runs import ConsoleOptions
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.worlds.geo import GeoFrame
@@ -51,10 +52,14 @@ class AttachedSystem:
         ConfigError: the site cannot be read.
     """
 
-    def __init__(self, options: AttachOptions, links: AttachedLinks) -> None:
-        self.options, self._links = options, links
-        self.clock, self.recorder, self.note = links.clock, links.recorder, links.note
-        self.site, self.numbers = options.site(), dict[str, int]()
+    def __init__(self, options: ConsoleOptions, links: AttachedLinks) -> None:
+        self.options = options
+        self._links = links
+        self.clock = links.clock
+        self.recorder = links.recorder
+        self.note = links.note
+        self.site = site_shown(options)
+        self.numbers = dict[str, int]()
         self.frame = self.site.frame if self.site is not None else SOMEWHERE
         self.device = self._make(links.own, "control room", CONTROL_ROOM, links.address)
         self.agent = ControlRoomAgent(self.device)
@@ -62,7 +67,8 @@ class AttachedSystem:
         self.on_record: Callable[[m.AuditRecord], object] = do_nothing
         self.state = SystemState(self.device, lambda: self.on_devices())
         self.fakes = FakeDevices(self._make, self._is_known, _identity, self._drop)
-        self.has_all_events, self._heard = False, -UNHEARD
+        self.has_all_events = False
+        self._heard = -UNHEARD
 
     def start(self) -> None:
         """Take part, and ask again and again."""
@@ -93,7 +99,8 @@ class AttachedSystem:
 
     def _ask_who(self) -> None:
         def answered(reply: m.Reply) -> None:
-            was_gone, self._heard = not self.answers, self.clock.now
+            was_gone = not self.answers
+            self._heard = self.clock.now
             if reply.code == m.NOT_REGISTERED or (was_gone and self.has_all_events):
                 self._ask_again()  # it may know nothing of an earlier life
             if isinstance(reply.content, m.DeviceList):

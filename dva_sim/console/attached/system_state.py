@@ -60,7 +60,8 @@ class SystemState:
     """
 
     def __init__(self, device: AgentDevice, on_news: Callable[[], object]) -> None:
-        self._device, self._on_news = device, on_news
+        self._device = device
+        self._on_news = on_news
         self.devices: dict[str, DeviceState] = {}
 
     @property
@@ -88,19 +89,24 @@ class SystemState:
         """The DVA says what the devices can show."""
         for one in found.devices:
             if (state := self.devices.get(one.device)) is not None:
-                state.camera, state.sensors = one.camera_url, one.sensors
+                state.camera = one.camera_url
+                state.sensors = one.sensors
 
     def _meet(self, device: m.Device) -> None:
         """Subscribe to a device, again if its address has changed."""
         known = self.devices.get(device.id_tag)
         if known is not None and known.device.address == device.address:
-            known.device, known.listed = device, self._now
+            known.device = device
+            known.listed = self._now
             return
         if known is not None:
             self._leave(known)
         state = self.devices[device.id_tag] = known or DeviceState(device, self._now)
-        state.device, state.listed = device, self._now
-        network, me, node = self._device.network, self._device.id_tag, device.id_tag
+        state.device = device
+        state.listed = self._now
+        network = self._device.network
+        me = self._device.id_tag
+        node = device.id_tag
         network.introduce(node, device.address)
         for topic in TOPICS.get(device.device_type, (HEARTBEAT,)):
             heard = self._hearing(state)
@@ -111,7 +117,8 @@ class SystemState:
             message = self._device.read(data, device_state.device.id_tag)
             if message is None:
                 return
-            device_state.heard, body = self._now, message.body
+            device_state.heard = self._now
+            body = message.body
             if isinstance(body, m.RobotStatus | m.PersonStatus):
                 device_state.status = body
             elif isinstance(body, m.RobotHolder):

@@ -86,9 +86,12 @@ class AuditKeeper:
         folder = self._folder and Path(self._folder.name)
         self.path = folder / f"audit{SUFFIX}" if folder else path or Path()
         self.is_lasting = path is not None
-        self._now, self.problem, self._lost = now, "", 0
+        self._now = now
+        self.problem = ""
+        self._lost = 0
         self._log = AuditLog(self.path)
-        self.number, self.head = self._log.number, self._log.head
+        self.number = self._log.number
+        self.head = self._log.head
         self.on_rows: Callable[[Sequence[AuditRow]], object] = lambda _: None
         self._asked: queue.SimpleQueue[_Asked | None] = queue.SimpleQueue()
         self._done: deque[tuple[Sequence[AuditRow], Sequence[Then], str]] = deque()
@@ -141,7 +144,8 @@ class AuditKeeper:
         while self._done:
             rows, waiting, self.problem = self._done.popleft()
             if rows:
-                self.number, self.head = rows[-1].number, rows[-1].hash
+                self.number = rows[-1].number
+                self.head = rows[-1].hash
                 self.on_rows(rows)
             for then in waiting:
                 then(self.problem)
@@ -165,11 +169,13 @@ class AuditKeeper:
 
     def _write(self) -> None:
         """Write what is asked for, in its order, until the end is."""
-        waiting, is_over = list[AuditEntry](), False
+        waiting = list[AuditEntry]()
+        is_over = False
         while not is_over:
             new, is_over = self._next(bool(waiting))
             waiting += [entry for entry, _ in new if entry is not None]
-            rows, problem = list[AuditRow](), ""
+            rows = list[AuditRow]()
+            problem = ""
             try:
                 rows = self._log.append(waiting) if waiting else rows
                 waiting = []

@@ -37,7 +37,8 @@ class Audited:
         label: Callable[[str], str],
     ) -> None:
         self.keeper = keeper
-        self._author, self._label = author, label
+        self._author = author
+        self._label = label
 
     def answered(self, what: str, client: str, line: Asked, on_result: OnResult) -> OnResult:
         """Return a callback that passes an answer on once its row is in the log.

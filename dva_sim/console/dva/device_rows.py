@@ -50,8 +50,11 @@ class DeviceRows:
         return [self._row(i, entries[i], i in fakes) for i in self._beats]
 
     def _row(self, id_tag: str, entry: DeviceEntry, is_fake: bool) -> DeviceRow:
-        run, now, device = self._run, self._run.clock.now, entry.device
-        heard, robot = now - entry.last_heard, run.field.robots.get(id_tag)
+        run = self._run
+        now = self._run.clock.now
+        device = entry.device
+        heard = now - entry.last_heard
+        robot = run.field.robots.get(id_tag)
         grant = run.dva.core.sessions.permissions.grants.get(id_tag)
         rate = self._rate_of(robot, now)
         speaks = not is_fake and device.device_type != DETECTOR

@@ -46,7 +46,10 @@ class FakeDevices:
         id_of: Callable[[int], tuple[str, str]],
         dismiss: Callable[[str], object],
     ) -> None:
-        self._make, self._is_known, self._id_of, self._dismiss = make, is_known, id_of, dismiss
+        self._make = make
+        self._is_known = is_known
+        self._id_of = id_of
+        self._dismiss = dismiss
         self.devices: dict[str, AgentDevice] = {}
 
     def add(self, line: FakeAsked, on_result: OnResult) -> None:

@@ -24,7 +24,9 @@ class AlarmActions:
     def __init__(
         self, alarms: ConsoleAlarms, author: Callable[[str], str], acknowledge: Doer
     ) -> None:
-        self._alarms, self._author, self._acknowledge_event = alarms, author, acknowledge
+        self._alarms = alarms
+        self._author = author
+        self._acknowledge_event = acknowledge
 
     @does("alarm_acknowledge")
     def _acknowledge(self, client: str, line: Asked, on_result: OnResult) -> None:

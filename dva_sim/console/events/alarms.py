@@ -98,7 +98,8 @@ class Alarms:
 
     def __init__(self) -> None:
         self.known: dict[str, RaisedAlarm] = {}
-        self.is_flood, self.left_out = False, 0
+        self.is_flood = False
+        self.left_out = 0
         self._raised: deque[float] = deque(maxlen=MOST_ALARMS)
 
     # --- what happens -----------------------------------------------------------------------
@@ -246,7 +247,8 @@ def _rank(alarms: Sequence[RaisedAlarm]) -> tuple[int, int, float, str]:
 def _row(alarms: Sequence[RaisedAlarm], now: float) -> AlarmRow:
     """A row of the list, for one alarm or for several that are alike."""
     first = min(alarms, key=lambda alarm: _rank([alarm]))
-    condition, count = first.condition, len(alarms)
+    condition = first.condition
+    count = len(alarms)
     many = f"{count} x {condition.kind}" + (f", {condition.place}" if condition.place else "")
     until = first.shelved_until
     return {

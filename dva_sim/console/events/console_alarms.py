@@ -77,7 +77,8 @@ class ConsoleAlarms:
     """
 
     def __init__(self, facts: AlarmFacts, clock: Callable[[], float] | None = None) -> None:
-        self._facts, self._clock = facts, clock or (lambda: time.monotonic())
+        self._facts = facts
+        self._clock = clock or (lambda: time.monotonic())
         self.alarms = Alarms()
         self._since: dict[str, int] = {}
 
@@ -124,7 +125,8 @@ class ConsoleAlarms:
         """Safety rules that are broken: for good, so that somebody has to see it."""
         for breach in self._facts.broken():
             text = f"{breach.rule} broken by {breach.who}: {breach.what}"
-            key, since = f"rule {breach.rule} {breach.who}", max(1, round(1000 * breach.time))
+            key = f"rule {breach.rule} {breach.who}"
+            since = max(1, round(1000 * breach.time))
             yield AlarmCondition(
                 key, "safety rule broken", "critical", place="", text=text, since_ms=since
             )
@@ -176,12 +178,16 @@ class ConsoleAlarms:
 def _of_events(events: Iterable[SiteEventShown], now_ms: int) -> Iterator[AlarmCondition]:
     """Yield open events, and those that have just been escalated."""
     for event in events:
-        number, kind = event["number"], event["kind"].replace("_", " ")
+        number = event["number"]
+        kind = event["kind"].replace("_", " ")
         place = event["room"] or OUTDOORS
         if not event["over"]:
             seen = event["acknowledged"]
             yield AlarmCondition(
-                *(f"event {number}", kind, event["severity"], place),
+                f"event {number}",
+                kind=kind,
+                priority=event["severity"],
+                place=place,
                 text=f"{kind.capitalize()}, {place}",
                 since_ms=event["reported_ms"],
                 event=number,

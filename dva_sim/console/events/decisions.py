@@ -33,7 +33,8 @@ def decision_of(
         device: Function that returns the id of a label.
         seen: Number of known decisions on an event, for pages that do not send it.
     """
-    number, reason = line.get("event", 0), line.get("reason") or None
+    number = line.get("event", 0)
+    reason = line.get("reason") or None
     label = str(line.get("device", ""))
 
     def known() -> int | None:
@@ -69,7 +70,8 @@ def place_of(line: PlaceAsked, site: Site) -> tuple[float, float]:
     Raises:
         Refused: it lies beyond it.
     """
-    x, y = line["x_m"], line["y_m"]
+    x = line["x_m"]
+    y = line["y_m"]
     left, low, right, high = site.extent
     if not (left <= x <= right and low <= y <= high):
         raise Refused("x_m and y_m should be a place on the site")
@@ -78,7 +80,8 @@ def place_of(line: PlaceAsked, site: Site) -> tuple[float, float]:
 
 def report_of(line: ReportAsked, place: m.Position) -> tuple[m.EventReport, str]:
     """Return the report of an event raised at a page, and the text shown on success."""
-    kind, severity = str(line["kind"]), SEVERITIES[line["severity"]]
+    kind = str(line["kind"])
+    severity = SEVERITIES[line["severity"]]
     report = m.EventReport(None, kind, place, severity, CERTAIN, "detected")
     return report, f"{kind.replace('_', ' ')} is raised"
 
@@ -127,7 +130,8 @@ def about_event(
     status = events.get(number)
     if status is None:
         return {"decisions": None, "acknowledged": None, "decided": None, "note": None}
-    last, decided = status.last_decision, None
+    last = status.last_decision
+    decided = None
     if last is not None:
         decided = DecidedShown(
             label=last.label,

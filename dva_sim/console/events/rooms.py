@@ -109,7 +109,8 @@ class ConsoleRooms:
     """
 
     def __init__(self, run: Run, roles: Roles) -> None:
-        self._run, self._roles = run, roles
+        self._run = run
+        self._roles = roles
         self.by_client: dict[str, ConsoleRoom] = {}
         self._used: set[int] = set()
         self._switched = 0.0

@@ -44,8 +44,13 @@ class Takeover:
         take: Callable[[OnResult], object],
         on_result: OnResult,
     ) -> None:
-        self._agent, self._robot, self._reason = agent, robot, reason
-        self._event, self._seat, self._take, self._on_result = event, seat, take, on_result
+        self._agent = agent
+        self._robot = robot
+        self._reason = reason
+        self._event = event
+        self._seat = seat
+        self._take = take
+        self._on_result = on_result
         self._tries = 0
 
     def begin(self) -> None:
@@ -78,7 +83,8 @@ class Takeover:
         if event.closed_for is not None or self._seat is None:
             self._ask_for_it()
             return
-        number, decisions = event.event_id, event.decisions
+        number = event.event_id
+        decisions = event.decisions
         body = m.Assign(number, self._robot, self._seat, None, self._reason, decisions)
         self._agent.ask(body, self._sent, self._lost)
 

@@ -27,7 +27,8 @@ class GuardActions:
     """
 
     def __init__(self, guards: PlayedGuards, site: Site) -> None:
-        self._guards, self._site = guards, site
+        self._guards = guards
+        self._site = site
 
     def _guard(self, client: str) -> PersonGuard:
         guard = self._guards.by_client.get(client)

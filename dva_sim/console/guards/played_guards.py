@@ -21,7 +21,8 @@ class PlayedGuards:
     """
 
     def __init__(self, run: Run, feed: Feed) -> None:
-        self._run, self._feed = run, feed
+        self._run = run
+        self._feed = feed
         self.by_client: dict[str, PersonGuard] = {}
         self._ways: dict[str, tuple[object, WayThere]] = {}  # the newest, and what it is of
         self._left: list[str] = []  # who is to be told so
@@ -48,7 +49,8 @@ class PlayedGuards:
 
     def lines(self) -> Iterator[tuple[str, GuardLine]]:
         """A line for each who plays, and one more for who plays no longer."""
-        gone, self._left = self._left, []
+        gone = self._left
+        self._left = []
         for client in gone:
             if client not in self.by_client:
                 yield client, self._line(client, None)

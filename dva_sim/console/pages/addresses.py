@@ -11,9 +11,15 @@ HERE = ("localhost", "127.0.0.1", "::1")
 
 def own_address(host: str) -> str:
     """Return this machine's address for others, if it listens on all; else that one alone."""
-    family, far, local = socket.AF_INET, "192.0.2.1", "127.0.0.1"  # RFC 5737: nobody has it
+    # RFC 5737: nobody has it
+    family = socket.AF_INET
+    far = "192.0.2.1"
+    local = "127.0.0.1"
     if ":" in host:
-        family, far, local = socket.AF_INET6, "2001:db8::1", "::1"  # RFC 3849: likewise
+        # RFC 3849: likewise
+        family = socket.AF_INET6
+        far = "2001:db8::1"
+        local = "::1"
     with contextlib.suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as sock:
         sock.connect((far, 9))  # of a datagram socket that sends nothing: it chooses a way
         return str(sock.getsockname()[0])

@@ -21,7 +21,7 @@ def main(given: Sequence[str] | None = None) -> int:
     parser.add_argument("--fd", type=int, required=True, help="socket to the simulation")
     parser.add_argument("--web-fd", type=int, required=True, help="socket to the web process")
     options = parser.parse_args(given)
-    # Ctrl-C reaches all processes of a terminal; the simulation says when it is over.
+    # Ctrl-C may reach all processes; the simulation says when it is over.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(NICENESS)
     run(PipeEnd(options.fd), PipeEnd(options.web_fd))

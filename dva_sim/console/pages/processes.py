@@ -10,22 +10,23 @@ import gc
 import os
 import socket
 import sys
-import time
 import webbrowser
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Protocol
 
-from dva_sim.cameras.children import END_WITHIN, PAINTED, Child
+from dva_sim.cameras.children import END_SOON, PAINTED, PipedChild
 from dva_sim.cameras.lines import Show
-from dva_sim.console.pages.page_options import PageOptions
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.lines import KINDS, Tell
 from dva_sim.network.realtime import PacedClock
+from dva_sim.options.runs import PageOptions
 from dva_sim.serving.listening import listen
+from dva_sim.serving.processes import end_all
 
-WEB, PICTURES = "dva_sim.console.web", "dva_sim.console.pages.pictures"
+WEB = "dva_sim.console.web"
+PICTURES = "dva_sim.console.pages.pictures"
 # What else is printed: an address for each of those who may do less than everything.
 ROLES = ("Dispatch only", "dispatch"), ("Drive only", "drive"), ("Look only", "look")
 BROWSERLESS = ("CI", "PYTEST_CURRENT_TEST", "DVA_SIM_NO_BROWSER")  # where none is opened
@@ -70,18 +71,24 @@ class ConsoleProcesses:
     Args:
         options: Addresses and access rules of the pages.
         say: Prints a line.
+        phones: Host and port for phones; None: none are served.
 
     Attributes:
         serving: First message of the web process: its addresses.
         failed: Reason why the web process has ended by itself; empty if it has not.
     """
 
-    def __init__(self, options: PageOptions, say: Say) -> None:
-        self._options, self._say = options, say
-        self._children: list[Child] = []
+    def __init__(
+        self, options: PageOptions, say: Say, phones: tuple[str, int] | None = None
+    ) -> None:
+        self._options = options
+        self._say = say
+        self._phones = phones
+        self._children: list[PipedChild] = []
         self._to_web: socket.socket | None = None
         self.serving: Mapping[str, Any] = {}
-        self.failed, self._restarts = "", 0
+        self.failed = ""
+        self._restarts = 0
 
     def start(
         self,
@@ -104,7 +111,7 @@ class ConsoleProcesses:
         """
         web = self._start_web(report, audit)
         pictures = self._start_pictures()
-        self.serving = web.first_line()
+        self.serving = web.ready(lambda: next(iter(web.pipe.lines()), None))
         subject.serve_cameras(str(self.serving["base"]))
         subject.tell = web.pipe.put
         subject.dropped = lambda: web.pipe.outbox.dropped
@@ -114,7 +121,7 @@ class ConsoleProcesses:
         subject.clock.pulse(FLUSH, self._flush)
         gc.freeze()  # what stays for the whole run is not looked through again and again
         self._say(f"Console: {self.serving['supervise']}")
-        if self._options.token:
+        if not self._options.no_token:
             for name, role in ROLES:
                 self._say(f"{name}: {self.serving[role]}")
         self._say_of_phones()
@@ -124,41 +131,39 @@ class ConsoleProcesses:
         """End both, as soon as they have written what they have."""
         if self._to_web is not None:
             self._to_web.close()
-        for child in self._children:
-            child.end()
-        deadline = time.monotonic() + END_WITHIN
-        for child in self._children:
-            child.make_sure(deadline)
+        end_all(self._children, END_SOON)
 
-    def _start_web(self, report: Path | None, audit: Path | None) -> Child:
+    def _start_web(self, report: Path | None, audit: Path | None) -> PipedChild:
         options = self._options
         listen(options.host, options.port).close()  # else the web process alone would say so
-        if options.phones:
-            listen(options.phones_host, options.phones_port, "--phones-port").close()
+        if self._phones is not None:
+            listen(*self._phones, "--phones-port").close()
         ours, self._to_web = socket.socketpair()
         words = ["--host", options.host, "--port", str(options.port)]
         words += ["--pictures-fd", str(ours.fileno())]
-        words += [] if options.token else ["--no-token"]
+        words += ["--no-token"] if options.no_token else []
         words += [] if audit is None else ["--audit", str(audit)]
         words += [] if report is None else ["--report", str(report)]
-        if options.phones:
-            words += ["--phones-host", options.phones_host]
-            words += ["--phones-port", str(options.phones_port)]
-        web = Child("web process", WEB, words, [ours], KINDS)
+        if self._phones is not None:
+            host, port = self._phones
+            words += ["--phones-host", host, "--phones-port", str(port)]
+        web = PipedChild("the web process", WEB, words, [ours], KINDS)
         self._children.append(web)
         ours.close()
         return web
 
-    def _start_pictures(self) -> Child:
+    def _start_pictures(self) -> PipedChild:
         """Our copy of its end stays open, so that another one can take its place."""
         end = self._to_web
         assert end is not None
         words = ["--web-fd", str(end.fileno())]
-        pictures = Child("pictures process", PICTURES, words, [end], PAINTED)
+        pictures = PipedChild("the pictures process", PICTURES, words, [end], PAINTED)
         self._children.append(pictures)
         return pictures
 
-    def _listen(self, subject: ConsoleSubject, web: Child, take: Callable[[Asked], object]) -> None:
+    def _listen(
+        self, subject: ConsoleSubject, web: PipedChild, take: Callable[[Asked], object]
+    ) -> None:
         def hear() -> None:
             for line in web.pipe.lines():
                 take(line)
@@ -169,7 +174,7 @@ class ConsoleProcesses:
 
         subject.clock.watch(web.pipe.fileno(), hear)
 
-    def _draw(self, subject: ConsoleSubject, pictures: Child) -> None:
+    def _draw(self, subject: ConsoleSubject, pictures: PipedChild) -> None:
         """Without pictures all else goes on, and another process draws from then on."""
         subject.show = pictures.pipe.put
 
@@ -180,8 +185,7 @@ class ConsoleProcesses:
             subject.clock.unwatch(pictures.pipe.fileno())
             subject.note(pictures.why())
             self._children.remove(pictures)
-            pictures.end()
-            pictures.make_sure(0.0)
+            end_all([pictures], 0.0)
             if self._restarts < MOST_RESTARTS:
                 self._restarts += 1
                 self._draw(subject, self._start_pictures())
@@ -210,6 +214,6 @@ class ConsoleProcesses:
         """Open the browser, where there is one that somebody could see."""
         hidden = any(os.environ.get(name) for name in BROWSERLESS)
         seen = sys.platform in ("darwin", "win32") or any(map(os.environ.get, NO_DISPLAY))
-        if self._options.open and seen and not hidden:
+        if not self._options.no_open and seen and not hidden:
             with suppress(webbrowser.Error):
                 webbrowser.open(address)

@@ -9,7 +9,8 @@ import segno
 RIM = 4  # modules around a code, as its standard asks for (ISO/IEC 18004)
 TERMINAL_RIM = 2  # which cameras do with, where rows are few
 _BLOCKS = {(0, 0): " ", (0, 1): "▄", (1, 0): "▀", (1, 1): "█"}
-_DARK_ON_WHITE, _RESET = "\x1b[38;5;16m\x1b[48;5;231m", "\x1b[0m"
+_DARK_ON_WHITE = "\x1b[38;5;16m\x1b[48;5;231m"
+_RESET = "\x1b[0m"
 
 
 def svg(address: str) -> bytes:

@@ -71,7 +71,11 @@ class Actions:
         alarms = AlarmActions(world.alarms, world.author, lambda *given: dispatcher.do(*given))
         holders = self, self._phones, self._at_robots, guards, self._rooms, alarms, world.dva
         dispatcher = ActionDispatcher(
-            *(ActionPlace.WORLD, holders, self._tell, "no action {what!r}"), lambda: world.audited
+            ActionPlace.WORLD,
+            holders=holders,
+            tell=self._tell,
+            elsewhere="no action {what!r}",
+            audited=lambda: world.audited,
         )
         self.take = dispatcher.take
         world.hold = self._stop_all
@@ -235,7 +239,8 @@ class Actions:
 
     def _joined(self) -> dict[str, str]:
         """Addresses of robots from outside the scenario that can be reached, by id."""
-        here, fakes = self._world.foreign.addresses(), self._world.dva.fakes
+        here = self._world.foreign.addresses()
+        fakes = self._world.dva.fakes
         return {robot: address for robot, address in here.items() if robot not in fakes}
 
     def _to_stop(self, line: OfSome, joined: Mapping[str, str]) -> list[str]:
@@ -246,7 +251,8 @@ class Actions:
             return everywhere
         if not given:
             raise Refused("No robot was named.")
-        numbers, labels = self._world.feed.numbers, self._world.run.stage.labels
+        numbers = self._world.feed.numbers
+        labels = self._world.run.stage.labels
         named = [r for r in everywhere if {r, numbers.get(r), labels.get(r)} & set(given)]
         if not named:
             raise Refused(f"there is no robot {given[0]!r}")
@@ -296,7 +302,8 @@ class Actions:
 
     def _look_for_old_pictures(self) -> None:
         """End the drives of pages that hold on and draw no new pictures."""
-        now, limit = self._world.clock.now, self._world.scenario.robot.max_age_s
+        now = self._world.clock.now
+        limit = self._world.scenario.robot.max_age_s
         holding = [(c, seat) for c, seat in self._seats.taken.items() if seat.holds]
         for client, seat in holding:
             for held in self._world.person(seat.number).robots.values():
@@ -346,7 +353,8 @@ class Actions:
 
     @does("pattern")
     def _pattern(self, _: str, line: PatternChoice, on_result: OnResult) -> None:
-        robot, name = self._robot(line.get("robot")), line.get("name")
+        robot = self._robot(line.get("robot"))
+        name = line.get("name")
         world = self._world
         if name not in PATTERNS and name != world.scenario.pattern:
             raise Refused(f"there is no pattern {name!r}; patterns: {', '.join(PATTERNS)}")
@@ -359,7 +367,8 @@ class Actions:
 
     @does("pace")
     def _pace(self, _: str, line: PaceChange, on_result: OnResult) -> None:
-        factor, paused = line.get("factor"), line.get("paused")
+        factor = line.get("factor")
+        paused = line.get("paused")
         if self._world.run.is_real:
             raise Refused("The simulation runs in real time because its links are real sockets.")
         if factor is not None and factor < 1.0:
@@ -382,7 +391,8 @@ class Actions:
 
     @does("tour_time")
     def _tour_time(self, client: str, line: TourTime, on_result: OnResult) -> None:
-        robot, took = self._robot(line["robot"]), line["took_s"]
+        robot = self._robot(line["robot"])
+        took = line["took_s"]
         log = self._world.recorder.newest_drive.get(robot)
         if log is None or log.operator != self._person(client).device.id_tag:
             raise Refused("You have not driven this robot.")

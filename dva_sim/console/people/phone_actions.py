@@ -43,7 +43,10 @@ class PhoneActions:
         robot: Callable[[Any], str],
         stop: Callable[[str, str], object],
     ) -> None:
-        self._world, self._seats, self._robot, self._stop = world, seats, robot, stop
+        self._world = world
+        self._seats = seats
+        self._robot = robot
+        self._stop = stop
         self._phones = world.phones
 
     def sits(self, client: str) -> bool:
@@ -64,7 +67,8 @@ class PhoneActions:
 
     def samples(self, client: str, line: SampleBatch) -> None:
         """Samples of a phone have come."""
-        batch, phone = samples_of(line), self._phones.seat(client)
+        batch = samples_of(line)
+        phone = self._phones.seat(client)
         if phone is None:
             return
         if phone.person is None:
@@ -97,7 +101,8 @@ class PhoneActions:
 
     @does("phone_register")
     def _register(self, client: str, line: PhoneIdentity, on_result: OnResult) -> None:
-        label, kind = line["label"], line["type"]
+        label = line["label"]
+        kind = line["type"]
         address = f"{line['server'].strip()}:{line['port']}"
         seat = self._seats.taken.get(client)
         if seat is not None and not self.sits(client):
@@ -146,7 +151,8 @@ class PhoneActions:
         """Remove a phone's device, if it has one."""
         if phone.person is None:
             return
-        phone.person, phone.registered = None, False
+        phone.person = None
+        phone.registered = False
         number = self._seats.stand_up(client)
         if number is not None:
             self._world.client_of.pop(number, None)
@@ -176,7 +182,8 @@ class PhoneActions:
     @does("phone_permission")
     def _permission(self, client: str, line: PhoneWish, on_result: OnResult) -> None:
         _, person = self._device(client)
-        level, robot = line["level"], self._asked(line["device"])
+        level = line["level"]
+        robot = self._asked(line["device"])
         held = person.robots.get(robot)
         if held is not None and held.level == level:
             on_result(True, f"{held.label} is yours already")

@@ -44,8 +44,11 @@ class RoomActions:
         robot: Callable[[Any], str],
         take: Callable[[str, OfRobots, OnResult], object],
     ) -> None:
-        self._world, self._rooms, self._seats = world, world.rooms, seats
-        self._robot, self._take = robot, take
+        self._world = world
+        self._rooms = world.rooms
+        self._seats = seats
+        self._robot = robot
+        self._take = take
 
     def attend(self, pages: Mapping[str, str]) -> None:
         """Let rooms take part only while their pages are open."""
@@ -142,7 +145,8 @@ class RoomActions:
         if status is None:
             raise Refused(f"there is no event {line['event']}")
         robot = self._robot(line["robot"])
-        label, body = self._world.run.stage.labels[robot], inspection_of(status)
+        label = self._world.run.stage.labels[robot]
+        body = inspection_of(status)
 
         def send(room: ConsoleRoom, on_result: OnResult) -> None:
             send_on_mission(room.device, robot, label, body, on_result)
@@ -158,7 +162,8 @@ class RoomActions:
         robots = list(dict.fromkeys((*latched, *stopped)))
         named = line.get("robots", "all")
         if named != "all":
-            numbers, labels = self._world.feed.numbers, run.stage.labels
+            numbers = self._world.feed.numbers
+            labels = run.stage.labels
             robots = [r for r in robots if {r, numbers.get(r), labels.get(r)} & set(named)]
         if not robots:
             raise Refused(NOBODY_STOPPED)
@@ -171,7 +176,8 @@ class RoomActions:
     @does("take_over")
     def _take_over(self, client: str, line: TakeoverAsked, on_result: OnResult) -> None:
         """Take a robot and its task from its driver into the client's own seat."""
-        robot, reason = self._robot(line["robot"]), line["reason"]
+        robot = self._robot(line["robot"])
+        reason = line["reason"]
 
         def begin(room: ConsoleRoom, on_result: OnResult) -> None:
             number = self._seats.sit(client)

@@ -19,7 +19,8 @@ from dva_sim.worlds.site import Site
 
 FAR, LEAST = 5.0, 3.0  # of a goal [m]
 RADIUS = 0.6  # of the ring in which a robot has to stand [m]
-STEP, TURN = 0.2, math.radians(15.0)
+STEP = 0.2
+TURN = math.radians(15.0)
 TURNED = math.radians(45.0)  # from here on a goal asks for a turn
 WIDE, NARROW = (0.45, 0.3), (0.15,)  # room on both sides of a robot, beside its own radius [m]
 BASE = 1.0  # so near where it stands, a robot has room anyway [m]

@@ -69,7 +69,8 @@ def settings_of(line: CalibrationAsked) -> PhoneSettings:
     Raises:
         ConfigError: there is no such filter or mapping; says which there are.
     """
-    reference, ios = line["reference_mps2"], line.get("ios", False)
+    reference = line["reference_mps2"]
+    ios = line.get("ios", False)
     if reference is not None:
         x, y, z = reference
         measured = x, y, z

@@ -56,18 +56,23 @@ class PhoneSeat:
         given_hz: float,
         attempts: int,
     ) -> None:
-        self._clock, self._profile_of, self._given_hz = clock, profile, given_hz
+        self._clock = clock
+        self._profile_of = profile
+        self._given_hz = given_hz
         self._attempts = attempts
         self.person: PersonAgent | None = None
         self.operator: PersonAgent | None = None
         self.registered = False
-        self.settings, self.orientation = PhoneSettings(), 0
+        self.settings = PhoneSettings()
+        self.orientation = 0
         self._profile = profile(self.settings)
         self.samples = self.lost = 0
         self.motion: MotionWriter | None = None
         self._times = PhoneClock()
         self._stamps: deque[float] = deque(maxlen=RATED_BY)
-        self._next, self._at, self._came = 0, 0.0, -math.inf
+        self._next = 0
+        self._at = 0.0
+        self._came = -math.inf
         self._newest: Triple | None = None
         self.tilt = self.new_tilt()
 
@@ -126,7 +131,8 @@ class PhoneSeat:
 
     def _note_app(self, period: float) -> None:
         if self.motion is not None:
-            now, settings = self._clock.now, self.settings
+            now = self._clock.now
+            settings = self.settings
             app = MotionApp(now, period, settings.reference, settings.ios, self._profile)
             self.motion.app(app)
 
@@ -202,9 +208,11 @@ class PhoneSeat:
         Args:
             now: Real time [s].
         """
-        settings, (level, turn) = self.settings, self.tilt.shown
+        settings = self.settings
+        (level, turn) = self.tilt.shown
         held = next(iter(self._held), None)
-        profile, rate = self._profile, self.rate_hz
+        profile = self._profile
+        rate = self.rate_hz
         fresh = rate is not None and now - self._came < FRESH
         return {
             **self.identity(),

@@ -54,7 +54,9 @@ class Phones:
     def __init__(
         self, run: Run, clock: PacedClock, console: Callable[[], Console], address: str | None
     ) -> None:
-        self._run, self._clock, self._console = run, clock, console
+        self._run = run
+        self._clock = clock
+        self._console = console
         self.address = address or f"{address_of('dva', 1)}:{DVA_PORT}"
         self.by_client: dict[str, PhoneSeat] = {}
         self.motion_folder: Path | None = None
@@ -65,7 +67,8 @@ class Phones:
         if client not in self.by_client:
             if len(self.by_client) >= MOST_PHONES:
                 return None
-            setup, hz = self._console().setup, self._console().phone.sample_rate_hz
+            setup = self._console().setup
+            hz = self._console().phone.sample_rate_hz
             seat = PhoneSeat(self._clock, self.profile, hz, setup.attempts)
             self.by_client[client] = seat
         return self.by_client[client]

@@ -3,53 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
-from dva_sim.cameras.children import ChildFailed
-from dva_sim.console.pages.page_options import PageOptions
 from dva_sim.console.pages.processes import ConsoleProcesses
 from dva_sim.console.replay.player import Player, playing
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
 from dva_sim.live.process import ending_when_asked
 from dva_sim.live.recorded_lines import readable
+from dva_sim.options.runs import PageOptions
 from dva_sim.recordings.reading import read_recording
+from dva_sim.serving.processes import ChildFailed
 
 Say = Callable[[str], object]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ReplayOptions(PageOptions):
-    """Options of a replay: recording, and address of its page.
-
-    Attributes:
-        file: A recording, or the lines of a run that was killed; None: those of `results`.
-        results: Folder of a study whose recordings can be chosen.
-    """
-
-    file: Path | None = None
-    results: Path | None = None
-
-    def player(self) -> Player:
-        """Return the player.
-
-        Raises:
-            DvaSimError: there is no such recording, or none at all.
-        """
-        shelf = None if self.results is None else Shelf(self.results)
-        if self.file is None:
-            return Player(None, shelf)
-        with readable(self.file) as file:
-            return Player(RecordedRun(read_recording(file), self.file.name), shelf)
-
-
-def show_replay(options: ReplayOptions, say: Say) -> None:
-    """Show it until Ctrl-C, SIGTERM, or the end of the web process.
+def player_of(file: Path | None, results: Path | None) -> Player:
+    """Return the player.
 
     Args:
-        options: Recording and addresses.
+        file: A recording, or the lines of a run that was killed; None: those of `results`.
+        results: Folder of a study whose recordings can be chosen.
+
+    Raises:
+        DvaSimError: there is no such recording, or none at all.
+    """
+    shelf = None if results is None else Shelf(results)
+    if file is None:
+        return Player(None, shelf)
+    with readable(file) as found:
+        return Player(RecordedRun(read_recording(found), file.name), shelf)
+
+
+def show_replay(
+    options: PageOptions, say: Say, *, file: Path | None = None, results: Path | None = None
+) -> None:
+    """Show it until Ctrl-C, SIGTERM, SIGHUP, or the end of the web process.
+
+    Args:
+        options: Address of its page.
         say: Prints a line.
+        file: See `player_of`.
+        results: See `player_of`.
 
     Raises:
         DvaSimError: there is no such recording, or none at all.
@@ -57,7 +52,7 @@ def show_replay(options: ReplayOptions, say: Say) -> None:
     """
     processes = ConsoleProcesses(options, say)
     with (
-        playing(options.player()) as player,
+        playing(player_of(file, results)) as player,
         ending_when_asked(player.clock, supervised=False) as ending,
     ):
         report = None if player.shelf is None else player.shelf.report

@@ -32,7 +32,8 @@ class RecordedTracks:
     """
 
     def __init__(self, tracks: Mapping[str, Sequence[TrackPoint]], duration: float) -> None:
-        self._tracks, self._duration = tracks, duration
+        self._tracks = tracks
+        self._duration = duration
         self._times = {label: [p.time for p in track] for label, track in tracks.items()}
 
     def places(self, now: float) -> Iterator[tuple[str, TrackPoint, float]]:
@@ -41,7 +42,8 @@ class RecordedTracks:
             index = bisect_right(self._times[label], now)
             if index == 0:
                 continue
-            before, after = track[index - 1], track[min(index, len(track) - 1)]
+            before = track[index - 1]
+            after = track[min(index, len(track) - 1)]
             if after is before:
                 left = now - before.time > GONE and before.time < self._duration - GONE
                 if not left:

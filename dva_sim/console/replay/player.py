@@ -1,20 +1,25 @@
 """Plays a recording to pages: its time goes on, faster or slower, stands, or jumps.
 
 All who look see the same moment. Nothing that a page asks for reaches anybody: there is nobody.
+
+Logs list messages in the order in which they were sent, because a recording does not know when they
+arrived.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import json
+import re
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from dva_sim.cameras.lines import Show, contained_line, scene_line
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import OnResult, Refused
-from dva_sim.console.replay.audit import RecordedAudit
-from dva_sim.console.replay.exchanges import ExchangeLog
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
 from dva_sim.console.wire.actions import ActionPlace
@@ -25,15 +30,82 @@ from dva_sim.console.wire.arguments import (
     RecordingAsked,
     RobotsWatched,
 )
+from dva_sim.console.wire.events import AuditLine
+from dva_sim.console.wire.limits import LOG_BATCH
 from dva_sim.console.wire.lines import Tell
+from dva_sim.console.wire.records import ExchangesLine
 from dva_sim.console.wire.rows import ClockShown, RowsLine
 from dva_sim.console.wire.seats import DoneLine
+from dva_sim.kernel.recorder import Sent
 from dva_sim.network.realtime import PacedClock
+from dva_sim.recordings.audit_log import NOTHING_BEFORE
 from dva_sim.recordings.reading import read_recording
 from dva_sim.recordings.writing import pack
 
+FIRST = 2000  # of those before the moment that is shown
+# What is published, to whom it may concern; nobody answers it.
+PUBLISHED = re.compile(
+    rb"<(HBMsg|RobotStatus|PersonStatus|RobotHolder|SensorValue|MissionStatus|EventStatus)>"
+)
+_REPLY = re.compile(rb"<reply>\s*<Answers>(\d+)</Answers>")
+_NUMBER = re.compile(rb"<MessageID>(\d+)</MessageID>")
+_COMMAND = b"<SetTeleOp>"
+
+
+class ExchangeLog:
+    """The exchanges of one device, by time.
+
+    Args:
+        traffic: All messages of a run, by time.
+        node: Id of the device.
+    """
+
+    def __init__(self, traffic: Iterable[Sent], node: str) -> None:
+        self._lines: list[list[Any]] = []
+        self._times: list[float] = []
+        asked: dict[tuple[str, bytes], list[Any]] = {}
+        for sent in traffic:
+            data = sent.payload
+            if not isinstance(data, bytes) or node not in (sent.source, sent.destination):
+                continue
+            answered = _REPLY.search(data)
+            if sent.source == node:
+                line = asked.get((sent.destination, answered[1])) if answered else None
+                if line is not None:
+                    line[3] = data.decode("latin-1")
+                    line[5] = 0
+            elif answered is None:
+                self._add(asked, sent, data)
+
+    def _add(self, asked: dict[tuple[str, bytes], list[Any]], sent: Sent, data: bytes) -> None:
+        """A command counts as published until it is found to be answered."""
+        is_published = PUBLISHED.search(data) is not None or _COMMAND in data
+        when = round(1000 * sent.time)
+        line = [len(self._lines) + 1, when, data.decode("latin-1"), None, None, int(is_published)]
+        self._lines.append(line)
+        self._times.append(sent.time)
+        if number := _NUMBER.search(data):
+            asked[sent.source, number[1]] = line
+
+    def until(self, now: float) -> int:
+        """Return how many there were up to a moment [s]."""
+        return bisect_right(self._times, now)
+
+    def batches(self, name: str, sent: int, end: int) -> list[ExchangesLine]:
+        """Lines for pages, of those after the first `sent` up to the first `end`."""
+        starts = range(max(sent, end - FIRST), end, LOG_BATCH)
+        return [
+            {"k": "log", "log": name, "lines": self._lines[start : min(end, start + LOG_BATCH)]}
+            for start in starts
+        ]
+
+
 # From one line to the next, real time [s].
-POSITIONS, ROWS, HAZARDS, FRAMES, LOGS = 0.1, 0.25, 1.0, 0.1, 0.2
+POSITIONS = 0.1
+ROWS = 0.25
+HAZARDS = 1.0
+FRAMES = 0.1
+LOGS = 0.2
 NOBODY = "this is a recording: nothing in it can be controlled"
 
 
@@ -55,12 +127,16 @@ class Player:
     def __init__(
         self, run: RecordedRun | None, shelf: Shelf | None = None, clock: PacedClock | None = None
     ) -> None:
-        self.run, self.shelf, self.audit = run, shelf, RecordedAudit()
+        self.run = run
+        self.shelf = shelf
+        self.audit = RecordedAudit()
         self.clock = clock or PacedClock()
         self.tell: Tell = lambda *_: None
         self.show: Show = lambda *_: None
         self.dropped: Callable[[], int] = lambda: 0
-        self._offset, self._jumps, self._frames = 0.0, 0, 0
+        self._offset = 0.0
+        self._jumps = 0
+        self._frames = 0
         self._watched: set[str] = set()
         self._logs: dict[str, ExchangeLog] = {}
         self._looks_at_devices = False
@@ -123,7 +199,8 @@ class Player:
         if self._site is not None:
             self._site.cleanup()
         self._site = TemporaryDirectory(prefix="dva-sim-")
-        folder, files = Path(self._site.name), pack(run.playback.site)
+        folder = Path(self._site.name)
+        files = pack(run.playback.site)
         for name, data in files.items():
             (folder / name).write_bytes(data)
         return folder / next(name for name in files if name.endswith(".yaml"))
@@ -155,7 +232,8 @@ class Player:
             self.tell(self.run.positions(self.now), "")
 
     def _tell_rows(self) -> None:
-        run, now = self.run, self.now
+        run = self.run
+        now = self.now
         if run is None:
             return
         if now >= run.duration and not self.clock.paused:
@@ -200,9 +278,11 @@ class Player:
 
     def _tell_logs(self) -> None:
         """Tell the messages since the last time; after a jump, all of them again."""
-        run, now = self.run, self.now
+        run = self.run
+        now = self.now
         for name, entry in self._sent.items() if run is not None else ():
-            log, is_again = self._log(name), entry < 0
+            log = self._log(name)
+            is_again = entry < 0
             end = log.until(now)
             lines = log.batches(name, max(0, entry), end)
             if is_again and not lines:
@@ -232,7 +312,8 @@ class Player:
 
     @does("pace")
     def _pace(self, _: str, line: PaceChange, on_result: OnResult) -> None:
-        factor, paused = line.get("factor"), line.get("paused")
+        factor = line.get("factor")
+        paused = line.get("paused")
         if paused is False and self.now >= self._duration:
             self._go_to(0.0)
         self.clock.pace(factor, paused)
@@ -286,3 +367,36 @@ def playing(player: Player) -> Iterator[Player]:
         yield player
     finally:
         player.close()
+
+
+class RecordedAudit:
+    """The rows of whichever recording is played; a file that is gone with the player.
+
+    Attributes:
+        path: File of the rows.
+    """
+
+    def __init__(self) -> None:
+        self._folder = TemporaryDirectory(prefix="dva-sim-audit-")
+        self.path = Path(self._folder.name) / "audit.json"
+        self.path.write_text("[]")
+
+    def show(self, rows: Sequence[Mapping[str, Any]], name: str) -> AuditLine:
+        """Open the log of another recording; returns the line for the pages."""
+        new = self.path.with_suffix(".new")
+        new.write_text(json.dumps(rows))
+        new.replace(self.path)  # at once: somebody may be reading
+        last = rows[-1] if rows else None
+        return {
+            "k": "audit",
+            "t": 0,
+            "rows": 0 if last is None else last["number"],
+            "hash": NOTHING_BEFORE if last is None else last["hash"],
+            "problem": "",
+            "lasting": True,
+            "file": name,
+        }
+
+    def close(self) -> None:
+        """Leave nothing behind."""
+        self._folder.cleanup()

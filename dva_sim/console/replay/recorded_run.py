@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.cameras.lines import FrameLine
-from dva_sim.console.replay.device_table import RecordedDevices
 from dva_sim.console.replay.moments import (
     ROUNDED,
     RecordedTracks,
@@ -28,13 +28,107 @@ from dva_sim.console.views.fields import HazardFeed
 from dva_sim.console.views.scene import scene_of
 from dva_sim.console.views.things import UNKNOWN_PERSON, Things, camera_shown
 from dva_sim.console.wire.events import EventsLine, HazardsLine, SiteEventShown, StorySoFarLine
-from dva_sim.console.wire.rows import DevicesLine, DoingShown, PlacesLine, RobotRow, RobotWindowLine
+from dva_sim.console.wire.rows import (
+    DeviceRow,
+    DevicesLine,
+    DoingShown,
+    PlacesLine,
+    RobotRow,
+    RobotWindowLine,
+)
 from dva_sim.console.wire.scenes import Happened, LinkShown, SceneLine, ThingBody
 from dva_sim.kernel.errors import DvaSimError
-from dva_sim.kernel.recorder import DriveLog
+from dva_sim.kernel.recorder import DriveLog, Sent
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode
+from dva_sim.protocol.errors import ProtocolError
 from dva_sim.recordings.reading import Opened, RecordedHazard
 from dva_sim.simulation.full.stage import DVA
 from dva_sim.simulation.scenario import robot_profiles
+
+BEATING = 10.0  # over which heartbeats are counted [s]
+
+
+class RecordedDevices:
+    """Devices registered at the DVA, and the times at which each was heard.
+
+    Args:
+        traffic: All messages of a run, by time.
+        dva: Id of the DVA.
+    """
+
+    def __init__(self, traffic: Iterable[Sent], dva: str) -> None:
+        self._registered: dict[str, tuple[float, m.Registration]] = {}
+        self._heard: dict[str, list[float]] = {}
+        self._beats: dict[str, list[float]] = {}
+        for sent in traffic:
+            if sent.destination == dva and isinstance(sent.payload, bytes):
+                self._take(sent)
+
+    def _take(self, sent: Sent) -> None:
+        who = sent.source
+        data = sent.payload
+        self._heard.setdefault(who, []).append(sent.time)
+        if b"<HBMsg>" in data:
+            self._beats.setdefault(who, []).append(sent.time)
+        elif b"<RegMsg>" in data and who not in self._registered:
+            try:
+                body = decode(data).body
+            except ProtocolError:
+                return
+            if isinstance(body, m.Registration):
+                self._registered[who] = sent.time, body
+
+    def rows(
+        self, now: float, robots: Mapping[str, RobotRow], doing: Mapping[str, str]
+    ) -> list[DeviceRow]:
+        """A row for each that had registered by then; what nobody recorded is open.
+
+        Args:
+            now: The moment [s].
+            robots: State of robots, by id.
+            doing: Activities of the people and robots on site, by label.
+        """
+        return [
+            self._row(who, about, now, robots.get(who), doing)
+            for who, (when, about) in self._registered.items()
+            if when <= now
+        ]
+
+    def _row(
+        self,
+        who: str,
+        about: m.Registration,
+        now: float,
+        robot: RobotRow | None,
+        doing: Mapping[str, str],
+    ) -> DeviceRow:
+        heard = self._heard[who]
+        beats = self._beats.get(who, [])
+        last = heard[bisect_right(heard, now) - 1]
+        recent = bisect_right(beats, now) - bisect_right(beats, now - BEATING)
+        return {
+            "id": who,
+            "label": about.label,
+            "type": about.device_type,
+            "address": about.address,
+            "doing": doing.get(about.label),
+            "heard_s": round(now - last, 1),
+            "silent": False,
+            "beats_hz": round(recent / BEATING, 2),
+            "fake": False,
+            "revocable": False,
+            "link": None,
+            "holder": None if robot is None else robot["holder"],
+            "holder_label": None if robot is None else robot["holder_label"],
+            "commands_hz": None if robot is None else robot["commands_hz"],
+            "round_trip_s": None,
+            "refused": None,
+            "picture_age_s": None,
+            "level": None,
+            "ends_s": None,
+        }
+
 
 TURNING = 0.25  # over which a turn rate is measured [s]
 STORY_KEPT = 200  # lines of the story up to a moment
@@ -60,7 +154,9 @@ class RecordedRun:
 
     def __init__(self, opened: Opened, name: str) -> None:
         self.playback = playback = opened.playback
-        self.name, self.is_whole, self.audit = name, opened.is_whole, opened.audit
+        self.name = name
+        self.is_whole = opened.is_whole
+        self.audit = opened.audit
         self.duration = playback.duration
         self.things = Things()
         self.numbers = self.things.numbers
@@ -73,11 +169,15 @@ class RecordedRun:
         self._windows: dict[str, RobotLines] = {}
         self._devices: RecordedDevices | None = None
         self._hazards = HazardFeed(
-            *(playback.site, playback.incidents, playback.surroundings, playback.contained)
+            playback.site,
+            incidents=playback.incidents,
+            surroundings=playback.surroundings,
+            contained=playback.contained,
         )
 
     def _number_all(self) -> None:
-        playback, limits = self.playback, self._limits()
+        playback = self.playback
+        limits = self._limits()
         camera = camera_shown(playback.scenario.camera)
         for number, (id_tag, radius) in enumerate(playback.radii.items()):
             speed, turn_rate = limits[number] if number < len(limits) else (0.5, math.pi / 6)
@@ -129,7 +229,11 @@ class RecordedRun:
             "trace": link.trace_up or link.trace_down or link.delay_log,
         }
         line = scene_of(
-            *(playback.scenario, playback.site, playback.incidents, self.things.all, how),
+            playback.scenario,
+            site=playback.site,
+            incidents=playback.incidents,
+            things=self.things.all,
+            link=how,
             name=self.name,
             seed=playback.seed,
         )
@@ -254,7 +358,8 @@ class RecordedRun:
     def events(self, now: float) -> EventsLine:
         """Return the states of the events."""
         playback = self.playback
-        site, labels = playback.site, playback.labels
+        site = playback.site
+        labels = playback.labels
         known = (event_at(event, now) for event in self.playback.events)
         lines: list[SiteEventShown] = [
             {

@@ -58,8 +58,12 @@ class RobotActions:
         deaf: Callable[[str, bool], object],
         slow: Callable[[float], object],
     ) -> None:
-        self._windows, self._robot, self._why_not = windows, robot, why_not
-        self._labels, self._deaf, self._slow = labels, deaf, slow
+        self._windows = windows
+        self._robot = robot
+        self._why_not = why_not
+        self._labels = labels
+        self._deaf = deaf
+        self._slow = slow
         self._hands: dict[str, PageHand] = {}  # by client
         self._count = 0
 
@@ -79,7 +83,8 @@ class RobotActions:
         self._must(window.hand.take(client))
         if mine is None or mine.robot != robot or window.number is None:
             self._count += 1
-            window.number, window.notice = self._count, ""
+            window.number = self._count
+            window.notice = ""
             self._hands[client] = PageHand(robot)
         on_result(True, "manual control is yours", hand=window.number)
 
@@ -115,7 +120,8 @@ class RobotActions:
         if hand is None:
             return
         held = line["held"] and not self._why_not()
-        hand.heard, hand.holds = time.monotonic(), held
+        hand.heard = time.monotonic()
+        hand.holds = held
         if held:
             self._drive(client, hand, line["speed"], line["turn"])
         else:
@@ -162,8 +168,10 @@ class RobotActions:
 
     @does("fault")
     def _fault(self, _: str, line: FaultSwitch, on_result: OnResult) -> None:
-        robot, what = self._robot(line["robot"]), line["what"]
-        window, on = self._windows.by_id[robot], line["on"]
+        robot = self._robot(line["robot"])
+        what = line["what"]
+        window = self._windows.by_id[robot]
+        on = line["on"]
         if what == "processing":
             seconds = line.get("seconds", 0.0)
             window.faults.slow_down(seconds if on else None)

@@ -14,7 +14,9 @@ from dva_sim.network.sockets import PORT_TRIES
 from dva_sim.protocol import messages as m
 
 Then = Callable[[bool, str], object]
-OFF, REGISTERED, LISTENING = "off", "registered", "listening"
+OFF = "off"
+REGISTERED = "registered"
+LISTENING = "listening"
 
 
 class OwnStation:
@@ -35,10 +37,16 @@ class OwnStation:
     """
 
     def __init__(self, robot: RobotAgent, network: RealNetwork, host: str, port: int) -> None:
-        self._robot, self._network, self._host, self._port = robot, network, host, port
-        self.state, self.dva = OFF, ""
+        self._robot = robot
+        self._network = network
+        self._host = host
+        self._port = port
+        self.state = OFF
+        self.dva = ""
         self.deaf: Callable[[bool], object] = lambda _: None
-        self._problem, self._asking, self._begun = "", False, False
+        self._problem = ""
+        self._asking = False
+        self._begun = False
         robot.device.silent = True
         robot.device.address = self._own_address()
 
@@ -62,7 +70,9 @@ class OwnStation:
         device = self._robot.device
         if self.state != OFF or self._asking:
             raise Refused(f"it is {'asking already' if self._asking else self.state}")
-        self.dva, self._asking, self._problem = dva, True, ""
+        self.dva = dva
+        self._asking = True
+        self._problem = ""
         self._network.introduce(device.dva, dva)
         device.come_back()
         device.register_once(
@@ -109,7 +119,8 @@ class OwnStation:
         except NetworkError as error:
             self._problem = f"{error}; switch it off and register it again"
             raise Refused(self._problem) from None
-        self.state, self._problem = LISTENING, ""
+        self.state = LISTENING
+        self._problem = ""
         device.tell(f"listens on {device.address}", "link")
         self.deaf(False)
         if not self._begun:
@@ -125,7 +136,9 @@ class OwnStation:
         self._robot.hang()
         device.leave()
         device.tell("is switched off", "link")
-        self.state, self._asking, self._problem = OFF, False, ""
+        self.state = OFF
+        self._asking = False
+        self._problem = ""
         if not self._port:
             device.address = self._own_address()
 

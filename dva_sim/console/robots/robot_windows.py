@@ -87,7 +87,8 @@ class RobotWindow:
 
     def _read(self, now: float) -> Iterator[SensorShown]:
         for name, port in self.robot.sensors.items():
-            values, stuck = port.read(now), name in self.faults.stuck
+            values = port.read(now)
+            stuck = name in self.faults.stuck
             shown: SensorShown = {"name": name, "unit": port.unit, "stuck": stuck}
             if len(values) > 3:
                 shown["least"] = min(values)
@@ -117,7 +118,9 @@ class RobotWindows:
         sent_at: Callable[[bytes], float | None],
         lost: Callable[[str, bytes], object],
     ) -> None:
-        self._recorder, self._numbers, self._labels = recorder, numbers, labels
+        self._recorder = recorder
+        self._numbers = numbers
+        self._labels = labels
         self._sent_at = sent_at
         self.by_id = {
             id_tag: RobotWindow(
@@ -128,7 +131,8 @@ class RobotWindows:
 
     def about(self, id_tag: str) -> ThingBody:
         """Return what does not change of a robot, for the scene: what its pictures are drawn by."""
-        spec, motors = self.by_id[id_tag].robot.body.spec, self.by_id[id_tag].robot.body.motors
+        spec = self.by_id[id_tag].robot.body.spec
+        motors = self.by_id[id_tag].robot.body.motors
         return {
             "wheel_radius_m": round(WHEEL * spec.radius, 3),
             "corners_m": [list(corner) for corner in spec.corners],
@@ -142,7 +146,8 @@ class RobotWindows:
 
     def heard(self, id_tag: str, exchange: Exchange) -> None:
         """A robot has heard a message, or has answered one that it had heard before."""
-        window, again = self.by_id[id_tag], exchange.number <= self.by_id[id_tag].newest
+        window = self.by_id[id_tag]
+        again = exchange.number <= self.by_id[id_tag].newest
         if exchange.reply is not None and exchange.service_s is not None:
             window.replies.add(exchange.service_s)
         if not again:
@@ -190,8 +195,11 @@ class RobotWindows:
     def _line(
         self, id_tag: str, window: RobotWindow, reason_of: Callable[[RobotAgent], str]
     ) -> RobotWindowLine:
-        robot, now = window.robot, window.robot.device.clock.now
-        point, body, faults = robot.set_point, robot.body, window.faults
+        robot = window.robot
+        now = window.robot.device.clock.now
+        point = robot.set_point
+        body = robot.body
+        faults = window.faults
         in_force = now < point.until
         asked = (point.speed, point.turn_rate) if in_force else (0.0, 0.0)
         speed, turn = body.motors.set_point(*self._limited(robot, *asked))

@@ -17,7 +17,9 @@ def stop_reason(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
         now: [s]
         held_by_lag: True if nobody may drive now because the run lags.
     """
-    body, controller, point = robot.body, robot.controller, robot.set_point
+    body = robot.body
+    controller = robot.controller
+    point = robot.set_point
     if body.jammed:
         return "it is stuck against something"
     if body.in_contact and STILL < abs(point.speed) > abs(body.speed) / HELD_BACK:

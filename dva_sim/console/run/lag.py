@@ -15,7 +15,8 @@ class LagRule:
     """
 
     def __init__(self) -> None:
-        self.held, self.newest = False, 0.0
+        self.held = False
+        self.newest = 0.0
         self._bad_at = float("-inf")
 
     def measured(self, now: float, lag: float) -> bool:
@@ -27,7 +28,9 @@ class LagRule:
         """
         self.newest = lag
         if lag > LIMIT:
-            begins, self.held, self._bad_at = not self.held, True, now
+            begins = not self.held
+            self.held = True
+            self._bad_at = now
             return begins
         if self.held and now - self._bad_at >= GOOD_FOR:
             self.held = False

@@ -5,23 +5,19 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 from typing_extensions import override
 
 from dva_sim.console.run.recorder import ConsoleRecorder
 from dva_sim.kernel.clock import Clock
-from dva_sim.network.carriers import RunCarrier, free_port
 from dva_sim.network.emulator.crossing import CrossedLink
 from dva_sim.network.emulator.forwarder import FAR, NEAR
 from dva_sim.network.emulator.report import LinkReport
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.link import LinkConfig
-from dva_sim.network.mqtt import open_broker
 from dva_sim.network.realtime import PacedClock
-from dva_sim.network.sockets import NodeCrossing
+from dva_sim.network.sockets import NodeCrossing, SocketNetwork
 from dva_sim.simulation.full.observations import Listener, Senders
 from dva_sim.simulation.full.stage import id_of, kind_of
 from dva_sim.simulation.scenario import Scenario
@@ -66,13 +62,10 @@ class RobotCrossing(NodeCrossing):
 
     @override
     def way(self, node: str, peer: str, endpoint: str) -> str | None:
-        way = self.way_to(node, _end_of(peer), int(endpoint.rpartition(":")[2]))
-        return None if way is None else f"ipc://{way}"
-
-    def way_to(self, node: str, end: str, port: int) -> Path | None:
-        """Return what leads a node to a port at an end of the link; None if it is at that end."""
         here = _end_of(node)
-        return None if here == end else self.link.way(here, port)
+        if here == _end_of(peer):
+            return None
+        return f"ipc://{self.link.way(here, int(endpoint.rpartition(':')[2]))}"
 
 
 def _end_of(node: str) -> str:
@@ -80,7 +73,7 @@ def _end_of(node: str) -> str:
 
 
 class ConsoleSockets:
-    """The sockets of all devices of a console; over ZeroMQ each has two ports of its own.
+    """The sockets of all devices of a console; each has two ports of its own.
 
     Args:
         scenario: Says what is set on the sockets.
@@ -89,7 +82,6 @@ class ConsoleSockets:
         host: Address to listen on.
         port: Port for the DVA's requests; its publications have the next one. 0: any two free ones.
         ring: Keys of the devices; None to run without.
-        carrier: Transport of the messages; None: ZeroMQ.
         emulated: Random seed of the scenario's link, which is emulated between robots, guards and
             detectors and everybody else; None: it is not.
 
@@ -109,24 +101,16 @@ class ConsoleSockets:
         host: str = "127.0.0.1",
         port: int = 0,
         ring: KeyRing | None = None,
-        carrier: RunCarrier | None = None,
         emulated: int | None = None,
     ) -> None:
-        self._clock, self._recorder, self._host, self._port = clock, recorder, host, port
-        self.dva, self.packets = "", None
-        carrier, broker, self._broker = carrier or RunCarrier(), "", None
-        crossing = None if emulated is None else RobotCrossing(scenario.link, emulated)
-        self.crossing = crossing
-        ways = None
-        if carrier.is_mqtt:
-            self._port = port or free_port(host)
-            also = None if crossing is None else crossing.link.place(self._port)
-            broker, self._broker = f"{host}:{self._port}", open_broker(host, self._port, also)
-            if crossing is not None:
-                ways = partial(crossing.way_to, end=carrier.mqtt.broker, port=self._port)
-        self.network = carrier.open(
-            *(clock, ring, self._tell, scenario.zeromq, broker), crossing=crossing, ways=ways
-        )
+        self._clock = clock
+        self._recorder = recorder
+        self._host = host
+        self._port = port
+        self.dva = ""
+        self.packets = None
+        self.crossing = None if emulated is None else RobotCrossing(scenario.link, emulated)
+        self.network = SocketNetwork(clock, ring, self._tell, scenario.zeromq, self.crossing)
         if self.crossing is not None:
             clock.every(LOOK_AT_LINK, self._look_at_link)
         self._senders = Senders(self.network.is_here)
@@ -140,6 +124,15 @@ class ConsoleSockets:
     def has_lost_link(self) -> bool:
         """True if the emulated link has ended by itself."""
         return self.crossing is not None and self.crossing.link.has_ended
+
+    def refuse_lost_link(self) -> None:
+        """Refuse to go on without the emulated link.
+
+        Raises:
+            LinkEnded: it has ended by itself.
+        """
+        if self.crossing is not None and self.has_lost_link:
+            raise self.crossing.link.ended()
 
     def _look_at_link(self) -> bool:
         if self.has_lost_link:
@@ -179,7 +172,8 @@ class ConsoleSockets:
             ends = _ENDS.search(payload, 0, _HEADER)
             if ends is None:
                 return
-            to, source = ends[1].decode(), ends[2].decode()
+            to = ends[1].decode()
+            source = ends[2].decode()
             if sent:
                 self._senders.note(node, payload)
                 listener.sent(now, node, to, payload)
@@ -196,5 +190,3 @@ class ConsoleSockets:
         if self.crossing is not None:
             self.packets = self.crossing.link.report()
             self.crossing.link.close()
-        if self._broker is not None:
-            self._broker.close()

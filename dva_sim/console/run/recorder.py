@@ -127,7 +127,8 @@ def keep_run(run: Run, recorder: ConsoleRecorder) -> None:
     """Say for the recording where everybody is, from now on."""
     kept = recorder.kept
     assert kept is not None
-    field, clock = run.field, run.clock
+    field = run.field
+    clock = run.clock
 
     def sample() -> None:
         now = clock.now
@@ -143,8 +144,10 @@ def keep_run(run: Run, recorder: ConsoleRecorder) -> None:
             kept.put_new("event", *event_facts(e), key=f"event {e.number}")
 
     log = FactLog(
-        *(kept.observe, field.robots, lambda robot: motion_of(field.robots[robot])),
-        lambda: page_of(run.dva),
+        kept.observe,
+        robots=field.robots,
+        look=lambda robot: motion_of(field.robots[robot]),
+        page=lambda: page_of(run.dva),
         keeps_sent=False,
     )
     facts()

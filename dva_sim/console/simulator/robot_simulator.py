@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
 
-from dva_sim.cameras.children import ChildFailed
-from dva_sim.console.asking.refusal import Refused
+from dva_sim.console.asking.dispatcher import ActionDispatcher, does
+from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.audit.audit_keeper import auditing
 from dva_sim.console.pages.addresses import own_address
-from dva_sim.console.pages.page_options import PageOptions
 from dva_sim.console.pages.processes import ConsoleProcesses
-from dva_sim.console.simulator.lone_robot_actions import LoneRobotActions
+from dva_sim.console.robots.robot_actions import RobotActions
 from dva_sim.console.simulator.robot_world import RobotWorld
+from dva_sim.console.wire.actions import ActionPlace, Asked
+from dva_sim.console.wire.arguments import (
+    LogsLooked,
+    Nothing,
+    OfRobot,
+    OfSome,
+    RegistrationAsked,
+    RobotsWatched,
+)
+from dva_sim.console.wire.seats import DoneLine
 from dva_sim.live.process import ending_when_asked
 from dva_sim.network.addresses import check_address
 from dva_sim.network.keys import KeyRing
+from dva_sim.options.runs import RobotOptions
+from dva_sim.protocol import messages as m
+from dva_sim.serving.processes import ChildFailed
 from dva_sim.simulation.full.verdicts import (
     EVENTS_UNKNOWN,
     OF_THE_DVA,
@@ -26,43 +36,106 @@ from dva_sim.simulation.full.verdicts import (
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.simulation.scenario.lone_robot import lone_robot
 
+LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
+
+
+class LoneRobotActions:
+    """Does what lines of the web process ask for.
+
+    Args:
+        world: The robot.
+
+    Attributes:
+        take: Does what a line asks for.
+    """
+
+    def __init__(self, world: RobotWorld) -> None:
+        self._world = world
+        self._hands = RobotActions(
+            world.windows,
+            lambda _: world.robot.device.id_tag,
+            why_not=lambda: "held: this machine cannot keep up" if world.lag.held else "",
+            labels=world.stage.labels,
+            deaf=world.deafen,
+            slow=world.slowed,
+        )
+        self.take = ActionDispatcher(
+            ActionPlace.ROBOT,
+            holders=(self, self._hands),
+            tell=self._tell,
+            elsewhere="a robot that runs alone does not know {what!r}",
+            audited=lambda: world.audited,
+        ).take
+        world.hold = lambda _: self._hands.stop(world.field.robots)
+        world.clock.pulse(LOOK, self._hands.look_for_the_silent)
+
+    def _tell(self, answer: DoneLine) -> None:
+        self._world.tell({**answer, "t": self._world.feed.now_ms})
+        self._world.tell_now()
+
+    @does("emergency")
+    def _emergency(self, _: str, line: OfSome, on_result: OnResult) -> None:
+        self._hands.stop(self._world.field.robots)
+        self._hands.press_emergency(self._world.robot.device.id_tag)
+        on_result(True, f"{self._world.robot.device.label} has stopped")
+
+    @does("robot_release")
+    def _release_emergency(self, client: str, line: OfRobot, on_result: OnResult) -> None:
+        robot = self._world.robot
+        decision = self._hands.release_emergency(robot.device.id_tag, client)
+        on_result(decision.code == m.OK, decision.text)
+
+    @does("robot_register")
+    def _register(self, _: str, line: RegistrationAsked, on_result: OnResult) -> None:
+        dva = line["dva"].strip()
+        check_address(dva)
+        self._world.station.register(dva, on_result)
+
+    @does("robot_listen")
+    def _listen(self, _: str, line: OfRobot, on_result: OnResult) -> None:
+        self._world.station.listen()
+        on_result(True, f"listens on {self._world.robot.device.address}")
+
+    @does("robot_off")
+    def _off(self, _: str, line: OfRobot, on_result: OnResult) -> None:
+        self._world.station.switch_off()
+        on_result(True, "it is off")
+
+    @does("release")
+    def _release(self, _: str, line: Nothing, on_result: OnResult) -> None:
+        """Nothing is in hand but by `manual_take`."""
+        on_result(True, "released")
+
+    @does("gone")
+    def _gone(self, client: str, _: Asked) -> None:
+        self._hands.gone(client)
+
+    @does("watch")
+    def _watch(self, _: str, line: RobotsWatched) -> None:
+        own = {self._world.robot.device.id_tag}
+        self._world.screens.watch(own if line["robots"] else set())
+
+    @does("look")
+    def _look(self, _: str, line: LogsLooked) -> None:
+        self._world.logs.look(line["logs"])
+
+
 LAST_WORDS = 0.2  # for what was said last [s]
 EVERYWHERE = "0.0.0.0", "::"
 
 Say = Callable[[str], object]
 
 
-@dataclass(frozen=True, kw_only=True)
-class RobotOptions(PageOptions):
-    """Options of a single robot: its profile, its port, and its DVA.
+def scenario_of(options: RobotOptions) -> Scenario:
+    """Return the robot's world: a site in which nothing else happens.
 
-    Attributes:
-        profile: Name or path.
-        number: Number of the robot, from 1: its id and its label follow from that.
-        dva: Address for registering at once, `HOST:PORT`; None: from its page.
-        listen: Port of its requests; its publications have the next one. 0: any two that are free.
-        keys: Folder with the keys of the devices; None to run without.
-        seed: Random seed.
-        changes: Changes of the scenario that it stands in, `KEY=VALUE`.
+    Raises:
+        ConfigError: there is no such profile or site, or the address of the DVA is none.
     """
-
-    profile: str = "servrobot"
-    number: int = 1
-    dva: str | None = None
-    listen: int = 0
-    keys: Path | None = None
-    seed: int = 1
-    changes: tuple[str, ...] = ()
-
-    def read(self) -> Scenario:
-        """Return the robot's world: a site in which nothing else happens.
-
-        Raises:
-            ConfigError: there is no such profile or site, or the address of the DVA is none.
-        """
-        if self.dva is not None:
-            check_address(self.dva, "--dva ")
-        return lone_robot({"robot": {"profile": self.profile, "count": self.number}}, self.changes)
+    if options.dva is not None:
+        check_address(options.dva, "--dva ")
+    robot = {"profile": options.profile or "servrobot", "count": options.number}
+    return lone_robot({"robot": robot}, options.set)
 
 
 class RobotSimulator:
@@ -74,11 +147,12 @@ class RobotSimulator:
     """
 
     def __init__(self, options: RobotOptions, say: Say) -> None:
-        self._options, self._say = options, say
+        self._options = options
+        self._say = say
         self._processes = ConsoleProcesses(options, say)
 
     def run(self) -> None:
-        """Run until Ctrl-C, SIGTERM, or the end of the web process.
+        """Run until Ctrl-C, SIGTERM, SIGHUP, or the end of the web process.
 
         Raises:
             ConfigError: there is no such robot, or no key of it.
@@ -87,11 +161,16 @@ class RobotSimulator:
             RulesBroken: a safety rule was broken.
         """
         options = self._options
-        scenario = options.read()
+        scenario = scenario_of(options)
         ring = None if options.keys is None else KeyRing(options.keys)
         host = own_address(options.host) if options.host in EVERYWHERE else options.host
         world = RobotWorld(
-            *(scenario, options.number, options.seed), ring=ring, host=host, port=options.listen
+            scenario,
+            number=options.number,
+            seed=options.seed,
+            ring=ring,
+            host=host,
+            port=options.listen,
         )
         try:
             self._run(world)

@@ -86,8 +86,10 @@ class RobotWorld:
         host: str = "127.0.0.1",
         port: int = 0,
     ) -> None:
-        self.scenario, self.seed = scenario, seed
-        self.clock, self.recorder = clock or PacedClock(), ConsoleRecorder()
+        self.scenario = scenario
+        self.seed = seed
+        self.clock = clock or PacedClock()
+        self.recorder = ConsoleRecorder()
         self.sockets = ConsoleSockets(scenario, self.clock, self.recorder, host, ring=ring)
         try:
             self._place(number, host, port)
@@ -97,7 +99,8 @@ class RobotWorld:
         self.tell: Tell = lambda *_: None
         self.show: Show = lambda *_: None
         self.dropped: Callable[[], int] = lambda: 0
-        self.lag, self._news = LagRule(), News(lambda: self.tell)
+        self.lag = LagRule()
+        self._news = News(lambda: self.tell)
         self.hold: Callable[[str], object] = lambda _: None
         self.clock.on_late = self._late
         self.audited: Audited | None = None
@@ -117,9 +120,12 @@ class RobotWorld:
         """Put the robot where it begins; it is off."""
         cameras = Cameras(lambda label, _: camera_url("http:///", label), topic_of)
         self.stage = Stage(
-            *(self.scenario, self.seed, self.network, self.recorder),
-            lambda kind, number: host,
-            self.sockets.time_of_day(),
+            self.scenario,
+            seed=self.seed,
+            network=self.network,
+            recorder=self.recorder,
+            address=lambda kind, number: host,
+            time_of_day=self.sockets.time_of_day(),
             cameras=cameras,
             attended=True,
         )
@@ -132,15 +138,18 @@ class RobotWorld:
 
     def _watch(self) -> None:
         """Feed, windows, log, camera and audit look at the robot from now on."""
-        robot, id_tag = self.robot, self.robot.device.id_tag
+        robot = self.robot
+        id_tag = self.robot.device.id_tag
         self.feed = Feed(self)
         self.recorder.robots = {id_tag}
         self.audit = SafetyAudit(
-            *(self.recorder, terms_of(self.scenario, attended=True)),
-            lambda _: motion_of(robot),
-            self.field.place_of,
+            self.recorder,
+            terms=terms_of(self.scenario, attended=True),
+            motion_of=lambda _: motion_of(robot),
+            place_of=self.field.place_of,
         )
-        self.recorder.on_accepted, self.recorder.on_hand = self.audit.accepted, self.audit.by_hand
+        self.recorder.on_accepted = self.audit.accepted
+        self.recorder.on_hand = self.audit.by_hand
         self.sockets.watch(self.audit)
         about = self.feed.numbers, self.stage.labels
         self.windows = RobotWindows(
@@ -188,7 +197,11 @@ class RobotWorld:
     def begin(self) -> None:
         """Implement `ConsoleSubject`."""
         scene = scene_of(
-            *(self.scenario, self.stage.site, (), self.feed.things.all, LINK),
+            self.scenario,
+            site=self.stage.site,
+            incidents=(),
+            things=self.feed.things.all,
+            link=LINK,
             name=f"robot {self.scenario.robot.profile}",
             seed=self.seed,
         )

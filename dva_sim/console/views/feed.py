@@ -39,7 +39,8 @@ class Feed:
     """
 
     def __init__(self, run: PlayedRun, events: EventTable | None = None) -> None:
-        self._run, self._events = run, events or EventTable()
+        self._run = run
+        self._events = events or EventTable()
         self.things = Things()
         self.numbers = self.things.numbers
         self.stoppers: dict[str, tuple[str, str]] = {}
@@ -109,8 +110,10 @@ class Feed:
         return [self._robot(robot, held_by_lag) for robot in self._run.field.robots.values()]
 
     def _robot(self, robot: RobotAgent, held_by_lag: bool) -> RobotRow:
-        run, id_tag = self._run, robot.device.id_tag
-        now, (holder, held_for) = run.clock.now, robot.holder
+        run = self._run
+        id_tag = robot.device.id_tag
+        now = run.clock.now
+        (holder, held_for) = robot.holder
         point = robot.set_point
         driven = robot.controller.mode is Mode.TELEOPERATION
         drive = run.recorder.newest_drive.get(id_tag)
@@ -166,7 +169,8 @@ class Feed:
 
 def story_of(recorder: Recorder) -> Iterator[StoryLine]:
     """Yield what a recorder was told since the last call; it is forgotten then."""
-    moments, recorder.timeline = recorder.timeline, list[Moment]()
+    moments = recorder.timeline
+    recorder.timeline = list[Moment]()
     for moment in moments:
         yield {"k": "story", **moment_shown(moment)}
 

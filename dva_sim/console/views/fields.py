@@ -36,7 +36,8 @@ class HazardFeed:
         surroundings: Surroundings,
         contained: Mapping[int, float],
     ) -> None:
-        self._incidents, self._surroundings = incidents, surroundings
+        self._incidents = incidents
+        self._surroundings = surroundings
         self._contained = contained
         west, south, east, north = site.extent
         area = max(1.0, (east - west) * (north - south))
@@ -48,7 +49,8 @@ class HazardFeed:
 
     def line(self, now_ms: int) -> HazardsLine:
         """Return the hazards as they are now."""
-        now, hazards = now_ms / 1000.0, list[HazardShown]()
+        now = now_ms / 1000.0
+        hazards = list[HazardShown]()
         for number, incident in enumerate(self._incidents):
             if not incident.is_there(now):
                 continue

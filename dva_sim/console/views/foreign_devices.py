@@ -50,7 +50,8 @@ class ForeignDevices:
     """
 
     def __init__(self, run: Run, feed: Feed) -> None:
-        self._run, self._feed = run, feed
+        self._run = run
+        self._feed = feed
         self._version = -1
         self._known: dict[str, str] = {}  # kinds, by id
 
@@ -70,7 +71,8 @@ class ForeignDevices:
         return entry.kind in (ROBOT, GUARD) and not is_shown and len(self._known) < MOST
 
     def _meet(self, entry: DeviceEntry) -> None:
-        device, is_robot = entry.device, entry.kind == ROBOT
+        device = entry.device
+        is_robot = entry.kind == ROBOT
         self._known[device.id_tag] = "robot" if is_robot else "guard"
         body = UNKNOWN_ROBOT if is_robot else {**UNKNOWN_PERSON, "person": True}
         label = distinct(device.label, device.id_tag, self._run.stage.labels.values())
@@ -78,7 +80,8 @@ class ForeignDevices:
 
     def positions(self) -> list[list[int]]:
         """Return the positions of devices that have reported one."""
-        frame, rows = self._run.stage.site.frame, []
+        frame = self._run.stage.site.frame
+        rows = []
         for id_tag, entry in self._here():
             if entry.position is not None:
                 x, y = frame.to_xy(entry.position.latitude, entry.position.longitude)

@@ -44,7 +44,9 @@ class MessageLog:
     """
 
     def __init__(self, name: str, node: str, transport: Transport) -> None:
-        self.name, self._node, self._transport = name, node, transport
+        self.name = name
+        self._node = node
+        self._transport = transport
         self.kept = self.wants_all = False
         self.listeners: list[Take] = []
         self._tap = Tap(transport.clock, self._take, publications=False)
@@ -86,7 +88,8 @@ class MessageLog:
 
 def _line_of(exchange: Exchange) -> list[Any]:
     """Number, time [ms], request, reply, service time [us], published; bytes as latin-1."""
-    reply, took = exchange.reply, exchange.service_s
+    reply = exchange.reply
+    took = exchange.service_s
     return [
         exchange.number,
         round(1000 * exchange.arrived),
@@ -107,7 +110,8 @@ class Logs:
     """
 
     def __init__(self, transport: Transport, node_of: Callable[[str], str | None]) -> None:
-        self._transport, self._node_of = transport, node_of
+        self._transport = transport
+        self._node_of = node_of
         self._logs: dict[str, MessageLog] = {}
         self._looked: dict[str, bool] = {}
 

@@ -38,7 +38,8 @@ class Things:
         self, id_tag: str, label: str, kind: str, body: ThingBody | None = None
     ) -> None:
         """Somebody comes whose label may be that of another one."""
-        number, more = len(self.all), body or {}
+        number = len(self.all)
+        more = body or {}
         self.all.append({"i": number, "id": id_tag, "label": label, "kind": kind, **more})
         self.numbers[id_tag] = number
 

@@ -17,18 +17,38 @@ from dva_sim.console.web.audit import AuditPages
 from dva_sim.console.web.camera import ConsoleCameras
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.phones import NoCertificate
-from dva_sim.console.web.server import make_server
 from dva_sim.console.web.simulation import Simulation
-from dva_sim.console.web.static_files import StaticFiles
 from dva_sim.console.wire.actions import prepare_checks
 from dva_sim.console.wire.roles import Role
-from dva_sim.kernel.errors import DvaSimError
+from dva_sim.kernel.errors import DvaSimError, error_line
 from dva_sim.serving.listening import listen
 from dva_sim.serving.port_listener import fitting_places
 from dva_sim.serving.server import serve
 
 if TYPE_CHECKING:
     from dva_sim.console.web.phone_listener import PhoneListener
+from starlette.types import ASGIApp
+
+from dva_sim.console.wire.limits import MOST_BYTES
+from dva_sim.serving.server import Server
+from dva_sim.serving.web_sockets import WireProtocol
+
+PING = 10.0  # [s]
+
+
+def make_server(app: ASGIApp, certificate: Path | None = None) -> Server:
+    """Return the server of an application; by https where it has a certificate, with its key."""
+    return Server.of(
+        app,
+        MOST_BYTES,
+        ssl_certfile=certificate,
+        ws=WireProtocol,
+        ws_max_size=MOST_BYTES,
+        ws_ping_interval=PING,
+        ws_ping_timeout=PING,
+        ws_per_message_deflate=False,
+    )
+
 
 FAREWELL = 0.2  # for last words on their way [s]
 
@@ -39,7 +59,7 @@ def main(given: Sequence[str] | None = None) -> int:
     try:
         asyncio.run(run(options))
     except DvaSimError as error:
-        print(f"dva-sim: {error}", file=sys.stderr)
+        print(error_line(error), file=sys.stderr)
         return 1
     return 0
 
@@ -62,7 +82,7 @@ def _parser() -> argparse.ArgumentParser:
 
 async def run(options: argparse.Namespace) -> None:
     """Open all, say where, serve, end."""
-    # Ctrl-C reaches all processes of a terminal; the simulation says when it is over.
+    # Ctrl-C may reach all processes; the simulation says when it is over.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sock = listen(options.host, options.port)
     port = sock.getsockname()[1]
@@ -85,12 +105,13 @@ async def run(options: argparse.Namespace) -> None:
         cameras.keep_telling(), hub.keep_tidy(), asyncio.to_thread(prepare_checks)
     )
     closing = asyncio.ensure_future(_close_when(ended, hub, cameras))
-    files, over, audit = StaticFiles(), _after(closing), AuditPages(options.audit)
-    app = make_app(access, hub, cameras, files, door=door, audit=audit, report=options.report)
+    over = _after(closing)
+    audit = AuditPages(options.audit)
+    app = make_app(access, hub, cameras, door=door, audit=audit, report=options.report)
     listeners = 2 if phones else 1
     serves = [serve(make_server(app), sock, fitting_places(listeners), over)]
     if phones:
-        app = make_app(phones.access, hub, cameras, files, door=door, audit=audit)
+        app = make_app(phones.access, hub, cameras, door=door, audit=audit)
         server = make_server(app, phones.certificate)
         serves.append(serve(server, phones.sock, fitting_places(listeners), over))
     await asyncio.gather(*serves)

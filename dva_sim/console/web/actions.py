@@ -105,8 +105,10 @@ class Bucket:
     """
 
     def __init__(self, rate: float, burst: int) -> None:
-        self._rate, self._burst = rate, float(burst)
-        self._room, self._then = float(burst), 0.0
+        self._rate = rate
+        self._burst = float(burst)
+        self._room = float(burst)
+        self._then = 0.0
 
     def takes(self, now: float) -> bool:
         """Return True if another message at `now` [s] is within the limit."""

@@ -16,23 +16,46 @@ from starlette.responses import (
     RedirectResponse,
     Response,
 )
-from starlette.routing import Route, WebSocketRoute
+from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from dva_sim.cameras.streaming import PictureStream
 from dva_sim.cameras.streams import CameraStreams, headers_of
+from dva_sim.console.web import static_files
 from dva_sim.console.web.access import Entrance
 from dva_sim.console.web.audit import AuditPages
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.log_requests import LogRequests
 from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePages
-from dva_sim.console.web.report import StudyReport
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
-from dva_sim.console.web.static_files import StaticFiles
 from dva_sim.console.wire.roles import Role
 from dva_sim.serving.connection import place_of
 from dva_sim.serving.port_guard import facts_of
+
+
+class StudyReport:
+    """A study's report: one file with styles and pictures of its own, and no scripts.
+
+    Args:
+        path: File of the report; None without one.
+    """
+
+    POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+
+    async def page(self, _: Request) -> Response:
+        """`GET /report`: the report of a study that is shown."""
+        try:
+            data = None if self._path is None else self._path.read_bytes()
+        except OSError:
+            data = None
+        if data is None:
+            raise HTTPException(404)
+        return HTMLResponse(data, headers=NOT_KEPT | {"Content-Security-Policy": self.POLICY})
+
 
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
@@ -72,7 +95,8 @@ class Doorkeeper:
     """
 
     def __init__(self, app: ASGIApp, access: Entrance) -> None:
-        self._app, self._access = app, access
+        self._app = app
+        self._access = access
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request."""
@@ -86,7 +110,8 @@ class Doorkeeper:
             await send(message)
 
         answer = self._refusal(scope)
-        place, role = place_of(scope), scope.get(ROLE, Role.NOBODY)
+        place = place_of(scope)
+        role = scope.get(ROLE, Role.NOBODY)
         is_limited = scope["path"] not in UNLIMITED
         if not place.begin(role, time.monotonic(), is_limited=is_limited):
             answer = answer or problem(503, "too many connections are in use")
@@ -138,18 +163,17 @@ class Pages:
         access: Knows the cookie.
         hub: Knows the simulation.
         cameras: Pictures.
-        files: Files of the page.
     """
 
-    def __init__(
-        self, access: Entrance, hub: Hub, cameras: CameraStreams, files: StaticFiles
-    ) -> None:
-        self._access, self._simulation, self._cameras = access, hub.simulation, cameras
-        self._files = files
+    def __init__(self, access: Entrance, hub: Hub, cameras: CameraStreams) -> None:
+        self._access = access
+        self._simulation = hub.simulation
+        self._cameras = cameras
 
     async def index(self, request: Request) -> Response:
         """`GET /`: the page; a token in the address becomes a cookie and leaves the address."""
-        path, token = request.url.path, request.query_params.get("token")
+        path = request.url.path
+        token = request.query_params.get("token")
         if path == "/" and request.scope[ROLE] is Role.PHONE:
             path = "/phone"
         if token is not None or path != request.url.path:
@@ -158,18 +182,7 @@ class Pages:
             if self._access.tokens.are_asked and role is not Role.NOBODY:
                 answer.headers["Set-Cookie"] = self._access.cookie_for(role)
             return answer
-        found = self._files.find(PAGES[path])
-        return HTMLResponse(found.data if found else _NO_PAGE, headers=NOT_KEPT)
-
-    async def file(self, request: Request) -> Response:
-        """`GET /static/NAME`: a file of the pages."""
-        found = self._files.find(request.path_params["name"])
-        if found is None:
-            raise HTTPException(404)
-        headers = {"ETag": found.tag, "Cache-Control": "no-cache"}
-        if found.tag in request.headers.get("if-none-match", ""):
-            return Response(status_code=304, headers=headers)
-        return Response(found.data, headers=headers, media_type=found.kind)
+        return HTMLResponse(static_files.read(PAGES[path]) or _NO_PAGE, headers=NOT_KEPT)
 
     async def health(self, _: Request) -> Response:
         """`GET /healthz`: 200 while the simulation runs, else 503."""
@@ -238,7 +251,6 @@ def make_app(
     access: Entrance,
     hub: Hub,
     cameras: CameraStreams,
-    files: StaticFiles,
     door: PhoneDoor | None = None,
     audit: AuditPages | None = None,
     report: Path | None = None,
@@ -249,13 +261,14 @@ def make_app(
         access: Its rules.
         hub: Hub of all pages, regardless of the listener that opened them.
         cameras: Pictures.
-        files: Files of the pages.
         door: Entrance for phones, if there is one.
         audit: Audit log, if it is kept.
         report: A study's report that is shown as it is.
     """
     study_report = StudyReport(report)
-    pages, rest, phones = Pages(access, hub, cameras, files), Rest(hub), PhonePages(door, files)
+    pages = Pages(access, hub, cameras)
+    rest = Rest(hub)
+    phones = PhonePages(door)
     log = audit or AuditPages(None)
     logs = LogRequests(hub)
 
@@ -271,7 +284,7 @@ def make_app(
         Route(AUTHORITY, phones.authority),
         Route("/api/phones", _for(Role.DRIVE, phones.about)),
         Route("/api/phones.svg", _for(Role.DRIVE, phones.code)),
-        Route("/static/{name:path}", pages.file),
+        Mount("/static", static_files.PageFiles()),
         Route(OPEN, pages.health),
         Route("/report", study_report.page),
         Route("/camera/{label:path}.mjpg", pages.stream),

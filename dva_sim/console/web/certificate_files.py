@@ -20,7 +20,8 @@ from dva_sim.console.web.certificates import (
 )
 from dva_sim.console.web.phones import NoCertificate
 
-AUTHORITY, LEAF = "authority.pem", "console.pem"
+AUTHORITY = "authority.pem"
+LEAF = "console.pem"
 
 
 class KeptCertificates(NamedTuple):
@@ -39,7 +40,8 @@ class KeptCertificates(NamedTuple):
 
 def data_folder() -> Path:
     """The folder of this user's data of the program, as the system has it."""
-    given, home = os.environ.get("XDG_DATA_HOME", ""), Path("~").expanduser()
+    given = os.environ.get("XDG_DATA_HOME", "")
+    home = Path("~").expanduser()
     if Path(given).is_absolute():
         return Path(given) / "dva-sim"
     if sys.platform == "darwin":

@@ -49,7 +49,8 @@ class Hosts:
     @classmethod
     def of(cls, given: list[str]) -> Hosts:
         """Names and addresses, sorted out; what can be neither is left out."""
-        names, addresses = set(), set()
+        names = set()
+        addresses = set()
         for one in given:
             try:
                 addresses.add(ipaddress.ip_address(one.strip("[]").partition("%")[0]))
@@ -80,7 +81,8 @@ class Signed:
         Raises:
             ValueError: it is something else, or the two do not belong together.
         """
-        key, certificate = load_pem_private_key(data, None), x509.load_pem_x509_certificate(data)
+        key = load_pem_private_key(data, None)
+        certificate = x509.load_pem_x509_certificate(data)
         if not isinstance(key, ec.EllipticCurvePrivateKey):
             raise ValueError("the key is of another kind")
         if certificate.public_key() != key.public_key():

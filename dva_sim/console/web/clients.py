@@ -56,7 +56,8 @@ class Driver:
         """The next message; None if all is said."""
         if self._answers:
             return self._answers.popleft()
-        text, self._seat = self._seat, None
+        text = self._seat
+        self._seat = None
         return text
 
 
@@ -78,7 +79,9 @@ class Client:
     """
 
     def __init__(self, name: str, role: Role, state: RunState, page: str = "") -> None:
-        self.name, self.role, self.page = name, role, page
+        self.name = name
+        self.role = role
+        self.page = page
         self.key = secrets.token_urlsafe(24)
         self.ws: WebSocket | None = None
         self.asked = 0.0
@@ -145,7 +148,8 @@ class Clients:
         """
         known = self._by_key(key)
         if known is not None and known.role is role and _may_come_again(known, page):
-            known.is_here, known.page = True, page
+            known.is_here = True
+            known.page = page
             known.feed = PageFeed(self._state, known.name, role >= Role.DRIVE)
             return known
         return self._add(Client(self._new_name("c"), role, self._state, page))
@@ -165,7 +169,8 @@ class Clients:
                 return None, None
             self.remove(least)
         program = self._add(Client(self._new_name("p"), role, self._state))
-        program.is_here, program.asked = False, now
+        program.is_here = False
+        program.asked = now
         return program, least
 
     def silent_programs(self, now: float) -> list[Client]:

@@ -33,16 +33,20 @@ class PageFeed:
     """
 
     def __init__(self, state: RunState, seat: str, acts: bool = True) -> None:
-        self._state, self._seat = state, seat
+        self._state = state
+        self._seat = seat
         self.looks = Looks(state.logs, acts)
         self.watches: frozenset[int] = frozenset()
         self._have_windows: dict[int, int] = {}
         self._own: deque[str] = deque()
-        self._count, self._turn = 0, 0
+        self._count = 0
+        self._turn = 0
         self._wants_snapshot = True
         self._have: dict[str, int] = {}
         self._have_seats: dict[str, int] = {}
-        self._have_places, self._have_story, self._have_scene = 0, 0, -1
+        self._have_places = 0
+        self._have_story = 0
+        self._have_scene = -1
 
     def resync(self) -> None:
         """Begin again with all there is."""
@@ -78,9 +82,11 @@ class PageFeed:
 
     def _snapshot(self) -> str:
         state = self._state
-        self._wants_snapshot, self._have_scene = False, state.scene_version
+        self._wants_snapshot = False
+        self._have_scene = state.scene_version
         self._have = {kind: known.version for kind, known in state.latest.items()}
-        self._have_places, self._have_story = state.place_version, state.story_count
+        self._have_places = state.place_version
+        self._have_story = state.story_count
         self._have_seats = {seat: known.version for seat, known in state.seats_short.items()}
         self._have_windows.clear()
         for own in ("seat", "guard"):
@@ -130,7 +136,8 @@ class PageFeed:
         state = self._state
         if state.place_version <= self._have_places:
             return None
-        since, self._have_places = self._have_places, state.place_version
+        since = self._have_places
+        self._have_places = state.place_version
         return state.moved_since(since)
 
     def _next_story_line(self) -> str | None:

@@ -218,7 +218,8 @@ class Hub:
         if driver.replaced:
             return
         message = read(text)
-        name, key = message.pop("do", None), message.pop("id", None)
+        name = message.pop("do", None)
+        key = message.pop("id", None)
         try:
             if not client.is_here and name not in WITHOUT_PAGE:
                 raise BadMessage("this page has lost its other connection; it may only stop")

@@ -75,19 +75,22 @@ class Entry:
             self.kind, self.payload = kind_of(self.data), payload_of(body)
             self.label = visible(body.label) if isinstance(body, m.Registration) else ""
         except ProtocolError as error:
-            self.kind, self.payload = kind_of(self.data), error.reason[:_SHOWN]
+            self.kind = kind_of(self.data)
+            self.payload = error.reason[:_SHOWN]
         if self.reply is not None:
             try:
                 answer = decode(self.reply).body
             except ProtocolError:
                 return
             if isinstance(answer, m.Reply):
-                self.code, self.text = answer.code, answer.text
+                self.code = answer.code
+                self.text = answer.text
 
     def brief(self, names: Names) -> LogEntry:
         """Return what a table shows of it."""
         header = self.header
-        source, to = header.get("SourceID", ""), header.get("DestinationID", "")
+        source = header.get("SourceID", "")
+        to = header.get("DestinationID", "")
         return {
             "n": self.number,
             "t": self.time,
@@ -128,7 +131,8 @@ def kind_of(data: bytes) -> str:
 
 def header_of(data: bytes) -> dict[str, str]:
     """The elements of a header as they stand, of a message that may be broken."""
-    start, found = data[:1024], {}
+    start = data[:1024]
+    found = {}
     for name in _HEADER:
         match = re.search(rb"<%s>([^<]{0,64})</%s>" % (name.encode(), name.encode()), start)
         if match:

@@ -42,7 +42,8 @@ class LogRequests:
 
     async def lines(self, request: Request) -> Response:
         """`GET /api/logs/NAME?before=N&...`: lines of a device's log that match."""
-        log, before = self._log(request), request.query_params.get("before", "")
+        log = self._log(request)
+        before = request.query_params.get("before", "")
         if before and not (before.isascii() and before.isdigit() and len(before) < 12):
             return problem(400, "before should be a whole number")
         looks = Looks(self._logs, request.scope[ROLE] >= Role.DRIVE)
@@ -127,19 +128,23 @@ def laid_out(data: bytes) -> tuple[str, list[dict[str, Any]]]:
     What cannot be laid out without a change to what is wrong with it is shown as it came.
     """
     plain = data.decode("utf-8", "backslashreplace")
-    shown, mistakes = plain, check_message(data)
+    shown = plain
+    mistakes = check_message(data)
     if "\n" not in plain and (pretty := _indented(plain)) is not None:
         again = check_message(pretty.encode())
         if [one.text for one in again] == [one.text for one in mistakes]:
-            shown, mistakes = pretty, again
+            shown = pretty
+            mistakes = again
     return shown, [{"line": p.line, "column": p.column, "text": p.text} for p in mistakes]
 
 
 def _indented(text: str) -> str | None:
     """One line of XML as several; None if its elements do not close in order."""
-    lines, depth = [""], 0
+    lines = [""]
+    depth = 0
     for token in _TOKEN.findall(text):
-        closes, opens = token.startswith("</"), token.startswith("<") and token[1:2] not in "/?!"
+        closes = token.startswith("</")
+        opens = token.startswith("<") and token[1:2] not in "/?!"
         depth -= closes
         if depth < 0:
             return None

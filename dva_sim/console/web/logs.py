@@ -70,7 +70,8 @@ class LogFilter:
         for key, value in words.items():
             if not isinstance(value, str) or len(value) > 200:
                 raise BadMessage(f"{key} should be a text of at most 200 characters")
-        since, all_kinds = given.get("since", 0), given.get("publications", False)
+        since = given.get("since", 0)
+        all_kinds = given.get("publications", False)
         if type(since) is not int or not isinstance(all_kinds, bool):
             raise BadMessage("since should be a number, publications true or false")
         return cls(**words, publications=all_kinds, since=since)
@@ -86,7 +87,8 @@ class LogFilter:
     def _is_of_device(self, entry: Entry, names: Names) -> bool:
         if not self.device:
             return True
-        header, wanted = entry.header, self.device.lower()
+        header = entry.header
+        wanted = self.device.lower()
         ends = header.get("SourceID", ""), header.get("DestinationID", "")
         return any(wanted in f"{end} {names.get(end, '')}".lower() for end in ends)
 
@@ -141,7 +143,8 @@ class KeptLog:
         """Forget all: what comes next begins after the entry of that number."""
         self.entries.clear()
         self._changes.clear()
-        self.bytes, self.newest = 0, before
+        self.bytes = 0
+        self.newest = before
         self.begun += 1
 
     def _forget(self) -> None:
@@ -215,7 +218,8 @@ class Looks:
     """
 
     def __init__(self, logs: KeptLogs, acts: bool) -> None:
-        self._logs, self.acts = logs, acts
+        self._logs = logs
+        self.acts = acts
         self.wanted: dict[str, LogFilter] = {}
         self.tables: frozenset[str] = frozenset()
         self._seen: dict[str, tuple[int, int, int]] = {}  # changes, lost, begun

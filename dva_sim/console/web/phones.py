@@ -9,8 +9,8 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
 
 from dva_sim.console.pages.qr_code import svg
+from dva_sim.console.web import static_files
 from dva_sim.console.web.rest import NOT_KEPT
-from dva_sim.console.web.static_files import StaticFiles
 from dva_sim.kernel.errors import DvaSimError
 
 AUTHORITY = "/trust/dva-sim.crt"
@@ -51,11 +51,10 @@ class PhonePages:
 
     Args:
         door: Entrance for phones; None if there is none.
-        files: Files of the pages.
     """
 
-    def __init__(self, door: PhoneDoor | None, files: StaticFiles) -> None:
-        self._door, self._files = door, files
+    def __init__(self, door: PhoneDoor | None) -> None:
+        self._door = door
 
     async def about(self, _: Request) -> Response:
         """`GET /api/phones`: the address for phones."""
@@ -70,11 +69,10 @@ class PhonePages:
 
     async def trust(self, _: Request) -> Response:
         """`GET /trust`: how a phone comes to trust this console."""
-        found = self._files.find("trust.html")
-        if found is None or self._door is None:
+        page = static_files.read("trust.html")
+        if page is None or self._door is None:
             return _none()
-        page = found.data.decode().replace("FINGERPRINT", self._door.fingerprint)
-        return HTMLResponse(page, headers=NOT_KEPT)
+        return HTMLResponse(page.replace("FINGERPRINT", self._door.fingerprint), headers=NOT_KEPT)
 
     async def authority(self, _: Request) -> Response:
         """`GET /trust/dva-sim.crt`: the certificate of its authority."""

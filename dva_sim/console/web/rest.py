@@ -32,7 +32,8 @@ def state_of(state: RunState, clients: int) -> dict[str, Any]:
     rows = state.lines.get("rows", {})
     values = {row["i"]: row for row in rows.get("robots", ())}
     doing = {row["i"]: row for row in rows.get("people", ())}
-    robots, people = [], []
+    robots = []
+    people = []
     for thing in (state.scene or {}).get("things", ()):
         place = _place(state, thing["i"])
         about = {"label": thing["label"], "id": thing["id"], "kind": thing["kind"]}
@@ -63,7 +64,8 @@ def _place(state: RunState, index: int) -> dict[str, float]:
     if row is None:
         return {}
     _, x_cm, y_cm, heading, speed = row
-    x, y = x_cm / 100, y_cm / 100
+    x = x_cm / 100
+    y = y_cm / 100
     place = {"x_m": x, "y_m": y}
     if (frame := frame_of(state)) is not None:
         latitude, longitude = frame.to_latlon(x, y)
@@ -89,7 +91,8 @@ class Rest:
     """
 
     def __init__(self, hub: Hub) -> None:
-        self._hub, self._simulation = hub, hub.simulation
+        self._hub = hub
+        self._simulation = hub.simulation
 
     async def state(self, _: Request) -> Response:
         """`GET /api/state`: the state of the run, with units in the names."""
@@ -124,7 +127,8 @@ class Rest:
     async def action(self, request: Request) -> Response:
         """`POST /api/actions`: the answer to an action; repeating its id does nothing twice."""
         try:
-            body, role = await body_of_request(request), request.scope[ROLE]
+            body = await body_of_request(request)
+            role = request.scope[ROLE]
             name = body.get("action")
             check_role(role, name)
             client = self._client(body, role)
@@ -144,7 +148,8 @@ class Rest:
     async def emergency(self, request: Request) -> Response:
         """`POST /api/emergency`: stops all robots, or some, before anything else that waits."""
         try:
-            body, role = await body_of_request(request), request.scope[ROLE]
+            body = await body_of_request(request)
+            role = request.scope[ROLE]
             asked = asked_of("emergency", self._robots_of(body), self._simulation.labels)
             known = self._hub.clients.find(body.get("key"), role)  # else anybody's, all the same
             client = known.name if known is not None else _program(role)
@@ -156,7 +161,8 @@ class Rest:
 
     def _robots_of(self, body: dict[str, Any]) -> dict[str, Any]:
         """The robots to stop: those that are known of a list, and all if none of it is."""
-        named, labels = body.get("robots", "all"), self._simulation.labels
+        named = body.get("robots", "all")
+        labels = self._simulation.labels
         if not isinstance(named, list):
             return {"robots": named}
         known = [

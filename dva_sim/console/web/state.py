@@ -62,7 +62,8 @@ class RunState:
     """
 
     def __init__(self) -> None:
-        self.version, self.time = 0, 0
+        self.version = 0
+        self.time = 0
         self.scene: Line | None = None
         self.scene_text = "null"
         self.scene_version = 0
@@ -71,7 +72,8 @@ class RunState:
         self.places: dict[int, list[int]] = {}
         self._moved: dict[int, int] = {}
         self._left: dict[int, int] = {}
-        self.place_version, self.place_time = 0, 0
+        self.place_version = 0
+        self.place_time = 0
         self.story: deque[Line] = deque(maxlen=STORY_KEPT)
         self.story_count = 0
         self.seats: dict[str, Versioned] = {}
@@ -116,7 +118,8 @@ class RunState:
 
     def _take_scene(self, line: Line) -> None:
         self.scene = {key: value for key, value in line.items() if key not in ("k", "t")}
-        self.scene_text, self.scene_version = encode(self.scene), self.version
+        self.scene_text = encode(self.scene)
+        self.scene_version = self.version
         self.logs.meet({str(thing["id"]): thing["label"] for thing in line.get("things", ())})
 
     def _take_places(self, line: Line) -> None:

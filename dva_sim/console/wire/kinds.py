@@ -38,7 +38,8 @@ class Kind:
     """
 
     def __init__(self, words: str, **limits: Any) -> None:
-        self.words, self._limits = words, limits
+        self.words = words
+        self._limits = limits
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> dict[str, Any]:
         return {**handler(source), **self._limits}
@@ -182,7 +183,8 @@ def read_arguments(arguments: type, given: Any, labels: Labels | None = None) ->
 
 
 def _problem(arguments: type, error: Mapping[str, Any]) -> str:
-    hints, (key, *path) = hints_of(arguments), error["loc"]
+    hints = hints_of(arguments)
+    (key, *path) = error["loc"]
     if error["type"] == "missing":
         return f"{key} is missing"
     if error["type"] == "extra_forbidden":

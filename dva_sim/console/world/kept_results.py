@@ -57,11 +57,13 @@ class KeptResults:
         part = {"scenario": scenario, "changes": dict(parse_changes(changes))}
         asked = {"persons": 1, "replications": 1, "seed": seed, "parts": {PART: part}}
         question = f"What did people do who drove in {scenario!r} at a console?"
-        self._out, self._study = out, Study.model_validate({"question": question} | asked)
+        self._out = out
+        self._study = Study.model_validate({"question": question} | asked)
         self._plan = StudyPlan.of(self._study)
         (self._job,) = self._plan.jobs
         assert isinstance(self._job.scenario, Scenario)
-        self.scenario, self.seed = self._job.scenario, self._job.seed
+        self.scenario = self._job.scenario
+        self.seed = self._job.seed
         self._persons: dict[str, int] = {}  # numbers by device, as they began to drive
         self._world: ConsoleWorld | None = None
         self._kept: KeptRun | None = None

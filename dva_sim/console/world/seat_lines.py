@@ -28,7 +28,8 @@ class ActedInput:
     input: InputHeard | None = None
 
 
-_NOTHING, _NO_DRIVE = ActedInput(), DriveLog("", "", 0, 0.0)
+_NOTHING = ActedInput()
+_NO_DRIVE = DriveLog("", "", 0, 0.0)
 
 
 class SeatLines:
@@ -49,7 +50,10 @@ class SeatLines:
         client_of: dict[int, str],
         phones: dict[str, PhoneSeat],
     ) -> None:
-        self._run, self._feed, self._persons, self._client_of = run, feed, persons, client_of
+        self._run = run
+        self._feed = feed
+        self._persons = persons
+        self._client_of = client_of
         self._phones = phones
         self._acted: dict[str, ActedInput] = {}  # of the newest command in force, by robot
 
@@ -132,10 +136,14 @@ class SeatLines:
         }
 
     def _drive(self, held: HeldRobot) -> DriveShown:
-        run, log = self._run, held.log or _NO_DRIVE
-        robot, reach = run.field.robots.get(held.robot), run.stage.reach(held.robot)
+        run = self._run
+        log = held.log or _NO_DRIVE
+        robot = run.field.robots.get(held.robot)
+        reach = run.stage.reach(held.robot)
         acted = self._acted.get(held.robot, _NOTHING)
-        frame, trips, is_over = held.frame, log.round_trips, log.ended is not None
+        frame = held.frame
+        trips = log.round_trips
+        is_over = log.ended is not None
         command = log.commands[-1][1:] if log.commands and not is_over else (0.0, 0.0)
         return {
             "i": self._feed.numbers.get(held.robot),  # of a robot from elsewhere there is none

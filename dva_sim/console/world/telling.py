@@ -36,7 +36,12 @@ from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.scenario import Scenario
 
 # From one line to the next, real time [s].
-POSITIONS, WINDOWS, ROWS, HAZARDS, DEVICES, TIDY = 0.1, 0.1, 0.5, 1.0, 1.0, 1.0
+POSITIONS = 0.1
+WINDOWS = 0.1
+ROWS = 0.5
+HAZARDS = 1.0
+DEVICES = 1.0
+TIDY = 1.0
 SOON = 0.05  # from one look at what has changed to the next, real time [s]
 
 
@@ -98,8 +103,11 @@ class PublishingWorld:
         """Tell what does not change, but for where the DVA listens."""
         run = self.run
         scene = scene_of(
-            *(self.scenario, run.stage.site, run.field.incidents),
-            *(self.feed.things.all, self.sliders.line()),
+            self.scenario,
+            site=run.stage.site,
+            incidents=run.field.incidents,
+            things=self.feed.things.all,
+            link=self.sliders.line(),
             name=self.name,
             seed=self.seed,
         )
@@ -174,7 +182,8 @@ class PublishingWorld:
 
     def _tell_events(self) -> None:
         """Events with what was decided on them, and who decides."""
-        listener, now_ms = self.rooms.listener, self.feed.now_ms
+        listener = self.rooms.listener
+        now_ms = self.feed.now_ms
         self._events = [
             {**event, **about_event(listener.events, listener.received_at, event["number"])}
             for event in self.feed.events()

@@ -85,8 +85,11 @@ class ConsoleWorld(PublishingWorld):
         if scenario.transport == "zeromq" and scenario.network_depth == "auto":
             # A later link may lose or delay anything: only the segments are right for all.
             scenario = scenario.model_copy(update={"network_depth": "segment"})
-        self.scenario, self.name, self.seed = scenario, name, seed
-        self.clock, self.recorder = clock or PacedClock(), ConsoleRecorder()
+        self.scenario = scenario
+        self.name = name
+        self.seed = seed
+        self.clock = clock or PacedClock()
+        self.recorder = ConsoleRecorder()
         cameras = Cameras(lambda label, _: camera_url("http:///", label), topic_of)
         self.sockets = sockets(scenario, self.clock, self.recorder) if sockets else None
         watched = Watched(
@@ -98,7 +101,8 @@ class ConsoleWorld(PublishingWorld):
             if self.sockets is not None:
                 self.sockets.close()
             raise
-        self.feed, self.lag = Feed(self.run, self.run.dva.core.events), LagRule()
+        self.feed = Feed(self.run, self.run.dva.core.events)
+        self.lag = LagRule()
         self.tell: Tell = lambda *_: None
         self.show: Show = lambda *_: None
         self.windows = self._windows()
@@ -142,7 +146,8 @@ class ConsoleWorld(PublishingWorld):
 
     def _windows(self) -> RobotWindows:
         """The robots' windows; a reply that is dropped is audited and kept, like any that goes."""
-        run, recorder = self.run, self.recorder
+        run = self.run
+        recorder = self.recorder
         recorder.robots = run.field.robots.keys()
 
         def lost(robot: str, reply: bytes) -> None:

@@ -119,7 +119,8 @@ class RandomChoice(Policy):
 
     @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        free, chosen = Free(situation), []
+        free = Free(situation)
+        chosen = []
         for task in waiting(situation):
             able = free.able(situation.eta[task])
             if able.size:

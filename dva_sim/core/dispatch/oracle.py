@@ -72,7 +72,9 @@ def solve(instance: Instance) -> OraclePlan:
 
 class _Search:
     def __init__(self, instance: Instance) -> None:
-        self.release, self.arrival, self.busy = instance.release, instance.arrival, instance.busy
+        self.release = instance.release
+        self.arrival = instance.arrival
+        self.busy = instance.busy
         self.best = _INF
         self.steps: tuple[_Step, ...] = ()
         self.seen: dict[tuple[int, ...], list[tuple[float, ...]]] = {}
@@ -99,7 +101,8 @@ class _Search:
     ) -> None:
         if not left:
             if cost < self.best:
-                self.best, self.steps = cost, steps
+                self.best = cost
+                self.steps = steps
             return
         last = steps[-1][2] if steps else -_INF
         if self._dominated(left, (cost, last, *free)):
@@ -118,7 +121,8 @@ class _Search:
         """Response time, event, unit and start of all that could be sent next, after the last."""
         found = []
         for event in left:
-            release, arrival = float(self.release[event]), self.arrival[event].tolist()
+            release = float(self.release[event])
+            arrival = self.arrival[event].tolist()
             for unit, since in enumerate(free):
                 start = max(release, since)
                 if start >= last and arrival[unit] < _INF:
@@ -177,12 +181,14 @@ class OraclePolicy(Policy):
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
         tasks = {situation.tasks[place].event - 1: place for place in waiting(situation)}
         places = {who.device: place for place, who in enumerate(situation.responders)}
-        free, chosen = Free(situation), []
+        free = Free(situation)
+        chosen = []
         for device, tour in zip(self.devices, self.plan.tours, strict=True):
             event = self._next(tour, tasks, situation.now)
             if event is None or device not in places:
                 continue
-            task, unit = tasks[event], places[device]
+            task = tasks[event]
+            unit = places[device]
             if unit in free.able(situation.eta[task]):
                 free.take(unit)
                 chosen.append(Assignment(task, unit))

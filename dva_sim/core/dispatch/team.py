@@ -53,7 +53,8 @@ class HazardTeam(Policy):
 
     def _best(self, situation: Situation, task: int, free: Free) -> int | None:
         """Choose who goes: for a dangerous look a robot, unless it is much later than a person."""
-        eta, what = situation.eta[task], situation.tasks[task]
+        eta = situation.eta[task]
+        what = situation.tasks[task]
         if what.stage != "confirm" or what.kind not in self.dangerous:
             return free.best(eta)
         robot = free.best(_only(eta, free.robots))

@@ -63,7 +63,9 @@ class Preemptive(Policy):
 
     @override
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
-        eta, free, left_behind = situation.eta, Free(situation), _left_behind(situation)
+        eta = situation.eta
+        free = Free(situation)
+        left_behind = _left_behind(situation)
         chosen = []
         for task in _most_urgent_first(situation, self.ageing_per_s):
             idle = free.best(eta[task])

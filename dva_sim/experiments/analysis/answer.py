@@ -33,14 +33,16 @@ class OtherRuns:
     """The contrast in other runs than the answer's, at the stop the answer leads with.
 
     Attributes:
-        low: Least mean.
-        high: Greatest mean.
+        low: Least lower edge of their intervals.
+        high: Greatest upper edge.
+        means: Least and greatest mean.
         count: Number of settings or of models.
         turns: True if the opposite of the answer is shown in some of them.
     """
 
     low: float
     high: float
+    means: tuple[float, float]
     count: int
     turns: bool
 
@@ -74,6 +76,7 @@ class Finding:
         elsewhere: Difference in the other settings that were run; None without others.
         only_model: The one model of the persons that was tried; empty if several were, or where
             nobody drives.
+        useful: Sides, each with the count up to which more are shown to help; see `useful_counts`.
     """
 
     measure: str
@@ -102,6 +105,7 @@ class Finding:
     models: OtherRuns | None = None
     elsewhere: OtherRuns | None = None
     only_model: str = ""
+    useful: tuple[tuple[Level, Level], ...] = ()
 
     @property
     def unit(self) -> str:
@@ -148,7 +152,7 @@ class Answer:
     """A study's answer: its main sentence, conditions and notes.
 
     Attributes:
-        lead: The answer in at most two sentences.
+        lead: The answer: the first sentence says it, the others where it holds.
         depends: Conditions of the answer, by subject: `Persons`, `Measured` ...
         notes: Other findings, and facts needed to read it fairly.
     """

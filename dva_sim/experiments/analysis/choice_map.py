@@ -29,6 +29,7 @@ from dva_sim.statistics import band
 
 BESIDE = ("contacts", "stop_share")
 _WAITS = "move_and_wait_share"
+_LEAST = 0.05  # regret that is not printed as 0.0
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,8 @@ class ChoiceMap:
         is_clear: True where the 95 % band of the regret lies above 0 and the regret above
             `smallest`, `(g, c, m)`. The band, paired by person and trial, is simultaneous for all
             differences in a situation, so it stays valid for the best choice found.
-        is_same: True where that band excludes a regret above `smallest`, `(g, c, m)`.
+        is_same: True where the bands of the differences from all other choices exclude a loss above
+            `smallest` beyond any of them, `(g, c, m)`: the least mean alone shows nothing.
         high: Upper end of that band, `(g, c, m)`; 0 for the best choice.
         smallest: Smallest difference that matters; 0 where none was declared.
         most: Value of runs that never ended; infinite if the measure is unbounded.
@@ -97,8 +99,13 @@ class ChoiceMap:
         return np.asarray(self.is_clear.any(axis=2))
 
     @property
+    def is_shaded(self) -> NDArray[np.bool_]:
+        """True for a choice that is worse under some model, the best under none, `(g, c)`."""
+        return np.asarray(self.is_worse & (self.least >= _LEAST))
+
+    @property
     def is_best(self) -> NDArray[np.bool_]:
-        """True for a choice that is as good as the best under every model, `(g, c)`."""
+        """True for a choice that is shown to be as good as any under every model, `(g, c)`."""
         return np.asarray((self.is_same & ~self.never).all(axis=2))
 
     @property
@@ -128,7 +135,10 @@ class ChoiceMap:
 
     @cached_property
     def never(self) -> NDArray[np.bool_]:
-        """True for a choice that ends no run in a situation under a model, `(g, c, m)`."""
+        """True for a choice that ends no run in a situation under a model, `(g, c, m)`.
+
+        This is what "never" means wherever a map is shown.
+        """
         return np.asarray(self.mean >= self.most)
 
     def best_of(self, situation: int) -> list[Level]:
@@ -202,7 +212,8 @@ def _judged(
         for c, m in np.ndindex(clear.shape[1:]):
             to_best = c, best[g, m], m
             clear[g, c, m] = low[to_best] > 0.0 and mean[to_best] > smallest
-            same[g, c, m] = c == best[g, m] or high[to_best] <= smallest
+            others = np.arange(len(high)) != c
+            same[g, c, m] = bool((high[c, others, m] <= smallest).all())
             ends[g, c, m] = 0.0 if c == best[g, m] else high[to_best]
     return clear, same, ends
 
@@ -221,8 +232,12 @@ def _differences(losses: Floats) -> tuple[Floats, Floats, Floats]:
     alike = (found.n_persons > 1) & ~np.isfinite(found.low)  # all persons differ by the same
     ends = (np.where(alike, found.mean, edge) for edge in (found.low, found.high))
     means, lows, highs = (x.reshape(-1, models) for x in (found.mean, *ends))
-    mean[one, other], low[one, other], high[one, other] = means, lows, highs
-    mean[other, one], low[other, one], high[other, one] = -means, -highs, -lows
+    mean[one, other] = means
+    low[one, other] = lows
+    high[one, other] = highs
+    mean[other, one] = -means
+    low[other, one] = -highs
+    high[other, one] = -lows
     return mean, low, high
 
 

@@ -119,8 +119,10 @@ def difference(part: str, levels: Levels, first: Rows, second: Rows) -> Differen
         first: Rows of the first folder, as numbers.
         second: Those of the second.
     """
-    a, b = first.means(), second.means()
-    runs_a, runs_b = a.by_run(), b.by_run()
+    a = first.means()
+    b = second.means()
+    runs_a = a.by_run()
+    runs_b = b.by_run()
     both = sorted(runs_a.keys() & runs_b.keys())
     old, new = (np.array([runs[run] for run in both]) for runs in (runs_a, runs_b))
     person = np.array([person for _, person, _, _ in both])

@@ -21,7 +21,9 @@ from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.study.parts import Level
 from dva_sim.statistics import Interval, cumulative_incidence, paired_difference, share_interval
 
-CONFIRMED, CLEARED, NOTHING = "confirmed", "cleared", "nothing"
+CONFIRMED = "confirmed"
+CLEARED = "cleared"
+NOTHING = "nothing"
 RIGHT = (CONFIRMED, CLEARED)
 WAYS = (
     *RIGHT,
@@ -67,7 +69,8 @@ class Endings:
         rows = {name: np.asarray(values)[here] for name, values in events.items()}
         self.horizon = horizon
         self.way, self.time = _first(rows, _how_drives_ended(rows, runs, view.part.name))
-        self._view, self._person = view, rows["person"]
+        self._view = view
+        self._person = rows["person"]
         self._codes = {f.name: codes_of(rows, f) for f in view.part.factors if f.name in rows}
 
     def __len__(self) -> int:
@@ -99,7 +102,9 @@ class Endings:
     def at(self, line: Level, stop: Level, panel: Setting | None = None) -> Ended:
         """Shares by the horizon, each with its 95 % interval over persons."""
         mask = self.under(line, stop, panel)
-        way, time, person = self.way[mask], self.time[mask], self._person[mask]
+        way = self.way[mask]
+        time = self.time[mask]
+        person = self._person[mask]
         causes = list(np.where(way == NOTHING, "", way))
         found = cumulative_incidence(time, causes, self.horizon, person)
         never = share_interval(np.zeros(len(person)), person)
@@ -128,7 +133,8 @@ def with_endings(runs: Table, events: Table) -> Table:
     ended, if it had but one.
     """
     is_true = np.asarray(events["is_true"]).astype(bool)
-    times, words = as_floats(np.asarray(events["confirmation_s"])), np.asarray(events["outcome"])
+    times = as_floats(np.asarray(events["confirmation_s"]))
+    words = np.asarray(events["outcome"])
     met: dict[tuple[Any, ...], list[bool]] = defaultdict(list)
     how: dict[tuple[Any, ...], list[str]] = defaultdict(list)
     for key, real, time, word in zip(_keys(events), is_true, times, words, strict=True):
@@ -166,7 +172,8 @@ def _first(rows: Table, drives: NDArray[np.str_]) -> tuple[NDArray[np.str_], Flo
     outcome = rows["outcome"].astype(str)
     way = np.array([_OF_EVENTS.get(word, word) for word in outcome], dtype="U24")
     way = np.where((way == "escalated") & (drives != ""), drives, way)
-    confirmed_at, closed_at = as_floats(rows["confirmation_s"]), as_floats(rows["closing_s"])
+    confirmed_at = as_floats(rows["confirmation_s"])
+    closed_at = as_floats(rows["closing_s"])
     confirmed = np.isfinite(confirmed_at)
     way = np.where(confirmed, CONFIRMED, way)
     if "is_true" in rows:

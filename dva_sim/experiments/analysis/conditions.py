@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from operator import itemgetter
 from typing import Any, NamedTuple
 
 from dva_sim.experiments.analysis.run_grid import Factor
@@ -55,43 +54,33 @@ def get(scenario: Mapping[str, Any], key: str) -> Any:
     return value
 
 
-def timeout_remark(scenarios: Mapping[str, Mapping[str, Any]], study: Mapping[str, Any]) -> str:
-    """Say whether a repeated request leaves time for its reply, condition by condition.
+def waits(
+    scenarios: Mapping[str, Mapping[str, Any]], study: Mapping[str, Any]
+) -> list[RequestWait]:
+    """List what requests wait for, condition by condition; nothing without requests.
 
     Args:
         scenarios: Those of the parts.
         study: Its factors, treatments and the ends of its ranges say which conditions there are.
     """
     played = itertools.product(scenarios.values(), _changes(study))
-    known = list(filter(None, (_waiting(*pair) for pair in played)))
-    if not known:
-        return ""
-    what = "four round trips and the processing time"
-    short = sorted({(w.timeout, w.round_trip) for w in known if w.timeout <= w.needed})
-    if not short:
-        most = level_name("command.timeout_s", max(w.needed for w in known))
-        return f"The time-out is above {what} in every condition ({most} at most)."
-    where = "; ".join(
-        f"{level_name('command.timeout_s', timeout)} with round trips of "
-        + ", ".join(level_name("link.delay_s", trip) for _, trip in group)
-        for timeout, group in itertools.groupby(short, itemgetter(0))
-    )
-    rest = "" if all(w.timeout <= w.needed for w in known) else " In all others it is above."
-    return (
-        f"The time-out is not above {what} in these conditions: {where}. There a request that is "
-        f"sent again, over a new connection, does not get its reply in time.{rest}"
-    )
+    return list(filter(None, (_waiting(*pair) for pair in played)))
 
 
-class _Waiting(NamedTuple):
+class RequestWait(NamedTuple):
     """Time-out of a request, and the time a reply needs [s]."""
 
     timeout: float
     round_trip: float
     needed: float
 
+    @property
+    def is_short(self) -> bool:
+        """True if a request that is sent again does not get its reply in time."""
+        return self.timeout <= self.needed
 
-def _waiting(scenario: Mapping[str, Any], changes: Mapping[str, Any]) -> _Waiting | None:
+
+def _waiting(scenario: Mapping[str, Any], changes: Mapping[str, Any]) -> RequestWait | None:
     """Return time-out and needed time of one condition; None without requests."""
 
     def base(key: str) -> Any:
@@ -108,7 +97,7 @@ def _waiting(scenario: Mapping[str, Any], changes: Mapping[str, Any]) -> _Waitin
     trip, needed = _needed(of)
     if "command.timeout_s" not in changes and timeout == _usual(base):
         timeout = time_out_s(needed)  # nobody gave one, so it follows the link
-    return _Waiting(float(timeout), trip, needed)
+    return RequestWait(float(timeout), trip, needed)
 
 
 def _usual(of: Callable[[str], Any]) -> float | None:
@@ -119,7 +108,8 @@ def _usual(of: Callable[[str], Any]) -> float | None:
 
 def _needed(of: Callable[[str], Any]) -> tuple[float, float]:
     """The round trip, and what the first answer over a new connection takes [s]."""
-    delay, processing = of("link.delay_s"), of("robot.processing_s")
+    delay = of("link.delay_s")
+    processing = of("robot.processing_s")
     ways = (of(f"link.{way}.delay_s") for way in ("up", "down"))
     trip = float(sum(delay if way is None else way for way in ways))
     mean = processing["mean_s"] if isinstance(processing, Mapping) else processing

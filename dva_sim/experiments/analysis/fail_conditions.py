@@ -91,13 +91,17 @@ class _Reader:
     """The words of a condition, one after the other."""
 
     def __init__(self, text: str) -> None:
-        self.text, self._at = text, 0
-        self.kind, self.word, self._begin = "", "", 0
+        self.text = text
+        self._at = 0
+        self.kind = ""
+        self.word = ""
+        self._begin = 0
         self.next()
 
     def next(self) -> str:
         """Go on; the word left behind."""
-        left, rest = self.word, self.text[self._at :]
+        left = self.word
+        rest = self.text[self._at :]
         self._begin = self._at + len(rest) - len(rest.lstrip())
         found = _WORD.match(rest)
         if found is None and rest.strip():

@@ -149,7 +149,8 @@ def _values(gate: Gate, rows: Rows) -> Array:
 
 
 def _statistic(gate: Gate, rows: Rows) -> float:
-    values, percent = _values(gate, rows), percent_of(gate.statistic)
+    values = _values(gate, rows)
+    percent = percent_of(gate.statistic)
     if not len(values):
         return math.nan
     if percent is not None:

@@ -111,12 +111,14 @@ def judged(study: Mapping[str, Any], runs: Table) -> Judgement:
     All tests of a family share its chance of a false alarm, comparisons and hypotheses alike;
     what speaks against hypotheses is adjusted among its own.
     """
-    compared, tested = _compare_all(study, runs), _test_all(study, runs)
+    compared = _compare_all(study, runs)
+    tested = _test_all(study, runs)
     claimed = [t.contrast.family for t in tested]
     families = [*(c.contrast.family for c in compared), *claimed]
     values = [*(c.p for c in compared), *(t.p for t in tested)]
     opposite = [t.p_against for t in tested]
-    adjusted, against = holm(values, families), holm(opposite, claimed)
+    adjusted = holm(values, families)
+    against = holm(opposite, claimed)
     alphas = holm_levels(values, families)[len(compared) :], holm_levels(opposite, claimed)
     of_claims = zip(tested, adjusted[len(compared) :], against, strict=True)
     verdicts = [replace(t, adjusted=float(p), against=float(q)) for t, p, q in of_claims]
@@ -248,7 +250,8 @@ def _tested(
     found = paired_difference(*pairs) if pairs is not None else None
     if pairs is None or found is None or not found.n_persons:
         return Tested(name, claim, contrast, at)
-    p, against = _p(claim, pairs), _p_against(claim, pairs)
+    p = _p(claim, pairs)
+    against = _p_against(claim, pairs)
     return Tested(name, claim, contrast, at, found, p=p, p_against=against)
 
 

@@ -63,7 +63,8 @@ def match(first: Results, second: Results) -> Matched:
     The rest is matched by configuration, so that a folder of one cell finds its like in
     a grid. Reference runs and repeats take no part.
     """
-    a, b = _cells(first), _cells(second)
+    a = _cells(first)
+    b = _cells(second)
     differing = _differing(a, b)
     by_levels = _matched(a, b, lambda cell: (cell["part"], _key(cell, differing)))
     rest_a = _without(a, (x for x, _ in by_levels))
@@ -89,7 +90,8 @@ def _differing(
     """Factors that cannot tell cells apart in both, with their levels here and there."""
     found = {}
     for factor in dict.fromkeys(name for cell in (*a, *b) for name in cell["levels"]):
-        here, there = _levels(a, factor), _levels(b, factor)
+        here = _levels(a, factor)
+        there = _levels(b, factor)
         if not set(here) & set(there):
             found[factor] = here, there
     return found
@@ -103,7 +105,8 @@ def _matched(
     a: Iterable[_Cell], b: Iterable[_Cell], key: Callable[[_Cell], Hashable]
 ) -> list[tuple[_Cell, _Cell]]:
     """Pairs of cells whose key is the same, and nobody else's."""
-    once_a, once_b = _once(a, key), _once(b, key)
+    once_a = _once(a, key)
+    once_b = _once(b, key)
     return [(cell, once_b[name]) for name, cell in once_a.items() if name in once_b]
 
 

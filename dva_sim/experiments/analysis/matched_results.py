@@ -120,7 +120,8 @@ class MatchedResults:
         Where both have runs with the same random numbers, only these are used. The cells bear the
         numbers of the first folder, so that runs can be paired.
         """
-        rows, shared = self.own_rows(side, table, column, group), self.shared(group)
+        rows = self.own_rows(side, table, column, group)
+        shared = self.shared(group)
         return rows.of(shared) if shared else rows
 
     def failed(self, side: int, group: GateGroup) -> frozenset[Run]:

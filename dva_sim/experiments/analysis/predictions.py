@@ -111,7 +111,8 @@ def _judge(prediction: Prediction, view: StudyView | None) -> Judged:
     if found is None:
         return Judged(text, expected, "not run", "not judged")
     verdict = verdict_of(prediction.direction, prediction.expected, view.smallest_effect, found)
-    low, high = max(found.low, -view.widest), min(found.high, view.widest)
+    low = max(found.low, -view.widest)
+    high = min(found.high, view.widest)
     words = f"{quantity(found.mean, unit)} ({number(low)} to {quantity(high, unit)})"
     return Judged(text, expected, words, verdict, found.n_persons)
 

@@ -25,8 +25,6 @@ from dva_sim.experiments.analysis.support import support_of_part
 from dva_sim.experiments.study.factor_levels import PARAMETERS
 from dva_sim.experiments.study.parts import REPEATS, STRATEGY, Level
 from dva_sim.kernel.units import unit_of
-from dva_sim.kernel.wording import listing, number, percent, quantity
-from dva_sim.simulation.labels import factor_name, level_name
 from dva_sim.statistics import Interval
 
 
@@ -91,7 +89,8 @@ class RepeatedStop:
     @property
     def relevant(self) -> int:
         """In how many the effect has that sign and exceeds the smallest that matters."""
-        sign, least = np.sign(self.found), self.smallest or 0.0
+        sign = np.sign(self.found)
+        least = self.smallest or 0.0
         return sum(bool(sign * r.mean > least) for r in self.others)
 
     @property
@@ -173,8 +172,10 @@ class _Reading:
     """The repeats of a study, and what is known of each besides its effect."""
 
     def __init__(self, part: RunGrid, finding: Finding, scenario: Mapping[str, Any]) -> None:
-        self.part, self.finding = part, finding
-        self._own, support = get(scenario, STRATEGY), support_of_part(part, scenario)
+        self.part = part
+        self.finding = finding
+        self._own = get(scenario, STRATEGY)
+        support = support_of_part(part, scenario)
         self._outside = None if support is None else support.outside.astype(float)
 
     def own(self, where: dict[str, Level]) -> Floats | None:
@@ -211,7 +212,8 @@ class _Reading:
 
 def _stop(read: _Reading, view: StudyView, level: Level) -> RepeatedStop:
     assert view.over is not None
-    finding, at = read.finding, view.stops.index(level)
+    finding = read.finding
+    at = view.stops.index(level)
     repeats = [
         repeat
         for model in read.part.settings(but=(str(finding.factor), view.over.name))
@@ -229,7 +231,8 @@ def _stop(read: _Reading, view: StudyView, level: Level) -> RepeatedStop:
 
 def _repeat(read: _Reading, where: dict[str, Level], at: int) -> Repeat | None:
     """The paired difference under one model; the reference run drops out of it."""
-    own, difference = read.own(where), read.difference(where)
+    own = read.own(where)
+    difference = read.difference(where)
     found = interval_of(difference) if own is None else _beside(read.finding, at, difference - own)
     if found is None:
         return None
@@ -256,65 +259,3 @@ def _beside(finding: Finding, at: int, change: Floats) -> Interval | None:
         low=mean + changed.mean - math.hypot(mean - low, changed.mean - changed.low),
         high=mean + changed.mean + math.hypot(high - mean, changed.high - changed.mean),
     )
-
-
-def sentences(robustness: RepeatedAnswer) -> list[str]:
-    """In how many repeats the conclusion holds, and how far effects reach."""
-    return [
-        _what_was_repeated(robustness),
-        *(_stop_sentence(robustness, s) for s in robustness.stops),
-    ]
-
-
-def _what_was_repeated(r: RepeatedAnswer) -> str:
-    strategies = [level_name(STRATEGY, name) for name in r.strategies]
-    under = f" under each of {listing(strategies)}," if strategies else ""
-    others = "one other set" if r.sets == 1 else f"{r.sets} other sets"
-    trials = "one trial" if r.trials == 1 else f"{r.trials} trials"
-    return (
-        f"Repeated{under} with the usual parameters and {others} within the bands that "
-        f"calibration leaves open ({r.persons} persons, {trials} each, with the same random "
-        "numbers as above). Each is the study's own result and what the model changes of it, by "
-        "the repeats of both."
-    )
-
-
-def _stop_sentence(r: RepeatedAnswer, stop: RepeatedStop) -> str:
-    count = len(stop.others)
-    where = f"At {factor_name(r.over)} {level_name(r.over, stop.level)}"
-    if not count:
-        return f"{where} no repeat under another model is complete."
-    unit, means = unit_of(r.measure), [x.mean for x in stop.others]
-    text = f"{where} the sign holds in {_of(stop.same_sign, count)} repeats"
-    text += f", in {stop.clear} of them with its whole interval"
-    if stop.smallest is not None:
-        text += f"; in {_of(stop.relevant, count)} the effect exceeds the smallest that matters"
-        text += f", in {stop.negligible} it is below that either way"
-    reach = f"{number(min(means))} to {quantity(max(means), unit)}"
-    return f"{text}. Effects run from {reach}.{_where_it_fails(r, stop)}{_beyond(stop)}"
-
-
-def _beyond(stop: RepeatedStop) -> str:
-    """Say how many of the repeats are extrapolations."""
-    beyond = sum(r.is_beyond for r in stop.others)
-    if not beyond:
-        return ""
-    return (
-        f" {_of(beyond, len(stop.others))} are extrapolated: no published experiment covers that "
-        "delay and way of steering."
-    )
-
-
-def _where_it_fails(r: RepeatedAnswer, stop: RepeatedStop) -> str:
-    """Under which strategies the sign is another."""
-    failed = []
-    for name in r.strategies:
-        means = [x.mean for x in stop.others if x.strategy == name]
-        others = sum(not mean * stop.found > 0 for mean in means)
-        if others:
-            failed.append(f"{level_name(STRATEGY, name)} ({others} of {len(means)})")
-    return f" The sign is another under {listing(failed)}." if failed else ""
-
-
-def _of(part: int, whole: int) -> str:
-    return f"{part} of {whole} ({percent(part / whole)})"

@@ -76,7 +76,8 @@ class IntervalLaw:
         """
         if persons < 2:
             raise ValueError(f"a study needs at least 2 persons, not {persons}")
-        shift, critical = abs(effect) / self.spread * math.sqrt(persons), self._critical(persons)
+        shift = abs(effect) / self.spread * math.sqrt(persons)
+        critical = self._critical(persons)
         below = float(special.nctdtr(persons - 1, shift, critical))
         # Far from all doubt the series does not converge; so many persons are as good as normal.
         return float(special.ndtr(shift - critical)) if math.isnan(below) else 1 - below
@@ -160,7 +161,8 @@ def plans(
             None for a pilot, where nothing is left out; without any claim not even an answer
             that is not open.
     """
-    claims, named = claims_of(study), contrasts_of(study)
+    claims = claims_of(study)
+    named = contrasts_of(study)
     claimed = {claim.comparison for claim in claims.values()}
     others = {k: c for k, c in named.items() if k not in claimed and k != ANSWER}
     family = _families(study, claims, named)
@@ -192,11 +194,13 @@ def _of_answer(view: StudyView | None, in_any_case: bool) -> Iterator[_Test]:
     if view is None or view.contrast is None or view.line is None:
         return
     differences = view.difference(view.panels[0], *view.contrast)
-    found, smallest = band(differences, view.level), view.smallest_effect
+    found = band(differences, view.level)
+    smallest = view.smallest_effect
     is_judged = np.isfinite(found.critical)
     if not is_judged.any():
         return
-    holds_zero, bounds = (found.low <= 0) & (found.high >= 0), np.maximum(-found.low, found.high)
+    holds_zero = (found.low <= 0) & (found.high >= 0)
+    bounds = np.maximum(-found.low, found.high)
     is_open = is_judged & holds_zero & (bounds > (smallest or 0.0))
     largest = int(np.where(is_judged, abs(found.mean), -1.0).argmax())
     effect = abs(float(found.mean[largest]))
@@ -251,8 +255,10 @@ def _of_claims(
         level = 1 - 2 * _ALPHA / family[contrast.family]  # one-sided
         if (pairs := pairs_of(study, runs, contrast, at)) is None:
             continue
-        found, unit = _interval(pairs, level), unit_of(contrast.measure)
-        mean, is_same = found.mean, claim.direction == "same"
+        found = _interval(pairs, level)
+        unit = unit_of(contrast.measure)
+        mean = found.mean
+        is_same = claim.direction == "same"
         side = -1 if claim.direction == "below" else 1
         ends = {-1: found.high - mean, 1: mean - found.low}
         law = _law(pairs, max(ends.values()) if is_same else ends[side], level)
@@ -324,11 +330,13 @@ def _count(chance: Callable[[int], float], wanted: float, known: int, least: int
 
 def _fewest(chance: Callable[[int], float], wanted: float) -> float:
     """By doubling, then by halves; infinite beyond `MOST_PERSONS`."""
-    low, high = 1, 2
+    low = 1
+    high = 2
     while chance(high) < wanted:
         if high > MOST_PERSONS:
             return math.inf
-        low, high = high, 2 * high
+        low = high
+        high = 2 * high
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if chance(middle) >= wanted else (middle, high)

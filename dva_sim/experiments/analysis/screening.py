@@ -95,8 +95,10 @@ def screen(
 def judged(study: Study, results: Results) -> Screening:
     """The effects of all assumed numbers, from the runs of every point."""
     _, answer = rule_of(study)
-    walks, numbers = walks_of(study), screened(study)
-    count, points = walks.shape[0], walks.shape[0] * walks.shape[1]
+    walks = walks_of(study)
+    numbers = screened(study)
+    count = walks.shape[0]
+    points = walks.shape[0] * walks.shape[1]
     factors = [Factor(POINT, tuple(range(points))), Factor(answer.factor, answer.contrast)]
     part = RunGrid(results.table("runs"), answer.part, factors)
     values = part.grid(answer.measure)  # (points, contrast, persons, trials)

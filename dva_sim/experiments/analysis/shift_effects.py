@@ -18,8 +18,11 @@ from dva_sim.simulation.timed.bounds import Floats, share_of_the_way
 from dva_sim.simulation.timed.shift_measures import FOLLOW_S
 from dva_sim.statistics import LEVEL, Band, band
 
-POLICY, INTENSITY = "dispatch.policy", "intensity"
-FLOOR, BEST, CALIBRATED = "random", "oracle", "nearest_idle"
+POLICY = "dispatch.policy"
+INTENSITY = "intensity"
+FLOOR = "random"
+BEST = "oracle"
+CALIBRATED = "nearest_idle"
 
 
 def is_dispatch(view: StudyView | None) -> bool:
@@ -56,7 +59,8 @@ class Shifts:
 
     def of(self, column: str) -> Floats:
         """Values of a measure by run, `(shifts, policies, stops)`; nan for missing runs."""
-        grid, panel = self.view.part.grid(column), self.view.panels[0]
+        grid = self.view.part.grid(column)
+        panel = self.view.panels[0]
         curves = [person_means(self.view.curve(grid, panel, p)) for p in self.view.lines]
         return np.stack(curves, axis=1)
 
@@ -74,6 +78,11 @@ class Shifts:
         return band((values - base).reshape(len(values), -1))
 
     @property
+    def calibrated(self) -> str:
+        """Policy under which loads are measured."""
+        return CALIBRATED if CALIBRATED in self.policies else self.policies[0]
+
+    @property
     def loads(self) -> list[float | None]:
         """Load of each stop: use of the busiest people under the policy it was set with.
 
@@ -83,14 +92,14 @@ class Shifts:
         over = self.view.over
         if over is None or over.name != INTENSITY or BEST in self.policies:
             return [None for _ in self.stops]
-        policy = CALIBRATED if CALIBRATED in self.policies else self.policies[0]
-        seen = self.means("load")[self.policies.index(policy)]
+        seen = self.means("load")[self.policies.index(self.calibrated)]
         return [float(load) if np.isfinite(load) else None for load in seen]
 
     @property
     def titles(self) -> list[str]:
         """Titles of the stops: the load where it was varied, else the setting."""
-        over, loads = self.view.over, self.loads
+        over = self.view.over
+        loads = self.loads
         return [
             f"load {load:.2f}" if load is not None else setting({over.name: stop} if over else {})
             for load, stop in zip(loads, self.view.stops, strict=True)
@@ -174,7 +183,8 @@ def pooled(
     response = np.where(np.isnan(response) | (response > follow), np.inf, response)
     shifts, owner = np.unique(events["person"], return_inverse=True)
     order = np.argsort(response, kind="stable")
-    ranked, owner = response[order], owner[order]
+    ranked = response[order]
+    owner = owner[order]
     wanted = np.asarray(quantiles)
     if not len(ranked):
         return (np.full(len(wanted), np.nan),) * 3

@@ -200,7 +200,8 @@ def layout_of(
         runs: The table of runs.
         are_points_trials: Otherwise the point is a factor of its own.
     """
-    factors, design = factors_of(study), study.get("design") or {}
+    factors = factors_of(study)
+    design = study.get("design") or {}
     if together := design.get("zip"):
         kept = _spoken_of(study, together)
         return runs, [f for f in factors if f.name not in together or f.name == kept]
@@ -231,7 +232,8 @@ def _as_trials(runs: Table) -> Table:
     """Each point and trial as a trial of its own; a reference run is that of every point."""
     aside = np.asarray(runs["is_reference"]).astype(bool)
     points = np.unique(as_floats(runs[POINT])[~aside]).astype(int)
-    own, shared = np.flatnonzero(~aside), np.flatnonzero(aside)
+    own = np.flatnonzero(~aside)
+    shared = np.flatnonzero(aside)
     rows = np.concatenate([own, np.tile(shared, len(points))])
     point = np.concatenate([as_floats(runs[POINT])[own].astype(int), points.repeat(len(shared))])
     trial = np.asarray(runs["trial"])[rows]
@@ -306,7 +308,8 @@ def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
         return None
     declared = declared or _only_answer(part)
     known = {f.name: f for f in part.factors}
-    over, line = known.get(declared.get("over", "")), known.get(declared.get("factor", ""))
+    over = known.get(declared.get("over", ""))
+    line = known.get(declared.get("factor", ""))
     if over is None and not (line and "over" in declared):
         over = _longest_numeric([f for f in part.factors if f is not line])
     line = line or next((f for f in part.factors if f is not over), None)
@@ -404,7 +407,8 @@ def _missed(view: StudyView) -> tuple[Missed, ...]:
     """Runs without confirmation at the last stop, for every line."""
     if not view.part.has("confirmed"):
         return ()
-    grid, panel = view.part.grid("confirmed"), view.panels[0]
+    grid = view.part.grid("confirmed")
+    panel = view.panels[0]
     seen = [(level, present(view.curve(grid, panel, level)[-1])) for level in view.lines]
     return tuple(Missed(level, int((runs < 1).sum()), len(runs)) for level, runs in seen)
 

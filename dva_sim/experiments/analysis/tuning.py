@@ -50,7 +50,8 @@ def tune(
         ConfigError: the study tunes nothing, or asks for a measure that there is none of.
         RunsFailed: some did, so that values would be judged by different persons.
     """
-    rule, trials = rule_of(study), tuning_study(study)
+    rule = rule_of(study)
+    trials = tuning_study(study)
     inputs = StudyInputs(study)
     refuse_unknown_measures(inputs)
     run_study(trials, out, jobs=jobs, episode=episode, progress=progress, limit_s=limit_s)

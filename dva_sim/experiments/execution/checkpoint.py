@@ -275,7 +275,8 @@ def _so_far(folder: Path, checkpoint: Checkpoint) -> Results:
             "be shown when it is complete"
         )
     every = runs_in(manifest)
-    done, failed = checkpoint.done(), checkpoint.failures()
+    done = checkpoint.done()
+    failed = checkpoint.failures()
     whole = _of_whole_persons(every, done | failed.keys())
     keys = {run.key for run in every}
     if not any(run.key in done for run in whole):

@@ -1,7 +1,9 @@
 """An existing dask.distributed cluster as the workers of a study.
 
 The scheduler itself gives the chunks of a worker that died to the others. Workers may differ from
-this machine in nothing that a run's numbers depend on; each says so before its first run.
+this machine in nothing that a run's numbers depend on; each says so before its first run. A worker
+does its tasks in threads, which nothing can end: it makes runs in a process of its own, as this
+machine does, where a run that takes too long is ended and one that crashes takes no worker along.
 
 References:
     M. Rocklin, "Dask: Parallel Computation with Blocked algorithms and Task Scheduling",
@@ -24,6 +26,7 @@ from typing import Any, ParamSpec, TypeVar
 from typing_extensions import override
 
 from dva_sim.experiments.execution.executors import Workers, WorkersLost
+from dva_sim.experiments.execution.worker_process import WorkerDied, WorkerProcess
 from dva_sim.experiments.results.manifest import versions
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 
@@ -34,6 +37,7 @@ _ADDRESS = r"(tcp|tls|ucx|ws|wss)://.+:\d+"
 _CONNECT_S = 10.0
 _WORKERS_S = 60.0  # how long a cluster may be without any worker
 _ONE_AT_A_TIME = threading.Lock()  # in a worker with several threads
+_processes: list[WorkerProcess] = []  # at most one: the one in which a worker makes its runs
 _STATE = ("commit", "dirty")  # tells nothing of what a run gives; the fingerprint does
 _NOISY = ("distributed", "distributed.client", "tornado", "tornado.application", "asyncio")
 
@@ -65,7 +69,7 @@ class DaskCluster(Workers):
                 "--scheduler needs dask.distributed, which is not installed: "
                 "pip install -e '.[cluster]'"
             ) from None
-        self.deaths = (KilledWorker,)
+        self.deaths = (KilledWorker, WorkerDied)
         self._open = ExitStack()
         with self._open:
             self._open.enter_context(_quiet())
@@ -197,7 +201,16 @@ def _checked(task: Callable[P, R], wanted: Versions, *args: P.args, **kwargs: P.
                 f"worker {get_worker().address} has {other}; install the same there, "
                 "and start it again"
             )
-        return task(*args, **kwargs)
+        if not _processes:
+            _processes.append(WorkerProcess())
+        try:
+            result: R = _processes[0].call(partial(task, *args, **kwargs))
+        except BaseException:
+            process = _processes.pop()
+            process.kill()
+            process.close()
+            raise
+        return result
 
 
 def differences(wanted: Versions, found: Versions) -> str:

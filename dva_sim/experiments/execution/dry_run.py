@@ -41,11 +41,13 @@ class DryRun:
         cells: Configurations, with the reference runs' own.
         rounds: After how many batches it may stop; 1 if nothing can stop it early.
         workers: Processes that the estimate is for.
-        estimate_s: Time for the rest [s], if any run tells its cost.
+        estimate_s: Time for the rest by the clock [s], if any run tells its cost. Trial runs are
+            timed by both clocks, so it holds for a machine that is as busy as it was then.
         tried: Runs that were tried for the estimate and thrown away; 0 if it rests on runs kept.
         remark: Doubt about tuned values; empty if there is none.
         is_least: True if it will take longer, since a trial run did not end in time.
         failed: Error of a trial run; empty if it did not fail.
+        cpu_s: CPU time for the rest, of all processes together [s].
     """
 
     runs: int
@@ -58,12 +60,14 @@ class DryRun:
     remark: str
     is_least: bool = False
     failed: str = ""
+    cpu_s: float = 0.0
 
 
 class _Tried(NamedTuple):
-    """Costs of some trial runs [s] and their warnings; see `DryRun`."""
+    """Costs of trial runs [CPU s], the time they took [s], and their warnings; see `DryRun`."""
 
     costs: dict[str, float]
+    wall_s: float = 0.0
     is_least: bool = False
     failed: str = ""
 
@@ -89,27 +93,36 @@ def dry_run(
     """
     plan = StudyPlan.of(asked)
     todo = list({job.key: job for job in plan.jobs}.values())
-    costs: dict[RunKey, float] = {}
+    costs = dict[RunKey, float]()
+    wall = 0.0
     if (Path(out) / JOURNAL).exists():
         identity = manifest_of(plan)["hash"]
         with Checkpoint(Path(out), identity, must_exist=True) as checkpoint:
             costs = checkpoint.costs()
+            wall = checkpoint.wall_s
     left = [job for job in todo if job.key not in costs]
     known = _by_config(costs)
     tried = _tried(left, probe) if probe is not None and not known else _Tried({})
-    estimate = _estimate(left, known or tried.costs)
+    cpu = _estimate(left, known or tried.costs)
     workers = 1 if plan.is_real_time else executors.local(jobs).width
+    # By the clock, for each CPU second: as it was so far, else as it was for one run at a time.
+    if known and wall:
+        pace = wall / sum(costs.values())
+    else:
+        busy = tried.wall_s / sum(tried.costs.values()) if tried.costs else 1.0
+        pace = busy / min(workers, executors.cores(), len(left) or 1)
     return DryRun(
         runs=len(todo),
         done=len(todo) - len(left),
         cells=len(plan.cells),
         rounds=len(rounds(plan.study, todo)),
         workers=workers,
-        estimate_s=None if estimate is None else estimate / min(workers, len(left) or 1),
+        estimate_s=None if cpu is None else cpu * pace,
         tried=len(tried.costs),
         remark="" if plan.tuned is None or plan.basis is None else plan.tuned.remark(plan.basis),
         is_least=tried.is_least,
         failed=tried.failed,
+        cpu_s=cpu or 0.0,
     )
 
 
@@ -122,7 +135,7 @@ def _by_config(costs: Mapping[RunKey, float]) -> dict[str, float]:
 
 
 def _estimate(left: Sequence[StudyJob], known: Mapping[str, float]) -> float | None:
-    """Estimate the cost of the rest [s], new configurations at the mean of the others."""
+    """Estimate the cost of the rest [CPU s], new configurations at the mean of the others."""
     if not known and left:
         return None
     average = sum(known.values()) / max(1, len(known))
@@ -130,28 +143,43 @@ def _estimate(left: Sequence[StudyJob], known: Mapping[str, float]) -> float | N
 
 
 def _tried(left: Sequence[StudyJob], probe: Simulate) -> _Tried:
-    """Try one run each of some configurations, spread over the design."""
-    first = list({job.config: job for job in reversed(left)}.values())
-    begun, costs, failed = time.monotonic(), dict[str, float](), ""
-    for index in [0, *_spread(len(first))] if first else ():
-        job, gone = first[index], time.monotonic() - begun
+    """Try one run each of some configurations, spread over the design.
+
+    Each is of another person: runs of one person cost alike, and plan their ways but once.
+    """
+    by_config: dict[str, list[StudyJob]] = defaultdict(list)
+    for job in left:
+        by_config[job.config].append(job)
+    groups = list(by_config.values())
+    costs = dict[str, float]()
+    walls = dict[str, float]()
+    failed = ""
+    begun = time.monotonic()
+    for index in [0, *_spread(len(groups))] if groups else ():
+        group = groups[index]
+        job = group[len(costs) % len(group)]
+        gone = time.monotonic() - begun
         if costs.get(job.config, 0.0) > _SHORT_S:
             continue
         if gone > PROBE_S and len(costs) >= _FEW:
             break
         clock = clock_of(job)
         start = clock()
+        start_wall = time.monotonic()
+        is_least = False
         try:
             with limited(max(MOST_S - gone, _SHORT_S), may_exit=False):
                 probe(job)
         except RunTooLong:
-            costs[job.config] = clock() - start
-            return _Tried(costs, True, failed)
+            is_least = True
         except Exception as error:
             failed = failed or f"{type(error).__name__}: {' '.join(str(error).split())}"
-        else:
-            costs[job.config] = clock() - start
-    return _Tried(costs, False, failed)
+            continue
+        costs[job.config] = clock() - start
+        walls[job.config] = time.monotonic() - start_wall
+        if is_least:
+            return _Tried(costs, sum(walls.values()), True, failed)
+    return _Tried(costs, sum(walls.values()), False, failed)
 
 
 def _spread(count: int) -> list[int]:

@@ -100,7 +100,8 @@ def cores() -> int:
 class ThisProcess(Workers):
     """This process."""
 
-    width, is_here = 1, True
+    width = 1
+    is_here = True
 
     @contextmanager
     def executor(self, width: int, task: Callable[..., Any]) -> Iterator[Executor]:

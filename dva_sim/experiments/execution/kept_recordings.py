@@ -46,7 +46,8 @@ def refuse_what_cannot_be_recorded(plan: StudyPlan) -> None:
         ConfigError: no part has runs that can be recorded, or the worst is asked for where no
             answer says by which measure.
     """
-    study, scenarios = plan.study, plan.scenarios.values()
+    study = plan.study
+    scenarios = plan.scenarios.values()
     if study.record is None:
         return
     if not any(model_for(scenario).is_recorded for scenario in scenarios):
@@ -101,7 +102,8 @@ def _record(
     rest = [job for name, job in wanted.items() if not (folder / name).exists()]
     own = {measure.about.name for measure in plan.measures.values()}
     prints = {name_of(job): _fingerprint(job, rows[position_of(job)], own) for job in rest}
-    done, total = len(wanted) - len(rest), len(wanted)
+    done = len(wanted) - len(rest)
+    total = len(wanted)
     tell(done, total)
     problems = []
     try:
@@ -215,7 +217,8 @@ class Rerun:
         from dva_sim.recordings.writing import write_recording  # late: start-up
 
         assert isinstance(job.scenario, Scenario)
-        name, run = name_of(job), simulate(job.scenario, job.seed, keep_traffic=True)
+        name = name_of(job)
+        run = simulate(job.scenario, job.seed, keep_traffic=True)
         tables = tables_of(run)
         if _print_of(tables["runs"][0]) != self.prints[name]:
             raise DvaSimError(f"{name}: the run is not what the study has: another version made it")

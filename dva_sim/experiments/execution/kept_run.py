@@ -76,7 +76,8 @@ class KeptRun:
     def __init__(
         self, folder: Path, manifest: Mapping[str, Any], scenario: Scenario, seed: int
     ) -> None:
-        self._folder, self.problem = folder, ""
+        self._folder = folder
+        self.problem = ""
         _remove(folder, KEPT_RUN)
         documents = json.dumps(manifest), json.dumps(scenario.model_dump(mode="json"))
         try:
@@ -126,7 +127,8 @@ class KeptRun:
             lines += new
             try:
                 self._keep(lines)
-                lines, self.problem = [], ""
+                lines = []
+                self.problem = ""
             except (sqlite3.Error, OSError) as error:
                 self.problem = str(error)
         self._db.close()
@@ -253,10 +255,8 @@ def _read(
     document = json.loads(scenario)
     if not own_code and OWN_CODE in json.dumps(document["events"]):
         raise ConfigError("names a class in a Python file; results never run code", path)
-    document, every = (
-        Scenario.model_validate(document),
-        [*lines, *(("", line) for (line,) in grown)],
-    )
+    document = Scenario.model_validate(document)
+    every = [*lines, *(("", line) for (line,) in grown)]
     return json.loads(manifest), document, seed, every
 
 

@@ -6,13 +6,14 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,20 +21,22 @@ from dva_sim.experiments.execution import dry_run, executors, kept_recordings, s
 from dva_sim.experiments.execution.checkpoint import Checkpoint
 from dva_sim.experiments.execution.dask_cluster import DaskCluster
 from dva_sim.experiments.execution.executors import Workers, WorkersLost
-from dva_sim.experiments.execution.scheduling import LIMIT_S, Simulate, run_job
+from dva_sim.experiments.execution.scheduling import Simulate, run_job
 from dva_sim.experiments.results.folder_lock import FolderLock
 from dva_sim.experiments.results.manifest import failures, machine, manifest_of, write_json
 from dva_sim.experiments.results.results import JOURNAL, MACHINE, MANIFEST, TABLES, digests
 from dva_sim.experiments.results.tables import design_row, write_tables
 from dva_sim.experiments.study.cell_grid import StudyJob
+from dva_sim.experiments.study.file_kinds import open_study
 from dva_sim.experiments.study.file_watch import FileWatch
 from dva_sim.experiments.study.hashing import edited_files, files_of, folders_of_files
-from dva_sim.experiments.study.loading import Settings, pairs_of
+from dva_sim.experiments.study.loading import pairs_of
 from dva_sim.experiments.study.plan import StudyPlan
-from dva_sim.experiments.study.stopping import is_enough, rounds
+from dva_sim.experiments.study.stopping import is_enough, rounds, widest
 from dva_sim.experiments.study.study import Study, Version
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.streams import derive_seed
+from dva_sim.options.studies import RunOptions
 
 Progress = Callable[[int, int], object]
 
@@ -73,7 +76,9 @@ def run_study(
         DvaSimError: the disk is full, another program holds the checkpoint, or the cluster is lost.
         KeyboardInterrupt: after tidying up; its message says what has been done.
     """
-    out, started, clock = Path(out), datetime.now(UTC), time.perf_counter()
+    out = Path(out)
+    started = datetime.now(UTC)
+    clock = time.perf_counter()
     plan = StudyPlan.of(asked)
     watch = FileWatch(lambda: (*files_of(plan.input_names), *edited_files()), folders_of_files)
     manifest = manifest_of(plan)  # later: what it hashes is watched
@@ -133,12 +138,15 @@ class _Session:
         watch: FileWatch,
     ) -> None:
         self.checkpoint = checkpoint
-        self._workers, self._episode, self._limit_s = workers, episode, limit_s
+        self._workers = workers
+        self._episode = episode
+        self._limit_s = limit_s
         self._watch = watch
         self._tell = progress or (lambda *_: None)
         self._place = _at_random if plan.is_real_time else _as_designed
         keys = {job.key for job in plan.jobs}
-        self._total, self._count = len(keys), len(keys & checkpoint.done())
+        self._total = len(keys)
+        self._count = len(keys & checkpoint.done())
         self._tell(self._count, self._total)
 
     def left(self, batch: Sequence[StudyJob]) -> list[StudyJob]:
@@ -160,7 +168,8 @@ class _Session:
                 self._watch.refuse_changes()  # these runs may have read either
                 now = time.perf_counter()
                 self.checkpoint.add(batch, now - clock)
-                clock, self._count = now, self._count + len(batch)
+                clock = now
+                self._count += len(batch)
                 self._tell(self._count, self._total)
 
     def end(self) -> None:
@@ -203,12 +212,14 @@ def _run_rounds(
     """
     batches = rounds(study, todo)
     chosen: list[StudyJob] = []
-    why, number = None, 0
+    why = None
+    number = 0
     for number, batch in enumerate(batches, 1):
         rest = session.left(batch)
         is_spent = study.budget_s is not None and session.checkpoint.wall_s >= study.budget_s
         if rest and chosen and is_spent:
-            why, number = "budget", number - 1
+            why = "budget"
+            number -= 1
             break
         session.run(rest)
         chosen.extend(batch)
@@ -217,10 +228,12 @@ def _run_rounds(
             break
     if why is not None:
         session.end()
-    elif study.stop is not None:
-        is_met = is_enough(study, _rows(todo, chosen, session.checkpoint))
-        why = "enough" if is_met else "limit"
-    return _in_order(todo, chosen), {"rounds": number, "of": len(batches), "why": why}
+    stopped: dict[str, Any] = {"rounds": number, "of": len(batches), "why": why}
+    if study.stop is not None:
+        reached = widest(study, study.stop, _rows(todo, chosen, session.checkpoint))
+        stopped["why"] = why or ("enough" if reached <= study.stop.half_width else "limit")
+        stopped["half_width"] = reached if math.isfinite(reached) else None
+    return _in_order(todo, chosen), stopped
 
 
 def _in_order(todo: Sequence[StudyJob], chosen: Sequence[StudyJob]) -> list[StudyJob]:
@@ -282,23 +295,19 @@ def _tidy(out: Path) -> None:
 
 @dataclass(frozen=True)
 class RunRequest:
-    """A study, which variant of it, where to, and on which processes: options of `dva_sim.run`."""
+    """A study that is asked for: which variant, where to, and on which processes."""
 
-    study: str | Path
-    out: str | Path | None = None
-    set: Settings = ()
-    seed: int | None = None
-    jobs: int | None = None
-    scheduler: str | None = None
-    limit_s: float = LIMIT_S
-    quick: bool = False
-    full: bool = False
-    pilot: int | None = None
+    options: RunOptions
 
-    @cached_property
-    def changes(self) -> list[str]:
-        """Keys to change, as `key=value`."""
-        return pairs_of(self.set, self.seed)
+    def open(self) -> Study:
+        """The study, with its changes.
+
+        Raises:
+            ConfigError: it is not there or not valid.
+        """
+        asked = self.options
+        changes = pairs_of(asked.set, asked.seed)
+        return open_study(asked.study, changes, version=self.version, pilot=asked.pilot)
 
     @property
     def version(self) -> Version | None:
@@ -307,19 +316,22 @@ class RunRequest:
         Raises:
             ConfigError: both are asked for.
         """
-        if self.quick and self.full:
+        if self.options.quick and self.options.full:
             raise ConfigError("--quick and --full are two versions of a study; give one of them")
-        return "quick" if self.quick else "full" if self.full else None
+        return "quick" if self.options.quick else "full" if self.options.full else None
 
     @property
     def folder(self) -> Path:
         """Folder of the results; by default one for each variant of a study."""
-        marks = [Path(self.study).stem, self.version, None if self.pilot is None else "pilot"]
-        return Path(self.out or Path("results") / "-".join(filter(None, marks)))
+        asked = self.options
+        marks = [Path(asked.study).stem, self.version, None if asked.pilot is None else "pilot"]
+        return Path(asked.out or Path("results") / "-".join(filter(None, marks)))
 
     def dry_run(self, plan: StudyPlan, probe: Simulate | None = None) -> dry_run.DryRun:
         """Preview what `run` would do; see `dry_run`."""
-        jobs = self.jobs if self.scheduler is None else 1  # who knows how many are free there
+        jobs = (
+            self.options.jobs if self.options.scheduler is None else 1
+        )  # who knows how many are free there
         return dry_run.dry_run(plan, self.folder, jobs=jobs, probe=probe)
 
     def run(self, plan: StudyPlan, progress: Progress | None = None) -> None:
@@ -327,14 +339,18 @@ class RunRequest:
         run_study(
             plan,
             self.folder,
-            jobs=self.jobs,
-            scheduler=self.scheduler,
+            jobs=self.options.jobs,
+            scheduler=self.options.scheduler,
             progress=progress,
-            limit_s=self.limit_s,
+            limit_s=self.options.limit_s,
         )
 
     def record(self, plan: StudyPlan, progress: Progress | None = None) -> list[str]:
         """Make the recordings that the study asks for; see `record_study`."""
         return kept_recordings.record_study(
-            plan, self.folder, jobs=self.jobs, progress=progress, limit_s=self.limit_s
+            plan,
+            self.folder,
+            jobs=self.options.jobs,
+            progress=progress,
+            limit_s=self.options.limit_s,
         )

@@ -37,7 +37,8 @@ def sampled_jobs(study: Study) -> Iterator[tuple[int, StudyJob]]:
 
 def _covering(cells: Sequence[set[tuple[str, Any]]]) -> list[int]:
     """The first cell and, one by one, those with the most levels that none before has."""
-    chosen, left = [0], set().union(*cells) - cells[0]
+    chosen = [0]
+    left = set().union(*cells) - cells[0]
     while left:
         chosen.append(max(range(len(cells)), key=lambda n: (len(cells[n] & left), -n)))
         left -= cells[chosen[-1]]

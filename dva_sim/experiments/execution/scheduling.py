@@ -5,7 +5,6 @@ A run that stalls is ended after a limit of time, whatever it is doing, and coun
 
 from __future__ import annotations
 
-import ctypes
 import faulthandler
 import json
 import math
@@ -16,7 +15,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from typing import Any
 
@@ -38,7 +37,6 @@ _CHUNK_S = 1.0  # CPU time that a chunk should take
 _SEED_S = 5.0  # and how long it may take until the runs of a random seed are parted
 _LONGEST_CHUNK = 64
 GRACE = 1.5  # times the limit: then the whole process ends, if nothing else helps
-INSIST = 1.0  # pause before a run that took no notice is told again [s]
 _KILLED = "killed the process it ran in, again and again (out of memory, or beyond its limit?)"
 
 _Chunk = Callable[[Sequence[StudyJob]], list[RunOutcome]]
@@ -65,7 +63,9 @@ def run_all(
     """
     plain = partial(perform_chunk, episode=episode, limit_s=limit_s, may_exit=not workers.is_here)
     run = workers.guarded(plain)
-    waiting, suspects, pace = deque(jobs), deque[StudyJob](), _Pace()
+    waiting = deque(jobs)
+    suspects = deque[StudyJob]()
+    pace = _Pace()
     while waiting or suspects:
         yield from _alone(suspects, run, episode, workers)
         yield from _together(waiting, suspects, run, episode, workers, pace)
@@ -128,7 +128,8 @@ class _Pace:
     """
 
     def __init__(self) -> None:
-        self._runs, self._cost_s = 0, 0.0
+        self._runs = 0
+        self._cost_s = 0.0
 
     def add(self, outcomes: Sequence[RunOutcome]) -> None:
         """Learn from what runs have cost."""
@@ -139,7 +140,9 @@ class _Pace:
         """The next jobs: fewer towards the end, so that the workers finish together."""
         if workers.is_here or not self._runs:
             return [waiting.popleft()]
-        rate, width, left = self._runs / max(self._cost_s, 1e-9), workers.width, len(waiting)
+        rate = self._runs / max(self._cost_s, 1e-9)
+        width = workers.width
+        left = len(waiting)
         usual = min(rate * _CHUNK_S, _LONGEST_CHUNK, left // (4 * width))
         most = max(usual, min(rate * _SEED_S, _LONGEST_CHUNK, left // width))
         chunk = [waiting.popleft()]
@@ -219,7 +222,8 @@ def limited(seconds: float, may_exit: bool) -> Iterator[None]:
     Time in which the whole process was stopped (Ctrl-Z) does not count. Python code is ended by
     an exception, again and again until it gives in. Code that never comes back to Python cannot
     be ended so; its process is ended if `may_exit`, which takes no part in Python at all and so
-    works in every case.
+    works in every case. Signals reach the main thread only: in any other one, nothing but the
+    end of the process limits a block.
 
     Raises:
         RunTooLong: from inside the block.
@@ -227,9 +231,9 @@ def limited(seconds: float, may_exit: bool) -> Iterator[None]:
     is_main = threading.current_thread() is threading.main_thread()
     with open(os.devnull, "w") as nowhere:  # noqa: PTH123
         if may_exit:
-            faulthandler.dump_traceback_later(GRACE * seconds + INSIST, exit=True, file=nowhere)
+            faulthandler.dump_traceback_later(GRACE * seconds + 1.0, exit=True, file=nowhere)
         try:
-            with _by_signal(seconds) if is_main else _by_thread(seconds):
+            with _by_signal(seconds) if is_main else nullcontext():
                 yield
         finally:
             if may_exit:
@@ -255,45 +259,3 @@ def _by_signal(seconds: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
-
-
-@contextmanager
-def _by_thread(seconds: float) -> Iterator[None]:
-    """Signals reach the main thread only; another thread has to be told by a third."""
-    thread, over = threading.get_ident(), threading.Event()
-    lock, raised = threading.Lock(), False
-
-    def insist() -> None:
-        nonlocal raised
-        pause = seconds
-        while not over.wait(pause):
-            with lock:
-                if not over.is_set():
-                    raised = True
-                    _raise_in(thread)
-            pause = INSIST
-
-    watch = threading.Thread(target=insist, daemon=True)
-    watch.start()
-    try:
-        yield
-    except RunTooLong:
-        raise RunTooLong(f"took more than its {seconds:g} s") from None
-    finally:
-        while not over.is_set():
-            with suppress(RunTooLong), lock:  # it may come as late as here
-                over.set()
-                if raised:
-                    _raise_in(thread)  # in place of one that may still be under way
-                    while True:  # until it comes
-                        pass
-
-
-def _raise_in(thread: int) -> None:
-    """At the next step of Python code there.
-
-    It has to come, and is not taken back: taken back, it leaves the interpreter looking for it for
-    ever, and a profiler or debugger there never gets past its first step (CPython 3.11).
-    """
-    what = ctypes.py_object(RunTooLong)
-    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), what)

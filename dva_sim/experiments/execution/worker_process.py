@@ -1,20 +1,17 @@
-"""A process of this machine that does what another one asks: both ends.
+"""A process of this machine that does what this one asks: this end of it."""
 
-It is a program of its own, so it neither knows nor runs the script that started a study. Until it
-has been sent where modules lie, it loads Python's own alone.
-"""
+from __future__ import annotations
 
-import os
 import pickle
-import select
 import socket
-import subprocess
 import sys
-import threading
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
+
+from dva_sim.experiments.execution import worker_program
+from dva_sim.serving.processes import Child, end_all
 
 
 class WorkerDied(Exception):
@@ -32,13 +29,16 @@ class WorkerProcess:
         ours, theirs = socket.socketpair()
         with ours, theirs:
             number = theirs.fileno()
-            self._process = subprocess.Popen(
-                # -P: a file beside this one is not taken for a module of Python.
-                [sys.executable, "-P", __file__, str(number)],
-                stdin=subprocess.DEVNULL,
-                pass_fds=(number,),
-            )
             self._file = ours.makefile("rwb")
+            self._process = Child(
+                "the worker process",
+                # -P: a file beside this one is not taken for a module of Python.
+                [sys.executable, "-P", worker_program.__file__, str(number)],
+                self._hang_up,
+                keeps_errors=False,  # what a plug-in prints is for the user
+                pass_fds=(number,),
+                start_new_session=False,  # Ctrl-Z stops all that is at work
+            )
         self._file.write(pickle.dumps(sys.path))
 
     def call(self, task: Callable[[], Any]) -> Any:
@@ -60,10 +60,12 @@ class WorkerProcess:
         self._process.kill()
 
     def close(self) -> None:
-        """Let it end, and wait for that."""
+        """Let it end, and make sure that it has."""
+        end_all([self._process])
+
+    def _hang_up(self) -> None:
         with suppress(OSError):
             self._file.close()
-        self._process.wait()
 
     @property
     def is_stopped(self) -> bool:
@@ -72,29 +74,3 @@ class WorkerProcess:
             stat = Path(f"/proc/{self._process.pid}/stat").read_text()
             return stat.rpartition(")")[2].split()[0] == "T"
         return False
-
-
-def serve(number: int) -> None:
-    """Do what comes through a socket, until that is closed at the other end."""
-    with socket.socket(fileno=number) as channel, channel.makefile("rwb") as file:
-        threading.Thread(target=_end_with_parent, args=(number,), daemon=True).start()
-        with suppress(EOFError, ConnectionError):
-            sys.path[:] = pickle.load(file)
-            while True:
-                answer = pickle.load(file)()
-                file.write(pickle.dumps(answer))
-                file.flush()
-
-
-def _end_with_parent(number: int) -> None:
-    """Whatever is being done: nobody waits for it any more."""
-    hang_up = select.poll()
-    hang_up.register(number, 0)
-    hang_up.poll()
-    for stream in (sys.stdout, sys.stderr):
-        stream.flush()
-    os._exit(0)
-
-
-if __name__ == "__main__":
-    serve(int(sys.argv[1]))

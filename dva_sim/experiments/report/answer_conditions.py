@@ -1,162 +1,113 @@
 """Conditions of an answer, beside its numbers: the persons, the settings, the delays.
 
-A number can be reproducible to the last digit and still hang on what was assumed. So each of
+A number can be reproducible to the last digit and still depend on what was assumed. So each of
 these is stated beside the answer, with its measurements from the same study.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from dva_sim.experiments.analysis.answer import Finding
-from dva_sim.experiments.analysis.answer_sentences import telling_stop
 from dva_sim.experiments.analysis.conditions import get
-from dva_sim.experiments.analysis.level_phrases import at, places
-from dva_sim.experiments.analysis.robustness import RepeatedAnswer
-from dva_sim.experiments.analysis.run_grid import (
-    Floats,
-    Setting,
-    present,
-)
-from dva_sim.experiments.analysis.study_view import (
-    StudyView,
-    keys_of,
-)
+from dva_sim.experiments.analysis.robustness import RepeatedAnswer, RepeatedStop
+from dva_sim.experiments.analysis.run_grid import Setting, present
+from dva_sim.experiments.analysis.study_view import StudyView, keys_of
+from dva_sim.experiments.report.answer_sentences import other_levels, place, telling_stop
+from dva_sim.experiments.report.prose import sentence
 from dva_sim.experiments.report.results_reading import ResultsReading
+from dva_sim.experiments.study.hashing import hashes_of, input_names
 from dva_sim.experiments.study.parts import STRATEGY, TUNING
 from dva_sim.experiments.study.screening import MAIN, kept_effects
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.wording import capital, listing, number, percent, quantity
-from dva_sim.simulation.labels import brief, level_name, setting
+from dva_sim.simulation.labels import brief, factor_name, level_name, setting
 from dva_sim.simulation.scenario.assumptions import all_assumptions
+from dva_sim.simulation.timed.scenario import TimedScenario
+from dva_sim.simulation.timed.travel import FOUND
+from dva_sim.simulation.timed.unnoticed import Unnoticed, unnoticed
 
 _WAITING = "move_and_wait_share"
-
-
-_MOST_SETTINGS = 3  # told one by one
 _MOST_KEYS = 5
 
 
 def depends(reading: ResultsReading) -> dict[str, str]:
     """By what each sentence is about; only what can be told of this study."""
-    view, finding = reading.view, reading.finding
+    view = reading.view
+    finding = reading.finding
     if view is None or finding is None:
         return {}
+    outside = view.stops_outside(view.panels[0], view.contrast) if view.over else []
     sentences = {
-        _whom(reading): _persons(reading, view, finding),
-        "Settings": " ".join(_settings(reading, view, finding)),
+        f"{capital(reading.cluster)}s": _persons(reading, view, finding),
+        "Settings": _settings(reading, view, finding),
         "Assumptions": _assumptions(reading, finding),
-        "Delays": _beyond(view, finding),
+        "Delays": sentence("delays", place=place(finding, outside)) if outside else "",
     }
     return {about: words for about, words in sentences.items() if words}
 
 
-def _whom(reading: ResultsReading) -> str:
-    return f"{capital(reading.cluster)}s"
-
-
 def _persons(reading: ResultsReading, view: StudyView, finding: Finding) -> str:
     """Describe the simulated persons: number, strategy, and results for other models of them."""
-    if reading.cluster == "shift":
-        return f"{finding.persons} simulated, independent of each other."
-    if reading.cluster == "repeat":
-        return f"{finding.persons} of each configuration, in real time, one run at a time."
-    trials = reading.trials_of(finding.part)
-    each = f", {trials} trial{'s' if trials > 1 else ''} each" if trials else ""
-    who = f"{finding.persons} simulated{each}; no human took part."
     strategy = get(reading.scenario_of(finding.part), STRATEGY)
-    if not strategy:
-        return who
-    if STRATEGY in {key.name for key in keys_of(reading.study)}:
-        return f"{who} How they steer is varied."
-    steer = f"They steer by the strategy {level_name(STRATEGY, strategy)}{_how(view, finding)}"
-    if reading.robustness is not None:
-        return f"{who} {steer}. {_under_others(reading.robustness)}"
-    return f"{who} {steer}; with another, not tried here, the difference may be smaller or larger."
-
-
-def _assumptions(reading: ResultsReading, finding: Finding) -> str:
-    """Say how many numbers about persons are assumed, and which of them move an answer."""
-    if not get(reading.scenario_of(finding.part), STRATEGY):
-        return ""
-    count = len(all_assumptions())
-    text = f"{count} numbers about people and phones are assumed (dva-sim assumed)."
-    effects = kept_effects(_MOST_KEYS)
-    if not effects:
-        return f"{text} To see which of them move such an answer: dva-sim screen {MAIN}."
-    clear = [effect.key for effect in effects if effect.is_clear]
-    found = f"{listing(clear)}" if clear else f"none of the {len(effects)} largest effects"
-    verb = "are" if len(clear) > 1 else "is"
-    return f"{text} Screened for {MAIN} only: {found} {verb} clear of chance."
-
-
-def _how(view: StudyView, finding: Finding) -> str:
-    """Say how much of the time an adaptive strategy used move-and-wait."""
-    stop = telling_stop(finding)
-    if stop is None or not view.part.has(_WAITING):
-        return ""
-    grid, sides = view.part.grid(_WAITING), (finding.first, finding.second)
-    shares = [_mean(view.curve(grid, view.panels[0], side)[stop]) for side in sides]
-    if not all(0 <= share < 1 for share in shares) or not any(shares):
-        return ""
-    clauses = [
-        f"{percent(share)} of the time under {level_name(finding.factor, side)}"
-        for share, side in zip(shares, sides, strict=True)
-    ]
-    return f", here by moving and waiting for {listing(clauses)}"
-
-
-def _mean(values: Floats) -> float:
-    seen = present(values)
-    return float(seen.mean()) if len(seen) else math.nan
-
-
-def _under_others(found: RepeatedAnswer) -> str:
-    """At the last level at which it was repeated."""
-    stops = [stop for stop in found.stops if stop.others]
-    if not stops:
-        return "No repeat under another model of them is complete."
-    stop, unit = stops[-1], found.unit
-    means = [repeat.mean for repeat in stop.others]
-    sign = f"{stop.same_sign} of {len(means)}"
-    return (
-        f"Under other models of them the sign is the same in {sign}, and the difference at "
-        f"{level_name(found.over, stop.level)} runs from {number(min(means))} to "
-        f"{quantity(max(means), unit)}."
+    repeats = reading.robustness
+    stops = [stop for stop in repeats.stops if stop.others] if repeats is not None else []
+    return sentence(
+        "persons",
+        cluster=reading.cluster,
+        persons=finding.persons,
+        trials=reading.trials_of(finding.part),
+        strategy=level_name(STRATEGY, strategy) if strategy else "",
+        is_varied=bool(strategy) and STRATEGY in {key.name for key in keys_of(reading.study)},
+        waiting=list(_waiting(view, finding)),
+        is_repeated=repeats is not None,
+        stop=stops[-1] if stops else None,
+        level=level_name(repeats.over, stops[-1].level) if repeats is not None and stops else "",
     )
 
 
-def _settings(reading: ResultsReading, view: StudyView, finding: Finding) -> Iterator[str]:
+def _waiting(view: StudyView, finding: Finding) -> Iterator[str]:
+    """Yield the share of the time that either side's persons moved and waited, if they chose to."""
+    stop = telling_stop(finding)
+    if stop is None or not view.part.has(_WAITING):
+        return
+    grid = view.part.grid(_WAITING)
+    sides = (finding.first, finding.second)
+    seen = [present(view.curve(grid, view.panels[0], side)[stop]) for side in sides]
+    shares = [float(values.mean()) for values in seen if len(values)]
+    if len(shares) == len(sides) and all(share < 1 for share in shares) and any(shares):
+        for share, side in zip(shares, sides, strict=True):
+            yield f"{percent(share)} of the time under {level_name(finding.factor, side)}"
+
+
+def _settings(reading: ResultsReading, view: StudyView, finding: Finding) -> str:
     """The answer under the other settings that were run, and what was not varied at all."""
     stop = telling_stop(finding)
-    if finding.within and stop is not None and (others := view.panels[1:]):
-        yield f"The answer is for {setting(finding.within)}. {_elsewhere(view, finding, others)}"
-    fixed = _fixed(reading, finding.part)
-    if fixed:
-        yield f"Not varied: {setting(fixed)}."
-
-
-def _elsewhere(view: StudyView, finding: Finding, others: list[Setting]) -> str:
-    """Give the same difference in the other settings, at the stop the answer leads with."""
-    stop = telling_stop(finding) or 0
-    where = f" {there}" if (there := at(finding, [stop])) else ""
-    found = [(panel, *_difference(view, finding, panel, stop)) for panel in others]
-    found = [entry for entry in found if np.isfinite(entry[1])]
-    if not found:
-        return ""
-    if len(found) > _MOST_SETTINGS:
-        means = [mean for _, mean, _, _ in found]
-        reach = f"{number(min(means))} to {quantity(max(means), finding.unit)}"
-        return f"Under the {len(found)} other settings the difference{where} is {reach}."
-    clauses = [
-        f"{quantity(mean, finding.unit)} ({number(low)} to {quantity(high, finding.unit)}) "
-        f"with {_apart(panel, finding.within)}"
-        for panel, mean, low, high in found
-    ]
-    return f"The difference{where} is {listing(clauses)}."
+    others = view.panels[1:] if finding.within and stop is not None else []
+    differences = [(panel, *_difference(view, finding, panel, stop or 0)) for panel in others]
+    apart = [entry for entry in differences if np.isfinite(entry[1])]
+    there = place(finding, [stop or 0])
+    varied = {key.name for key in keys_of(reading.study)}
+    scenario = reading.scenario_of(finding.part)
+    values = {key: get(scenario, key) for key in reading.page.assumed if key not in varied}
+    return sentence(
+        "settings",
+        within=setting(finding.within) if others else "",
+        there=there and f" {there}",
+        levels=other_levels(finding, len(apart)) if apart else "",
+        means=[mean for _, mean, _, _ in apart],
+        unit=finding.unit,
+        apart=[
+            f"{quantity(mean, finding.unit)} ({number(low)} to {quantity(high, finding.unit)}) "
+            f"with {_apart(panel, finding.within)}"
+            for panel, mean, low, high in apart
+        ],
+        fixed=setting({key: value for key, value in values.items() if isinstance(value, str)}),
+    )
 
 
 def _difference(
@@ -176,25 +127,92 @@ def _apart(panel: Setting, usual: Setting) -> str:
     return brief(other) if TUNING in other else setting(other)
 
 
-def _fixed(reading: ResultsReading, part: str) -> dict[str, Any]:
-    """Keys that matter and were not varied, with their values."""
-    varied = {key.name for key in keys_of(reading.study)}
-    values = {
-        key: get(reading.scenario_of(part), key)
-        for key in reading.page.assumed
-        if key not in varied
-    }
-    return {key: value for key, value in values.items() if isinstance(value, str)}
+def _assumptions(reading: ResultsReading, finding: Finding) -> str:
+    """Say how many numbers about persons are assumed, and which of them move an answer.
 
-
-def _beyond(view: StudyView, finding: Finding) -> str:
-    """Say at which delays no published experiment covers the simulated persons."""
-    outside = view.stops_outside(view.panels[0], view.contrast)
-    if not outside or view.over is None:
+    Of the timed model, which has no persons, say which times are.
+    """
+    scenario: dict[str, Any] = dict(reading.scenario_of(finding.part))
+    if scenario.get("model") == "timed":
+        return assumed_times(scenario, reading.manifest.get("inputs", {}))
+    if not get(scenario, STRATEGY):
         return ""
-    is_everywhere = len(outside) == len(view.stops)
-    where = "at any level" if is_everywhere else places(finding, np.array(outside))
-    return (
-        f"Extrapolated: no published experiment covers the delay from picture to effect {where}, "
-        "on one side or both."
+    effects = kept_effects(_MOST_KEYS)
+    clear = [effect.key for effect in effects if effect.is_clear]
+    count = len(all_assumptions())
+    return sentence("assumptions", count=count, effects=len(effects), clear=clear, study=MAIN)
+
+
+def repeated(robustness: RepeatedAnswer) -> list[str]:
+    """Say in how many repeats under other models the answer holds, and how far effects reach."""
+    strategies = [level_name(STRATEGY, name) for name in robustness.strategies]
+    what = sentence("repeated", r=robustness, strategies=strategies)
+    return [what, *(_repeated_stop(robustness, stop) for stop in robustness.stops)]
+
+
+def _repeated_stop(robustness: RepeatedAnswer, stop: RepeatedStop) -> str:
+    failed = []
+    for name in robustness.strategies:
+        means = [other.mean for other in stop.others if other.strategy == name]
+        others = sum(not mean * stop.found > 0 for mean in means)
+        if others:
+            failed.append(f"{level_name(STRATEGY, name)} ({others} of {len(means)})")
+    return sentence(
+        "repeated_stop",
+        stop=stop,
+        level=f"{factor_name(robustness.over)} {level_name(robustness.over, stop.level)}",
+        means=[other.mean for other in stop.others],
+        unit=robustness.unit,
+        failed=failed,
+        beyond=sum(other.is_beyond for other in stop.others),
     )
+
+
+_TIMES = {"mobilisation": "to set out", "look": "to look", "act": "to contain"}
+
+
+def assumed_times(scenario: Mapping[str, Any], inputs: Mapping[str, str]) -> str:
+    """Name the durations that no run measures, and how many events an assumption finds.
+
+    Args:
+        scenario: Scenario of the timed model, as the manifest has it.
+        inputs: Hashes of the files of the study: a site that has changed since is not looked at.
+    """
+    contains = bool(scenario["dispatch"]["containment"])
+    is_noticed = any(s.get("notice") == "detectors" for s in scenario.get("demand", []))
+    return sentence(
+        "assumed_times",
+        teams=list(filter(None, (_of_team(g, contains) for g in scenario["responders"]))),
+        by_detectors=is_noticed,
+        hidden=[
+            f"{each.kind.replace('_', ' ')} at {each.places} of {each.of} places"
+            for each in (_hidden(scenario, inputs) if is_noticed else ())
+        ],
+        found_s=f"{FOUND:,.0f}",
+    )
+
+
+def _of_team(group: Mapping[str, Any], contains: bool) -> str:
+    """`guard 45 s to set out, 3 s to look (typical times)`; empty where all take no time."""
+    times = {name: _typical(group.get(name) or {}) for name in _TIMES}
+    if group.get("kind") == "robot" or not contains:
+        del times["act"]
+    said = [f"{time:g} s {_TIMES[name]}" for name, time in times.items() if time]
+    return f"{group.get('name') or group.get('kind')} typically {listing(said)}" if said else ""
+
+
+def _typical(law: Mapping[str, Any]) -> float:
+    """The median of a law if it has one, else its mean, else its middle [s]."""
+    known = [law[key] for key in ("median_s", "mean_s") if law.get(key)]
+    return float(known[0] if known else (law.get("low_s", 0) + law.get("high_s", 0)) / 2)
+
+
+def _hidden(scenario: Mapping[str, Any], inputs: Mapping[str, str]) -> list[Unnoticed]:
+    """Nothing where the scenario or its site is not as it was."""
+    streams = [{k: v for k, v in stream.items() if v != ""} for stream in scenario["demand"]]
+    try:
+        known = TimedScenario.model_validate(dict(scenario) | {"demand": streams})
+        now = hashes_of(input_names([known]))
+        return list(unnoticed(known)) if now.items() <= inputs.items() else []
+    except (ConfigError, ValidationError):
+        return []

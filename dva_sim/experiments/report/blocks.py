@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from dva_sim.experiments.report.cell_table import CellTable
@@ -92,9 +92,9 @@ class Verbatim:
 
 @dataclass(frozen=True)
 class Terms:
-    """Words and what they mean; `key` is where a link to one leads."""
+    """Words and what they mean."""
 
-    entries: tuple[tuple[str, str, str], ...]
+    entries: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
@@ -108,41 +108,22 @@ class Folded:
 Block = Heading | Words | First | Items | Printed | FigureBlock | Verbatim | Terms | Folded
 
 
-def texts_of(blocks: Iterable[Block]) -> list[str]:
-    """All that is said in sentences, and the heads of tables, in order."""
-    found: list[str] = []
-
-    def note(text: str) -> str:
-        found.append(text)
-        return text
-
-    reworded(blocks, note)
-    return found
-
-
-def reworded(blocks: Iterable[Block], change: Callable[[str], str]) -> list[Block]:
-    """Return the blocks with every text changed, in reading order."""
-    return [_reworded(block, change) for block in blocks]
-
-
-def _reworded(block: Block, change: Callable[[str], str]) -> Block:
-    if isinstance(block, Words):
-        return replace(block, text=change(block.text))
-    if isinstance(block, First):
-        lead, figure = change(block.lead), block.figure and _captioned(block.figure, change)
-        depends = tuple((about, change(words)) for about, words in block.depends)
-        return First(lead, figure, depends)
-    if isinstance(block, Items):
-        return Items(tuple(map(change, block.items)))
-    if isinstance(block, Printed):
-        heads, note = list(map(change, block.table.heads)), change(block.table.note)
-        return replace(block, table=replace(block.table, heads=heads, note=note))
-    if isinstance(block, FigureBlock):
-        return FigureBlock(_captioned(block.figure, change))
-    if isinstance(block, Folded):
-        return replace(block, blocks=tuple(reworded(block.blocks, change)))
-    return block
-
-
-def _captioned(figure: Drawn, change: Callable[[str], str]) -> Drawn:
-    return replace(figure, caption=change(figure.caption))
+def texts_of(blocks: Iterable[Block]) -> Iterator[str]:
+    """Yield all that is said in sentences, and the heads of tables, in order."""
+    for block in blocks:
+        match block:
+            case Words(text=text):
+                yield text
+            case First(lead=lead, figure=figure, depends=depends):
+                yield lead
+                if figure is not None:
+                    yield figure.caption
+                yield from (words for _, words in depends)
+            case Items(items=items):
+                yield from items
+            case Printed(table=table):
+                yield from (*table.heads, table.note)
+            case FigureBlock(figure=drawn):
+                yield drawn.caption
+            case Folded(blocks=inner):
+                yield from texts_of(inner)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, plain_level, present
+from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, plain_level, present
 from dva_sim.experiments.analysis.support import Support
 from dva_sim.experiments.report.prose import note
 from dva_sim.kernel.units import unit_of
@@ -82,12 +82,19 @@ def cell_table(
     """
     settings = list(part.settings())
     columns: list[_Column | None] = [_value(part, name) for name in points]
-    columns += [_counts(part), *_endings(part), *_measure(part, measure, possible)]
+    columns += [
+        ("runs", [str(len(values)) for values in _cells(part, "seed")]),
+        *_endings(part),
+        *_measure(part, measure, possible),
+    ]
     columns += [*_others(part, [s for s in summaries if s[0] != measure]), _beyond(support)]
     there = [c for c in columns if c is not None]
     names = [factor_name(f.name) for f in part.factors]
     rows = [
-        [*_cell_name(setting), *(values[i] for _, values in there)]
+        [
+            *(level_name(factor, level) for factor, level in setting.items()),
+            *(values[i] for _, values in there),
+        ]
         for i, setting in enumerate(settings)
     ]
     ran = [bool(there) for there in part.ran.ravel()]
@@ -110,7 +117,8 @@ def _constant(table: CellTable) -> list[int]:
 def _without_constants(table: CellTable) -> CellTable:
     """Without the columns that do not vary."""
     kept = [n for n in range(len(table.heads)) if n not in _constant(table)]
-    heads, rows = [table.heads[n] for n in kept], [[row[n] for n in kept] for row in table.rows]
+    heads = [table.heads[n] for n in kept]
+    rows = [[row[n] for n in kept] for row in table.rows]
     return replace(table, heads=heads, rows=rows)
 
 
@@ -135,18 +143,10 @@ def _by_cell(part: RunGrid, grid: Floats) -> Floats:
     return grid.reshape(-1, len(part.persons), len(part.trials))
 
 
-def _cell_name(setting: Setting) -> list[str]:
-    return [level_name(factor, level) for factor, level in setting.items()]
-
-
 def _value(part: RunGrid, name: str) -> _Column:
     """Values of a factor outside the grid, one for each cell."""
     values = [plain_level(value) for value in part.first_of_cells(name)]
     return with_unit(name), [f"{v:.3g}" if isinstance(v, float) else str(v) for v in values]
-
-
-def _counts(part: RunGrid) -> _Column:
-    return "runs", [str(len(values)) for values in _cells(part, "seed")]
 
 
 _ENDINGS = {

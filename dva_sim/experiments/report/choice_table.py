@@ -7,17 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.answer_sentences import EXTRAPOLATED
 from dva_sim.experiments.analysis.choice_map import ChoiceMap
 from dva_sim.experiments.analysis.run_grid import Floats
 from dva_sim.experiments.report.cell_table import CellTable
-from dva_sim.experiments.report.prose import note
+from dva_sim.experiments.report.prose import note, sentence
 from dva_sim.kernel.wording import listing, quantity
-from dva_sim.simulation.labels import factor_name, level_name, named
+from dva_sim.simulation.labels import factor_name, level_name
 
-NEVER = "never done"
+NEVER = "never"
 WORST = "worst of these"
-_NAMED = 5  # other choices that a sentence names
 
 
 def choice_table(found: ChoiceMap, part: str) -> CellTable:
@@ -102,13 +100,14 @@ def facts_of(found: ChoiceMap) -> dict[str, Any]:
         "smallest": quantity(found.smallest, found.unit) if found.smallest else "",
         "has_waiting": found.waiting is not None,
         "cut_off": quantity(found.most, found.unit) if found.never.any() else "",
+        "never": NEVER,
     }
 
 
 def _behind(found: ChoiceMap, g: int, c: int) -> str:
     """Greatest upper end of the bands of the regret."""
     is_lost = found.never[g, c].any() and not found.is_lost[g]
-    return NEVER if is_lost else regret_number(max(0.0, float(found.high[g, c].max())))
+    return regret_number(math.inf if is_lost else max(0.0, float(found.high[g, c].max())))
 
 
 def _range(values: Floats) -> str:
@@ -118,20 +117,20 @@ def _range(values: Floats) -> str:
 
 
 def regret_text(found: ChoiceMap, situation: int, choice: int) -> str:
-    """`3 to 69`, over the models of persons; `=`: as good as the best; `3 to 9 ?`: not settled."""
+    """`3 to 69`, over the models of persons; `=`: as good as any; `0.0 to 9 ?`: not settled."""
     if found.never[situation, choice].all():
         return NEVER
     if found.is_best[situation, choice]:
         return "="
-    low, high = found.least[situation, choice], found.worst[situation, choice]
+    low = found.least[situation, choice]
+    high = found.worst[situation, choice]
     is_open = not found.is_worse[situation, choice]
     return f"{_range(np.array([low, high]))}{' ?' if is_open else ''}"
 
 
 def overall_text(found: ChoiceMap, choice: int) -> str:
     """The most that a choice costs beyond the best one, in any situation."""
-    worst = float(found.overall[choice])
-    return NEVER if math.isinf(worst) else regret_number(worst)
+    return regret_number(float(found.overall[choice]))
 
 
 def situation_name(found: ChoiceMap, situation: int) -> str:
@@ -145,61 +144,35 @@ def lead_of(found: ChoiceMap) -> str:
     """Say whether one choice is best everywhere, and which has the least regret."""
     names = [level_name(found.choice.name, level) for level in found.choice.levels]
     settled = found.is_best[~found.is_lost].T
-    best = [name for name, good in zip(names, settled, strict=True) if good.all()]
-    given = factor_name(found.given.name)
-    over = f"over {len(found.models.levels)} models of the persons{_beyond(found)}"
-    if found.is_lost.all():
-        return f"Nothing was ever done on any {given} tried, {over}."
-    if len(best) == len(names):
-        return f"No difference that matters was found on any {given} tried, {over}."
-    if best:
-        return f"Nothing is better than {listing(best)} on any {given} tried, {over}."
-    if np.isinf(found.overall).all():
-        what = factor_name(found.choice.name)
-        return f"Each {what} fails on some {given} on which another does not, {over}."
-    if not found.is_worse.any():
-        what = factor_name(found.choice.name)
-        return f"The study is too small to tell which {what} is best on any {given} tried, {over}."
-    first, *rest = np.argsort(found.overall, kind="stable").tolist()
-    others = "; ".join(
-        f"{names[c]} {_cost(found, c)}, "
-        f"{level_name(found.given.name, found.given.levels[_hardest(found, c)])}"
-        for c in rest[:_NAMED]
+    marked = found.outside.reshape(len(found.given.levels), -1).any(axis=1)
+    outside = [level_name(found.given.name, found.given.levels[g]) for g in np.flatnonzero(marked)]
+    where = "" if found.is_beyond or not outside else f" on {listing(outside)}"
+    hardest = found.worst.argmax(axis=0)  # where each choice is farthest behind the best one
+    return sentence(
+        "map",
+        found=found,
+        choice=factor_name(found.choice.name),
+        given=factor_name(found.given.name),
+        models=len(found.models.levels),
+        beyond=f", extrapolated{where}" if outside else "",
+        best=[name for name, good in zip(names, settled, strict=True) if good.all()],
+        count=len(names),
+        is_hopeless=np.isinf(found.overall).all(),
+        ranked=[
+            (
+                names[c],
+                _cost(found, c),
+                level_name(found.given.name, found.given.levels[hardest[c]]),
+            )
+            for c in np.argsort(found.overall, kind="stable").tolist()
+        ],
     )
-    more = f"; the {len(rest) - _NAMED} others by no less" if len(rest) > _NAMED else ""
-    where = named(found.given.name, found.given.levels[_hardest(found, first)])
-    return (
-        f"No single {factor_name(found.choice.name)} is best on every {given} tried; the smallest "
-        f"worst loss is that of {names[first]}: {_cost(found, first)} behind the best one, with "
-        f"{where}, {over}. "
-        f"The others are behind by up to: {others}{more}."
-    )
-
-
-def _beyond(found: ChoiceMap) -> str:
-    """`, extrapolated`, for all situations or some of them."""
-    marked = [
-        level
-        for level, outside in zip(found.given.levels, found.outside, strict=True)
-        if outside.any()
-    ]
-    if not marked:
-        return ""
-    if found.is_beyond:
-        return f", {EXTRAPOLATED}"
-    names = listing([level_name(found.given.name, level) for level in marked])
-    return f", {EXTRAPOLATED} on {names}"
-
-
-def _hardest(found: ChoiceMap, choice: int) -> int:
-    """The situation in which a choice is farthest behind the best one."""
-    return int(np.argmax(found.worst[:, choice]))
 
 
 def _cost(found: ChoiceMap, choice: int) -> str:
     """`14.6 s`: the most that a choice costs beyond the best one."""
     worst = float(found.overall[choice])
-    return NEVER if math.isinf(worst) else quantity(worst, found.unit)
+    return f"{NEVER} finishes" if math.isinf(worst) else quantity(worst, found.unit)
 
 
 def _best(found: ChoiceMap, situation: int) -> str:
@@ -215,5 +188,5 @@ def _best(found: ChoiceMap, situation: int) -> str:
 def regret_number(value: float) -> str:
     """Format a regret, which has room for no more; infinite if another finishes runs alone."""
     if not math.isfinite(value):
-        return "never" if math.isinf(value) else "–"
+        return NEVER if math.isinf(value) else "–"
     return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"

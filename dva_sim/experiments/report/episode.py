@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from dva_sim.experiments.study.loading import Settings, pairs_of
+from dva_sim.experiments.study.loading import pairs_of
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.patterns import known_patterns
+from dva_sim.options.runs import EpisodeOptions
 from dva_sim.recordings.pictures import Wanted, joined
 from dva_sim.recordings.reading import Opened, read_recording
 from dva_sim.recordings.writing import check_target, write_recording
@@ -50,65 +51,35 @@ class Played:
         return model_for(self.scenario).rows(self.kept)
 
 
-@dataclass(frozen=True)
 class EpisodeRequest:
     """Request to run one scenario, with changes, recording and pictures.
 
+    Args:
+        options: Scenario, its changes, and the files to write.
+
     Attributes:
         scenario: Name or path.
-        set: Keys to change.
-        side_by_side: Two patterns to play the same seed under, separated by a comma.
+        changes: Keys to change, as `key=value`.
         pictures: Pictures to draw.
-        record: File to keep the run in, `.mcap`.
-        overwrite: It may be there, and is replaced.
 
     Raises:
         ConfigError: options that do not go together, before anything is run.
     """
 
-    scenario: str
-    seed: int = 1
-    set: Settings = ()
-    side_by_side: str | None = None
-    pictures: Wanted = field(default_factory=Wanted)
-    record: Path | None = None
-    overwrite: bool = False
-
-    @classmethod
-    def of(
-        cls,
-        scenario: str | Path,
-        seed: int,
-        *,
-        set: Settings,
-        side_by_side: str | Sequence[str] | None,
-        record: str | Path | None,
-        overwrite: bool,
-        **pictures: Any,
-    ) -> EpisodeRequest:
-        """From the options of `dva_sim.episode`; those that are not named here are of `Wanted`."""
-        return cls(
-            scenario=str(scenario),
-            seed=seed,
-            set=set,
-            side_by_side=None if side_by_side is None else joined(side_by_side),
-            pictures=Wanted.of(**pictures),
-            record=None if record is None else Path(record),
-            overwrite=overwrite,
-        )
-
-    def __post_init__(self) -> None:
-        if self.record is not None:
-            if self.side_by_side is not None:
+    def __init__(self, options: EpisodeOptions) -> None:
+        self.scenario = str(options.scenario)
+        self.seed = options.seed
+        self.changes = pairs_of(options.set)
+        self.pictures = Wanted.of(options)
+        both = options.side_by_side
+        self._patterns = None if both is None else joined(both)
+        self._record = None if options.record is None else Path(options.record)
+        if self._record is not None:
+            if self._patterns is not None:
                 raise ConfigError("--record keeps one run; it does not go with --side-by-side")
-            check_target(self.record, self.overwrite)
-        if self.side_by_side is not None and self.pictures.camera is not None:
+            check_target(self._record, options.overwrite)
+        if self._patterns is not None and self.pictures.camera is not None:
             raise ConfigError("--camera shows one run; it does not go with --side-by-side")
-
-    @cached_property
-    def changes(self) -> list[str]:
-        """Keys to change, as `key=value`."""
-        return pairs_of(self.set)
 
     def scenarios(self) -> list[AnyScenario]:
         """Scenarios to run: one, or two that differ by their pattern.
@@ -116,24 +87,25 @@ class EpisodeRequest:
         Raises:
             ConfigError: it is not there or not valid, or its model has not what is asked for.
         """
-        document, changes = scenarios.load(self.scenario), parse_changes(self.changes)
+        document = scenarios.load(self.scenario)
+        changes = parse_changes(self.changes)
         model = model_of(document)
         built = model.build(document, changes)
         if not isinstance(built, Scenario):
             self._check_other(built)
             return [built]
         self.pictures.check(built)
-        if self.side_by_side is None:
+        if self._patterns is None:
             return [built]
-        patterns = _two_patterns(self.side_by_side)
+        patterns = _two_patterns(self._patterns)
         return [scenarios.build(document, changes | {"pattern": each}) for each in patterns]
 
     def _check_other(self, scenario: AnyScenario) -> None:
         """Reject options that only the full model supports, before anything runs."""
         it = f"{self.scenario} is a {scenario.model} scenario"
-        if self.record is not None:
+        if self._record is not None:
             raise ConfigError(f"{it}: only full ones are recorded")
-        if self.side_by_side is not None:
+        if self._patterns is not None:
             raise ConfigError(f"{it}: only full ones run twice")
         if self.pictures.any and not isinstance(scenario, TaskScenario):
             raise ConfigError(f"{it}: there is nothing to see")
@@ -144,7 +116,7 @@ class EpisodeRequest:
         """Run one of its scenarios."""
         started = time.perf_counter()
         if isinstance(scenario, Scenario):
-            kept = simulate(scenario, self.seed, self.pictures.any or self.record is not None)
+            kept = simulate(scenario, self.seed, self.pictures.any or self._record is not None)
         else:
             kept = model_for(scenario).simulate(scenario, self.seed)
         return Played(scenario, self.seed, kept, time.perf_counter() - started)
@@ -155,12 +127,13 @@ class EpisodeRequest:
         Raises:
             ConfigError: a moment after the run ended, or a file that cannot be written.
         """
-        first, pictures = runs[0], self.pictures
+        first = runs[0]
+        pictures = self.pictures
         recordings = [run.kept for run in runs if isinstance(run.kept, Recording)]
-        if self.record is not None:
+        if self._record is not None:
             about = {"scenario": self.scenario}
-            write_recording(recordings[0], self.record, tables=first.tables, about=about)
-            yield f"Recording: {self.record}"
+            write_recording(recordings[0], self._record, tables=first.tables, about=about)
+            yield f"Recording: {self._record}"
         if recordings and pictures.any:
             yield from pictures.write(recordings)
         elif isinstance(first.scenario, TaskScenario) and pictures.still is not None:

@@ -1,7 +1,7 @@
 """The glossary: words that not every reader knows, of reports and of the documentation.
 
-A report links each word, where it first occurs, to the list at its foot, which holds only the words
-that occur in it. The documentation lists all of them.
+The list at the foot of a report holds only the words that occur in it. The documentation lists all
+of them.
 """
 
 from __future__ import annotations
@@ -32,11 +32,6 @@ class Term:
     in_reports: bool = True
 
     @property
-    def key(self) -> str:
-        """The name as an identifier."""
-        return "word-" + re.sub(r"[^a-z0-9]+", "-", self.name.lower()).strip("-")
-
-    @property
     def pattern(self) -> str:
         """Regular expression that matches the term."""
         return self.regex or rf"\b{re.escape(self.name)}\b"
@@ -63,35 +58,10 @@ TERMS = tuple(term for term in GLOSSARY if term.in_reports)
 
 
 def terms_in(texts: Iterable[str]) -> list[Term]:
-    """Those that are said anywhere, in the order of their names."""
-    marker = Marker(TERMS)
-    found = {term for text in texts for _, term in marker.split(text) if term is not None}
-    return sorted(found, key=lambda term: term.name.lower())
-
-
-class Marker:
-    """Finds each term where it is said for the first time.
-
-    Args:
-        terms: Terms to find.
-    """
-
-    def __init__(self, terms: Iterable[Term]) -> None:
-        self._left = list(terms)
-
-    def split(self, text: str) -> Iterator[tuple[str, Term | None]]:
-        """A text in pieces, those that say a term for the first time with that term."""
-        while self._left and (found := self._first(text)):
-            match, term = found
-            self._left.remove(term)
-            if match.start():
-                yield text[: match.start()], None
-            yield match.group(), term
-            text = text[match.end() :]
-        if text:
-            yield text, None
-
-    def _first(self, text: str) -> tuple[re.Match[str], Term] | None:
-        """The earliest term, and of those at one place the longest."""
-        found = [(m, t) for t in self._left if (m := re.search(t.pattern, text))]
-        return min(found, key=lambda pair: (pair[0].start(), -pair[0].end()), default=None)
+    """Return the terms that occur anywhere, in the order of their names."""
+    text = "\n".join(texts)
+    return [
+        term
+        for term in sorted(TERMS, key=lambda term: term.name.lower())
+        if re.search(term.pattern, text)
+    ]

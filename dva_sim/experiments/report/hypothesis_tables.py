@@ -1,19 +1,28 @@
-"""Tables of hypotheses and comparisons: claim beside result."""
+"""Tables of hypotheses, comparisons and registration: claim beside result."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 from dva_sim.experiments.analysis.answer import too_few
-from dva_sim.experiments.analysis.answer_sentences import EXTRAPOLATED
-from dva_sim.experiments.analysis.hypothesis_tests import Compared, Judgement, Tested, Verdict
+from dva_sim.experiments.analysis.hypothesis_tests import (
+    Compared,
+    Judgement,
+    Tested,
+    Verdict,
+    judged,
+)
+from dva_sim.experiments.analysis.run_grid import Table
 from dva_sim.experiments.report.cell_table import CellTable
-from dva_sim.experiments.report.prose import note
+from dva_sim.experiments.report.prose import note, sentence
+from dva_sim.experiments.study.hashing import fingerprint_of_judges
+from dva_sim.experiments.study.parts import POINT
 from dva_sim.kernel.units import unit_of
-from dva_sim.kernel.wording import capital, number, quantity, signed
-from dva_sim.simulation.labels import level_name, measure_of, setting
+from dva_sim.kernel.wording import listing, number, quantity
+from dva_sim.simulation.labels import factor_name, level_name, measure_of, setting
 from dva_sim.statistics import LEVEL, Interval
 
 # A mark beside the word: neither needs a colour.
@@ -46,7 +55,8 @@ def hypothesis_table(tested: Sequence[Tested], cluster: str = "person") -> CellT
 
 def _few(tested: Tested, cluster: str) -> str:
     """Say that a hypothesis stayed open for want of persons; else an empty text."""
-    found, least = tested.difference, tested.contrast.smallest or tested.hypothesis.margin or None
+    found = tested.difference
+    least = tested.contrast.smallest or tested.hypothesis.margin or None
     is_few = tested.verdict == "open" and found is not None and _are_few(found, least)
     return too_few(found.n_persons, cluster) if is_few and found is not None else ""
 
@@ -64,26 +74,18 @@ def _least_p(persons: int, tests: int) -> float:
 
 
 _SETTLED: dict[Verdict, str] = {
+    "did not hold": "refuted",
+    "open": "undecided",
+    "not run": "not run",
     "held": "held",
-    "did not hold": "was refuted",
-    "open": "is undecided",
-    "not run": "was not run",
 }
-_OPENINGS: dict[Verdict, str] = {
-    "held": "",
-    "did not hold": "it is not so that ",
-    "open": "whether ",
-    "not run": "whether ",
-}
-"""Words before a claim in the lead; a refuted one alone would read as the result."""
-_ORDER: tuple[Verdict, ...] = ("did not hold", "open", "not run", "held")
-_MOST_NAMED = 2  # hypotheses, before the rest are only counted
+"""Verdicts in the lead, in their order there."""
 
 
 def verdict_lead(
     tested: Sequence[Tested], cluster: str, *, is_extrapolated: bool, only_model: str
 ) -> str:
-    """The verdicts on registered hypotheses in at most two sentences, refuted ones first.
+    """Name the verdicts on registered hypotheses, refuted ones first.
 
     Args:
         tested: The hypotheses as they came out; at least one.
@@ -91,50 +93,27 @@ def verdict_lead(
         is_extrapolated: True if any lies beyond the delays at which people were watched.
         only_model: The one model of the persons that was tried; empty if several were.
     """
-    ranked = sorted(tested, key=lambda claim: _ORDER.index(claim.verdict))
-    named = [t for t in ranked if t.verdict == ranked[0].verdict][:_MOST_NAMED]
-    beyond = f" ({EXTRAPOLATED})" if is_extrapolated else ""
-    first = f"{_counted(ranked)}{beyond}: {'; '.join(_with_facts(t, cluster) for t in named)}."
-    rest = Counter(t.verdict for t in ranked)
-    del rest[ranked[0].verdict]
-    clauses = [f"{n} of the others {_SETTLED[verdict]}" for verdict, n in rest.items()]
-    if only_model:
-        clauses.append(f"only one model of the persons was tried ({only_model})")
-    return f"{first} {capital('; '.join(clauses))}." if clauses else first
-
-
-def _counted(ranked: Sequence[Tested]) -> str:
-    """`Both registered hypotheses held`, `1 of 3 registered hypotheses was refuted`."""
-    verdict, count = ranked[0].verdict, len(ranked)
-    same = sum(t.verdict == verdict for t in ranked)
-    if count == 1:
-        return f"Registered hypothesis {ranked[0].name} {_SETTLED[verdict]}"
-    settled = _SETTLED[verdict]
-    if same > 1:
-        settled = settled.replace("was ", "were ").replace("is ", "are ")
-    some = f"{same} of {count}" if same < count else "Both" if count == 2 else f"All {count}"
-    return f"{some} registered hypotheses {settled}"
-
-
-def _inside(text: str) -> str:
-    """A sentence as a clause of another: without its full stop, and small unless it is a name."""
-    clause = text.strip().removesuffix(".")
-    return clause[:1].lower() + clause[1:] if clause[1:2].islower() else clause
-
-
-def _with_facts(tested: Tested, cluster: str) -> str:
-    """`Waiting costs (4.0 s, 90 % interval 3.0 to 5.0 s, claimed above 2.0 s)`."""
-    text = _OPENINGS[tested.verdict] + _inside(tested.hypothesis.text or _claim(tested))
-    if tested.difference is None:
-        return text
-    found, unit = tested.difference, unit_of(tested.contrast.measure)
-    facts = [
-        f"{signed(found.mean, unit)}",
-        f"{_level(tested)} interval {number(found.low)} to {quantity(found.high, unit)}",
-        f"claimed {bound_of(tested)}",
-        _few(tested, cluster),
-    ]
-    return f"{text} ({', '.join(filter(None, facts))})"
+    counts = Counter(t.verdict for t in tested)
+    first, *rest = [verdict for verdict in _SETTLED if counts[verdict]]
+    return sentence(
+        "verdicts",
+        count=len(tested),
+        verdict=_SETTLED[first],
+        is_extrapolated=is_extrapolated,
+        claims=[
+            (
+                t.name,
+                (t.hypothesis.text or _claim(t)).strip().removesuffix("."),
+                _found(t),
+                bound_of(t),
+                _few(t, cluster),
+            )
+            for t in tested
+            if t.verdict == first
+        ],
+        others=[f"{counts[verdict]} {_SETTLED[verdict]}" for verdict in rest],
+        only_model=only_model,
+    )
 
 
 def comparison_table(found: Judgement, cluster: str = "person") -> CellTable:
@@ -183,7 +162,8 @@ def _claim(tested: Tested) -> str:
 
 def bound_of(tested: Tested) -> str:
     """`above 2.0 s`, `below −2.0 s` or `the same within 2.0 s`."""
-    claim, unit = tested.hypothesis, unit_of(tested.contrast.measure)
+    claim = tested.hypothesis
+    unit = unit_of(tested.contrast.measure)
     margin = quantity(claim.margin, unit) if claim.margin else "zero"
     return {
         "above": f"above {margin}",
@@ -240,3 +220,77 @@ def _apart(compared: Compared, cluster: str, tests: int) -> str:
         return "✓ yes"
     is_few = _are_few(found, compared.contrast.smallest, tests)
     return f"? {too_few(found.n_persons, cluster)}" if is_few else "? not shown"
+
+
+_DIGITS = 16
+
+
+_DESIGNS = {
+    "latin_hypercube": "points of a Latin hypercube",
+    "sobol": "points of a Sobol' sequence",
+    "saltelli": "points of Saltelli's sample, with what lies between them",
+}
+
+
+_CLAIMS = ("hypotheses", "answer", "comparisons")
+
+
+def registration_table(manifest: Mapping[str, Any], runs: Table, persons: int) -> CellTable:
+    """Line by line what was registered, beside what was run.
+
+    The claims are those registered, also where the study as run has others.
+
+    Args:
+        manifest: Manifest of the results, with a registration in its status.
+        runs: The table of runs.
+        persons: Number of persons simulated.
+    """
+    found = manifest["status"]["registration"]
+    study = manifest["study"]
+    plan = found.get("plan") or {}
+    versions = manifest.get("versions") or {}
+    rows = [
+        ["persons x trials", _size(plan, plan.get("persons")), _size(study, persons)],
+        *_claims(dict(study) | {key: plan.get(key) for key in _CLAIMS}, runs),
+        ["design", _design(plan), _design(study)],
+        [
+            "made with",
+            found.get("made_with", "–"),
+            f"{versions.get('dva-sim')} {versions.get('fingerprint')}",
+        ],
+        ["judged with", found.get("judged_with") or "–", fingerprint_of_judges()],
+        ["hash", str(found.get("hash", ""))[:_DIGITS], ""],
+        ["earlier registrations", *_earlier(found.get("earlier") or ())],
+    ]
+    return CellTable("", ["", "as registered", "as run"], 3, rows)
+
+
+def _size(study: Mapping[str, Any], persons: int | None) -> str:
+    return f"{persons} x {study.get('replications')}"
+
+
+def _claims(study: Mapping[str, Any], runs: Table) -> Iterator[list[str]]:
+    """The bound that each hypothesis was to be tested against, and what came out."""
+    for tested in judged(study, runs).tested if runs else ():
+        yield [f"hypothesis {tested.name}", bound_of(tested), verdict_with_interval(tested)]
+
+
+def _design(study: Mapping[str, Any]) -> str:
+    """Describe how levels are combined, and the number of levels of each factor."""
+    design = study.get("design") or {}
+    factors = study.get("factors") or {}
+    lines = [f"{factor_name(f)} ({len(v)} levels)" for f, v in factors.items() if f != POINT]
+    for kind, words in _DESIGNS.items():
+        if design.get(kind):
+            ranges = listing([factor_name(name) for name in design.get("ranges") or {}])
+            return "; ".join([f"{design[kind]} {words} over {ranges}", *lines])
+    how = "one after another" if design.get("zip") else "every combination"
+    if design.get("rows") or design.get("csv"):
+        how = "rows of a list"
+    return f"{how}: {', '.join(lines)}"
+
+
+def _earlier(hashes: Sequence[str]) -> tuple[str, str]:
+    if not hashes:
+        return "none told", ""
+    return f"{len(hashes)}: {', '.join(h[:_DIGITS] for h in hashes)}", ""

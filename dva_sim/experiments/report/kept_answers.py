@@ -29,7 +29,8 @@ from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.whole_files import write_whole
 
-FOLDER, HISTORY = "answers", "history.csv"
+FOLDER = "answers"
+HISTORY = "history.csv"
 _MANIFEST = ".manifest.json"
 
 
@@ -115,7 +116,8 @@ def answer_in(folder: Path) -> tuple[KeptAnswer, dict[str, Any]]:
             another size than its file has.
     """
     reading = Reading(load_so_far(folder))
-    manifest, study = dict(reading.manifest), reading.study
+    manifest = dict(reading.manifest)
+    study = reading.study
     if reading.results.partial or manifest.get("failures"):
         raise ConfigError(f"{folder}: only a study that is finished without failed runs is kept")
     if reading.broken:
@@ -126,7 +128,8 @@ def answer_in(folder: Path) -> tuple[KeptAnswer, dict[str, Any]]:
     if any(study.get(key) != usual.get(key) for key in ("persons", "replications", "factors")):
         raise ConfigError(f"{folder}: was run in another size than that of its study's file")
     machine = json.loads((folder / "machine.json").read_text(encoding="utf-8"))
-    versions, finding = manifest["versions"], reading.finding
+    versions = manifest["versions"]
+    finding = reading.finding
     if versions.get("dirty"):
         raise ConfigError(f"{folder}: was run by a program with changes that are not committed")
     kept = KeptAnswer(
@@ -174,7 +177,8 @@ def changed_since(manifest: Mapping[str, Any], study: Study) -> str:
     for key, what in _ASKED.items():
         if _without_question(manifest.get(key)) != _without_question(now[key]):
             return what
-    before, files = manifest.get("inputs", {}), now["inputs"]
+    before = manifest.get("inputs", {})
+    files = now["inputs"]
     return next((f for f in sorted(before.keys() & files) if before[f] != files[f]), "")
 
 

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final
+from typing import Any
 
 import numpy as np
 
-from dva_sim.experiments.report.prose import paragraphs
+from dva_sim.experiments.analysis.conditions import waits
+from dva_sim.experiments.report.prose import paragraphs, sentence
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.study import coverage
 from dva_sim.experiments.study.parts import POINT, multiplied
-from dva_sim.kernel.wording import capital, listing, number
 from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT
-from dva_sim.simulation.labels import measure_called, measure_name
+from dva_sim.simulation.labels import level_name, measure_called, measure_name
 from dva_sim.statistics import VarianceReduction, band, variance_reduction
 
 _FEW = 6  # persons: with fewer nothing can be drawn again
@@ -29,18 +30,25 @@ def remarks(reading: Reading) -> list[str]:
     return [*size, *lines, *tests, _made_by(reading)]
 
 
-_SAMPLES: Final = {"shift": "Independent shifts", "repeat": "Repeats of each configuration"}
-
-
 def _size(reading: Reading) -> str:
     """Persons and trials as they were run, and what decided how many."""
-    cluster = reading.cluster
-    trials = "blocks of trials" if _is_task(reading) else "trials"
-    name = _SAMPLES.get(cluster, "Simulated persons")
-    each = "" if cluster in _SAMPLES else f"; {trials} of each: {_trials(reading)}"
-    few = coverage.of_few_persons(reading.persons)
-    told = f" {capital(few)}." if few else ""
-    return f"{name}: {reading.persons}{_why_so_many(reading)}{each}.{told}"
+    stopped = reading.manifest.get("stopped") or {}
+    stop = reading.study.get("stop") or {}
+    return sentence(
+        "run_size",
+        cluster=reading.cluster,
+        persons=reading.persons,
+        is_ended=bool(stop) or reading.study.get("budget_s") is not None,
+        why=stopped.get("why"),
+        rounds=stopped.get("rounds"),
+        of=stopped.get("of"),
+        is_doubled=stop.get("batch_persons") == "double",
+        level="" if reading.view is None else f"{100 * reading.view.level:.3g}",
+        coverage=coverage.in_words(coverage.OF_STOPPING),
+        trials="" if reading.cluster in ("shift", "repeat") else _trials(reading),
+        is_task=_is_task(reading),
+        few=coverage.of_few_persons(reading.persons),
+    )
 
 
 def _trials(reading: Reading) -> str:
@@ -53,30 +61,6 @@ def _trials(reading: Reading) -> str:
     return ", ".join(f"{count} in {name}" for name, count in counts.items())
 
 
-def _why_so_many(reading: Reading) -> str:
-    """Say why a study with a stopping rule or a budget ended."""
-    stopped = reading.manifest.get("stopped") or {}
-    if reading.study.get("stop") is None and reading.study.get("budget_s") is None:
-        return ""
-    batches = f"after {stopped.get('rounds')} of {stopped.get('of')} batches"
-    why, stop = stopped.get("why"), reading.study.get("stop") or {}
-    if why == "enough" and stop.get("batch_persons") == "double":
-        level = "" if reading.view is None else f" at {100 * reading.view.level:.3g} %"
-        return (
-            f" (stopped {batches}: every interval asked for was narrow enough; each look has "
-            f"intervals{level}, so that 95 % hold whichever look ends the study)"
-        )
-    if why == "enough":
-        return (
-            f" (stopped {batches}: every interval asked for was narrow enough; a 95 % interval "
-            f"that ends a study by its width holds {coverage.in_words(coverage.OF_STOPPING)})"
-        )
-    if why == "budget":
-        return f" (stopped {batches}: the time limit was reached, so it cannot be reproduced)"
-    asked = "; not every interval became as narrow as was asked" if why == "limit" else ""
-    return f" (all {stopped.get('of')} batches, the most that was allowed{asked})"
-
-
 def _is_task(reading: Reading) -> bool:
     return any(s.get("model") == "task" for s in reading.scenarios.values())
 
@@ -84,19 +68,19 @@ def _is_task(reading: Reading) -> bool:
 def _made_by(reading: Reading) -> str:
     """The program, and whether it can be had again."""
     versions = reading.manifest.get("versions") or {}
-    program = f"Made with dva-sim {versions.get('dva-sim', 'of unknown version')}"
-    if fingerprint := versions.get("fingerprint"):
-        program += f", simulating code {fingerprint}"
-    commit = versions.get("commit")
-    if not commit:
-        return f"{program}; its commit is not known: it did not run from a checkout."
-    state = " with changes that are not committed" if versions.get("dirty") else ""
-    return f"{program}, commit {commit[:12]}{state}."
+    return sentence(
+        "made_by",
+        version=versions.get("dva-sim", "of unknown version"),
+        fingerprint=versions.get("fingerprint"),
+        commit=versions.get("commit"),
+        dirty=versions.get("dirty"),
+    )
 
 
 def _usual(reading: Reading) -> list[str]:
 
-    study, is_task = reading.study, _is_task(reading)
+    study = reading.study
+    is_task = _is_task(reading)
     awaited = measure_called(reading.view.measure).awaits if reading.view else ""
     return paragraphs(
         "method",
@@ -122,10 +106,9 @@ def _adjusted(reading: Reading) -> str:
         band(each.difference(each.panels[0], *view.contrast)[:, -1:]) for each in (view, plain)
     )
     ratio = float((ours.high - ours.low)[0] / (theirs.high - theirs.low)[0])
-    names = listing([" times ".join(_words(name)) for name in view.covariates])
-    if not np.isfinite(ratio) or np.array_equal(ours.mean, theirs.mean, equal_nan=True):
-        return f"{names}, but for too few persons"
-    return f"{names}; at the last level its interval is {number(ratio)} times as long as without"
+    names = [" times ".join(_words(name)) for name in view.covariates]
+    is_same = not np.isfinite(ratio) or np.array_equal(ours.mean, theirs.mean, equal_nan=True)
+    return sentence("adjusted", names=names, ratio=None if is_same else ratio)
 
 
 def _words(covariate: str) -> list[str]:
@@ -136,22 +119,39 @@ def _alike(reading: Reading) -> str:
     """Report the observed gain from pairing."""
     if reading.pair_correlation is None:
         return ""
-    words = f"; at the last level the two sides correlate with {number(reading.pair_correlation)}"
     found = _reduction(reading)
-    if found is None or not np.isfinite(found.ratio.mean):
-        return words
-    ratio = found.ratio
-    text = f"{number(ratio.mean)} ({number(ratio.low)} to {number(ratio.high)})"
-    if found.is_lower:
-        return f"{words}, so the variance of the difference is {text} of that of unpaired runs"
-    return f"{words}; that pairing lowers the variance is not shown (ratio {text})"
+    is_known = found is not None and np.isfinite(found.ratio.mean)
+    return sentence(
+        "alike",
+        correlation=reading.pair_correlation,
+        ratio=found.ratio if found is not None and is_known else None,
+        is_lower=found is not None and found.is_lower,
+    )
 
 
 def _reduction(reading: Reading) -> VarianceReduction | None:
     """Variance reduction of the contrast at its last stop."""
-    view, sides = reading.view, reading.last_sides
+    view = reading.view
+    sides = reading.last_sides
     if view is None or sides is None:
         return None
     first, second = sides
     person = np.broadcast_to(view.part.persons[:, np.newaxis], first.shape)
     return variance_reduction(first.ravel(), second.ravel(), person.ravel())
+
+
+def timeout_remark(scenarios: Mapping[str, Mapping[str, Any]], study: Mapping[str, Any]) -> str:
+    """Say in which conditions a repeated request has no time for its reply; see `waits`."""
+    known = waits(scenarios, study)
+    if not known:
+        return ""
+    trips: dict[str, list[str]] = {}
+    for timeout, trip in sorted({(w.timeout, w.round_trip) for w in known if w.is_short}):
+        where = trips.setdefault(level_name("command.timeout_s", timeout), [])
+        where.append(level_name("link.delay_s", trip))
+    return sentence(
+        "time_out",
+        short=[f"{timeout} with round trips of {', '.join(at)}" for timeout, at in trips.items()],
+        needed=level_name("command.timeout_s", max(w.needed for w in known)),
+        is_all=all(w.is_short for w in known),
+    )

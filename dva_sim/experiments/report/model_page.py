@@ -1,7 +1,7 @@
 """Model-specific parts of a report: texts, tables and figures.
 
 `ModelPage` is the usual page, of persons who drive; a model whose runs are something else has a
-page of its own, derived from it (`model_pages`).
+page of its own, derived from it (`results_reading.page_of`).
 """
 
 from __future__ import annotations
@@ -10,12 +10,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dva_sim.experiments.analysis.answer import Answer, Finding
-from dva_sim.experiments.analysis.answer_sentences import answer
 from dva_sim.experiments.analysis.conditions import conditions
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, Table
 from dva_sim.experiments.analysis.study_view import StudyView
+from dva_sim.experiments.report.answer_sentences import answer
 from dva_sim.experiments.report.cell_table import SUMMARIES, CellTable, Summary
+from dva_sim.experiments.report.prose import paragraphs, sentence
+from dva_sim.kernel.wording import number, percent, quantity
+from dva_sim.simulation.labels import level_name
 
 
 class ModelPage:
@@ -90,3 +96,166 @@ def correlated(correlation: float | None) -> str:
     if correlation is None:
         return ""
     return f"The two sides of the contrast correlate with {correlation:.2f} at the last level."
+
+
+_OF_TRANSPORTS: tuple[Summary, ...] = (
+    ("completed", "drives done", np.mean, percent),
+    ("wall_crossings", "crossings per drive", np.mean, number),
+    ("round_trip_mean_s", "round trip [s]", np.mean, number),
+    ("round_trip_p95_s", "its 95th percentile [s]", np.mean, number),
+    ("delivered_share", "commands delivered", np.mean, percent),
+    ("crucial_delivered_share", "crucial ones", np.mean, percent),
+    ("command_rate_hz", "applied [Hz]", np.mean, number),
+    ("command_age_mean_s", "age when applied [s]", np.mean, number),
+    ("age_in_force_mean_s", "age in force [s]", np.mean, number),
+    ("picture_rate_hz", "pictures shown [Hz]", np.mean, number),
+    ("picture_age_mean_s", "their age [s]", np.mean, number),
+    ("session_up_bps", "session up [bit/s]", np.mean, number),
+    ("session_down_bps", "session down [bit/s]", np.mean, number),
+    ("bulk_down_bps", "a TCP flow down [bit/s]", np.mean, number),
+    ("share_of_fair_down", "session, in equal shares", np.mean, number),
+    ("bulk_use_down", "line used by TCP, down", np.mean, percent),
+    ("jain_up", "Jain's index up", np.mean, number),
+    ("jain_down", "Jain's index down", np.mean, number),
+)
+
+
+class TransportPage(ModelPage):
+    """Report page for sessions that compete on a congested link."""
+
+    name: ClassVar[str] = "transport"
+    summaries: ClassVar[tuple[Summary, ...]] = _OF_TRANSPORTS
+    assumed: ClassVar[tuple[str, ...]] = ()
+
+    @classmethod
+    def fits(cls, view: StudyView) -> bool:
+        """True if the runs measure a session's throughput."""
+        return view.part.has("session_down_bps")
+
+    def method(self, correlation: float | None) -> list[str] | None:
+        """Describe how the network and the drives over it were simulated."""
+        return paragraphs("method_transport", correlated=correlated(correlation))
+
+
+_OF_MIDDLEWARE: tuple[Summary, ...] = (
+    ("connected", "connected", np.mean, percent),
+    ("age_in_force_p50_s", "age in force, median [s]", np.mean, number),
+    ("age_in_force_p95_s", "95th percentile [s]", np.mean, number),
+    ("too_old_share", "too old", np.mean, percent),
+    ("longest_gap_s", "longest gap [s]", np.mean, number),
+    ("command_rate_hz", "applied [Hz]", np.mean, number),
+    ("false_stops", "false stops", np.mean, number),
+    ("outdated_share", "out of order", np.mean, percent),
+    ("picture_rate_hz", "pictures shown [Hz]", np.mean, number),
+    ("picture_age_p95_s", "their age, p95 [s]", np.mean, number),
+    ("up_bytes", "to the robot [B]", np.mean, number),
+    ("down_bytes", "back [B]", np.mean, number),
+    ("late_p99_s", "link late, p99 [s]", np.max, number),
+    ("attempts", "attempts", np.max, number),
+    ("disturbed", "disturbed", np.sum, number),
+)
+
+
+class MiddlewarePage(ModelPage):
+    """Report page for commands measured in real time."""
+
+    name: ClassVar[str] = "middleware"
+    cluster: ClassVar[str] = "repeat"
+    summaries: ClassVar[tuple[Summary, ...]] = _OF_MIDDLEWARE
+    has_support: ClassVar[bool] = False
+    assumed: ClassVar[tuple[str, ...]] = ()
+    ends_by_event: ClassVar[bool] = False
+
+    @classmethod
+    def fits(cls, view: StudyView) -> bool:
+        """True if the runs measure the lateness of the link itself."""
+        return view.part.has("late_p99_s")
+
+    def method(self, correlation: float | None) -> list[str] | None:
+        """Describe how commands were sent and measured."""
+        return paragraphs("method_middleware")
+
+
+_KEYS = "person_label", "pattern", "link_delay_s"
+_HEADS = (
+    *("person", "messaging pattern", "one-way delay", "drives", "driven [s]"),
+    *("age of commands, median [s]", "worst 5 % older than [s]", "without a command [%]"),
+    *("refused", "time-outs", "times in the tour [s]"),
+)
+
+
+def people_drove(drives: Mapping[str, NDArray[Any]]) -> bool:
+    """Return True if a person made at least one of the drives."""
+    return "person_label" in drives and any(drives["person_label"].tolist())
+
+
+class PeoplePage(ModelPage):
+    """The page of a run in which people drove.
+
+    Args:
+        drives: Columns of the table `drives`.
+    """
+
+    name: ClassVar[str] = "people"
+    cluster: ClassVar[str] = "run"
+    has_support: ClassVar[bool] = False
+
+    def __init__(self, view: StudyView, drives: Table) -> None:
+        super().__init__(view)
+        theirs = np.array([bool(label) for label in drives["person_label"].tolist()])
+        self._drives = {name: np.asarray(column)[theirs] for name, column in drives.items()}
+
+    def answer(self, finding: Finding | None) -> Answer:
+        """Count people, drives and robots, and say that this is not an experiment."""
+        patterns = dict.fromkeys(self._drives["pattern"].tolist())
+        return Answer(
+            sentence(
+                "people_drove",
+                drives=len(self._drives["person_label"]),
+                people=len(set(self._drives["person_label"].tolist())),
+                robots=len(set(self._drives["robot_name"].tolist())),
+                patterns=[level_name("pattern", pattern) for pattern in patterns],
+            )
+        )
+
+    def cells(self, part: RunGrid) -> CellTable | None:
+        """The drives by person, pattern and link, in the order in which they began."""
+        columns = [self._drives[key].tolist() for key in _KEYS if key in self._drives]
+        keys = [tuple(map(str, key)) for key in zip(*columns, strict=True)]
+        rows = []
+        for key in dict.fromkeys(keys):
+            here = np.array([each == key for each in keys])
+            rows.append(self._row({name: c[here] for name, c in self._drives.items()}))
+        return CellTable(part.name, list(_HEADS), 3, rows)
+
+    def method(self, correlation: float | None) -> list[str] | None:
+        """Explain the columns."""
+        return [
+            "Ages and time-outs are measured by the run's clock, command by command: the tables "
+            "drives and commands have all of them. Nobody's name is kept."
+        ]
+
+    def _row(self, drives: Mapping[str, NDArray[Any]]) -> list[str]:
+        delay = float(drives["link_delay_s"][0]) if "link_delay_s" in drives else np.nan
+        lasted = np.asarray(drives["driven_s"], float)
+        stopped = np.nansum(np.asarray(drives["stop_share"], float) * lasted)
+        total = float(np.nansum(lasted))
+        tour = np.asarray(drives.get("tour_time_s", []), float)
+        return [
+            str(drives["person_label"][0]),
+            level_name("pattern", str(drives["pattern"][0])),
+            "not known" if np.isnan(delay) else quantity(delay, "s"),
+            str(len(lasted)),
+            number(total),
+            _median(drives["command_age_p50_s"]),
+            _median(drives["command_age_p95_s"]),
+            f"{100 * stopped / total:.0f}" if total else "–",
+            str(int(np.nansum(np.asarray(drives["commands_refused"], float)))),
+            str(int(np.nansum(np.asarray(drives["timeouts"], float)))),
+            ", ".join(f"{time:.1f}" for time in tour[np.isfinite(tour)]) or "–",
+        ]
+
+
+def _median(values: NDArray[Any]) -> str:
+    known = np.asarray(values, float)
+    return number(float(np.nanmedian(known))) if np.isfinite(known).any() else "–"

@@ -1,20 +1,23 @@
-"""Outcomes of events in a report: the answer's contrast in words, and a table."""
+"""Outcomes of events in a report: the answer's contrast in words, a table, and all in a line."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.competing_risks import CLEARED, CONFIRMED, NOTHING, Ended, Endings
-from dva_sim.experiments.analysis.level_phrases import place_of
 from dva_sim.experiments.analysis.run_grid import Setting
 from dva_sim.experiments.analysis.study_view import StudyView
+from dva_sim.experiments.report.answer_sentences import place
 from dva_sim.experiments.report.cell_table import CellTable
-from dva_sim.experiments.report.prose import note
+from dva_sim.experiments.report.prose import note, sentence
 from dva_sim.experiments.study.parts import Level
-from dva_sim.kernel.wording import capital, listing, number, percent, quantity
+from dva_sim.kernel.wording import listing, number, percent, quantity
 from dva_sim.simulation.labels import factor_name, level_name, setting
 from dva_sim.statistics import Interval
 
@@ -26,23 +29,33 @@ def sentences(endings: Endings, view: StudyView, finding: Finding | None) -> lis
     sides = (finding.first, finding.second)
     stops = [stop for stop in view.stops if not _all_right(endings, sides, stop)]
     if not stops:
-        return [
-            f"In part {finding.part} the first event of every run was confirmed at the levels "
-            "that the answer compares; at the others not all were."
-        ]
+        return [sentence("endings_right", part=finding.part)]
     stop = stops[-1]
-    text = "; ".join(_side(view, endings.at(level, stop)) for level in sides)
-    where = place_of(finding, view.stops.index(stop))
-    when = f"by {quantity(endings.horizon, 's')} after the report"
-    there = ", ".join(filter(None, (f"in part {finding.part}", where, when)))
-    return [f"{capital(there)}: {text}.{_apart(endings, finding, stop)}"]
+    within = f"with {setting(finding.within)}" if finding.within else ""
+    levels = [level_name(finding.factor, side) for side in sides]
+    found = endings.difference(*sides, stop)
+    sign = 1 if found.mean > 0 else -1
+    low, high = sorted(sign * max(-1.0, min(end, 1.0)) for end in (found.low, found.high))
+    is_known = bool(np.isfinite(found.low) and found.mean != 0)
+    return [
+        sentence(
+            "endings",
+            part=finding.part,
+            place=", ".join(filter(None, (within, place(finding, [view.stops.index(stop)])))),
+            horizon=quantity(endings.horizon, "s"),
+            sides=[_side(view, endings.at(level, stop)) for level in sides],
+            first=levels[0],
+            second=levels[1],
+            direction="above" if sign > 0 else "below",
+            points=number(100 * abs(found.mean)) if is_known else "",
+            ends=f"{number(100 * low)} to {number(100 * high)}" if low < high else "",
+        )
+    ]
 
 
 def in_a_line(endings: Endings, part: str, failed: int = 0) -> str:
     """Say that everything went right in a part, failed runs excepted."""
-    every = f"every event{' whose run did not fail' if failed else ''} was confirmed"
-    cleared = ", and every false alarm cleared" if CLEARED in endings.ways else ""
-    return f"In part {part} {every}{cleared}."
+    return sentence("all_right", part=part, failed=failed, cleared=CLEARED in endings.ways)
 
 
 def table(endings: Endings, view: StudyView, cluster: str) -> CellTable:
@@ -119,24 +132,78 @@ def _side(view: StudyView, ended: Ended) -> str:
     return f"{name}: {listing(clauses)}"
 
 
-def _apart(endings: Endings, finding: Finding, stop: Level) -> str:
-    """Difference between the shares confirmed, in percentage points."""
-    found = endings.difference(finding.first, finding.second, stop)
-    if not np.isfinite(found.low) or found.mean == 0:
-        return ""
-    first, second = (level_name(finding.factor, x) for x in (finding.first, finding.second))
-    sign = 1 if found.mean > 0 else -1
-    low, high = sorted(sign * max(-1.0, min(end, 1.0)) for end in (found.low, found.high))
-    ends = f" ({number(100 * low)} to {number(100 * high)})" if low < high else ""
-    return (
-        f" In the share confirmed {first} lies {number(100 * abs(found.mean))} percentage points "
-        f"{'above' if sign > 0 else 'below'} {second}{ends}."
-    )
-
-
 def _share(found: Interval) -> str:
     """With its interval, where there are enough persons for one."""
     if not np.isfinite(found.low):
         return percent(found.mean)
     low = percent(found.low).removesuffix("\N{NO-BREAK SPACE}%")
     return f"{percent(found.mean)} ({low} to {percent(found.high)})"
+
+
+_SEEN = "confirmed", "contained"
+_LEFT = {
+    "escalated": "escalated",
+    "expired": "expired",
+    "open": "still open at the end",
+    "undetected": "never reported",
+}
+
+
+class EventOutcomes(NamedTuple):
+    """Counts of events by outcome.
+
+    Attributes:
+        real: Events that were no false alarms.
+        confirmed: Real ones that were confirmed.
+        missed: Real ones that were refuted, by kind and by who looked.
+        left: Other real ones, by what became of them.
+        false_alarms: Number of false alarms.
+        believed: False alarms that were confirmed.
+    """
+
+    real: int
+    confirmed: int
+    missed: Counter[tuple[str, str]]
+    left: Counter[str]
+    false_alarms: int
+    believed: int
+
+    @property
+    def warns(self) -> bool:
+        """Return True if an event was missed or a false alarm was taken for real."""
+        return bool(self.missed or self.believed)
+
+    def __str__(self) -> str:
+        """`Events: 288, of which 263 were confirmed, 23 missed (real but refuted: ...)`."""
+        return sentence(
+            "events",
+            e=self,
+            missed=[_looked(*who, n) for who, n in self.missed.most_common()],
+            left=[(_LEFT.get(outcome, outcome), n) for outcome, n in self.left.most_common()],
+        )
+
+
+def _looked(kind: str, who: str, number: int) -> str:
+    if number == 1:
+        return f"1 {kind.replace('_', ' ')} inspected by a {who}"
+    return f"{number} {kind.replace('_', ' ')}s inspected by {who}s"
+
+
+def outcomes_of(events: Mapping[str, NDArray[Any]]) -> EventOutcomes | None:
+    """Count the events of a table by outcome; None if it has no events or no outcomes."""
+    if "outcome" not in events or "is_true" not in events or not len(events["outcome"]):
+        return None
+    real = np.asarray(events["is_true"]) == True  # noqa: E712  (True, False or missing)
+    outcome = np.asarray(events["outcome"])
+    seen = np.isin(outcome, _SEEN)
+    missed = real & (outcome == "refuted")
+    kinds = np.asarray(events["kind"])
+    whose = np.asarray(events["responder_kind"])
+    return EventOutcomes(
+        real=int(real.sum()),
+        confirmed=int((real & seen).sum()),
+        missed=Counter(zip(map(str, kinds[missed]), map(str, whose[missed]), strict=True)),
+        left=Counter(map(str, outcome[real & ~seen & ~missed])),
+        false_alarms=int((~real).sum()),
+        believed=int((~real & seen).sum()),
+    )

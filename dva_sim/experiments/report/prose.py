@@ -6,7 +6,7 @@ import re
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from dva_sim.kernel.wording import capital, number, percent, quantity
+from dva_sim.kernel.wording import capital, listing, number, percent, quantity, signed
 
 if TYPE_CHECKING:
     import jinja2
@@ -23,9 +23,15 @@ def note(name: str, **facts: Any) -> str:
     return _rendered(_sections("notes")[name], facts)
 
 
+def sentence(name: str, **facts: Any) -> str:
+    """Render a section of `sentences.txt.j2`: the answer and its conditions."""
+    return _rendered(_sections("sentences")[name], facts)
+
+
 def paragraphs(name: str, **facts: Any) -> list[str]:
     """Render a template to paragraphs, one line each."""
-    found = _template(name).render(facts).split("\n\n")
+    template = _environment(trim=True).get_template(f"{name}.txt.j2")
+    found = template.render(facts).split("\n\n")  # empty lines part paragraphs
     return [line for text in found if (line := _in_a_line(text))]
 
 
@@ -35,7 +41,12 @@ def _in_a_line(text: str) -> str:
 
 
 def _rendered(text: str, facts: dict[str, Any]) -> str:
-    return _in_a_line(_environment().from_string(text).render(facts))
+    return _in_a_line(_compiled(text).render(facts))
+
+
+@cache
+def _compiled(text: str) -> jinja2.Template:
+    return _environment().from_string(text)
 
 
 _HEAD = re.compile(r"^== (\w+) ==\n", re.MULTILINE)
@@ -51,10 +62,6 @@ def _sections(name: str) -> dict[str, str]:
     return {head: text.strip() for head, text in zip(parts[::2], parts[1::2], strict=True)}
 
 
-def _template(name: str) -> jinja2.Template:
-    return _environment(trim=True).get_template(f"{name}.txt.j2")  # empty lines part paragraphs
-
-
 @cache
 def _environment(trim: bool = False) -> jinja2.Environment:
     import jinja2
@@ -65,5 +72,6 @@ def _environment(trim: bool = False) -> jinja2.Environment:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.filters |= {f.__name__: f for f in (capital, number, percent, quantity)}
+    filters = (capital, listing, number, percent, quantity, signed)
+    environment.filters |= {f.__name__: f for f in filters}
     return environment

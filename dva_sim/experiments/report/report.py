@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dva_sim.experiments.analysis.answer import too_few
-from dva_sim.experiments.analysis.conditions import conditions, timeout_remark
+from dva_sim.experiments.analysis.conditions import conditions
 from dva_sim.experiments.analysis.predictions import Judged, judge_all
-from dva_sim.experiments.analysis.robustness import sentences
 from dva_sim.experiments.analysis.study_view import factors_of, keys_of
 from dva_sim.experiments.execution.checkpoint import load_so_far
-from dva_sim.experiments.report.answer_table import answer_table
+from dva_sim.experiments.report.answer_conditions import repeated
+from dva_sim.experiments.report.answer_table import answer_table, spread_table
 from dva_sim.experiments.report.blocks import (
     Block,
     FigureBlock,
@@ -36,37 +36,36 @@ from dva_sim.experiments.report.blocks import (
 )
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.report.choice_table import beside_table, choice_table
-from dva_sim.experiments.report.figures.registry import draw_all, leading
-from dva_sim.experiments.report.figures.style import Drawn, ReportFigure
-from dva_sim.experiments.report.glossary import Marker, terms_in
-from dva_sim.experiments.report.hypothesis_tables import comparison_table, hypothesis_table
-from dva_sim.experiments.report.method import remarks
+from dva_sim.experiments.report.figures.registry import draw_all
+from dva_sim.experiments.report.figures.style import Drawn
+from dva_sim.experiments.report.glossary import terms_in
+from dva_sim.experiments.report.hypothesis_tables import (
+    comparison_table,
+    hypothesis_table,
+    registration_table,
+)
+from dva_sim.experiments.report.method import remarks, timeout_remark
 from dva_sim.experiments.report.outcome_table import in_a_line
 from dva_sim.experiments.report.outcome_table import sentences as sentences_of_endings
 from dva_sim.experiments.report.outcome_table import table as endings_table
 from dva_sim.experiments.report.printing import print_page
 from dva_sim.experiments.report.prose import note
-from dva_sim.experiments.report.registration_table import registration_table
-from dva_sim.experiments.report.size_plan_table import plan_table
-from dva_sim.experiments.report.spread_table import spread_table
-from dva_sim.experiments.report.study_size import size_of
+from dva_sim.experiments.report.study_size import not_reached, plan_table, size_of
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.report.tuning_table import tuned_table
 from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.study.parts import POINT
 from dva_sim.experiments.study.study import Status
-from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.whole_files import whole, write_whole
 from dva_sim.kernel.wording import capital, first_and_rest, listing, number
 from dva_sim.simulation.labels import factor_name, is_in_file, level_name, setting, with_unit
 
 if TYPE_CHECKING:
     import jinja2
-    from markupsafe import Markup
 
 
 WORDS = "Words"
-MOST_FIGURES = 7  # design: that are not folded away, the answering one among them
 _KINDS = {
     "confirmatory": "Confirmatory: registered before the run",
     "declared": "Declared in the study's file, not registered before the run",
@@ -104,6 +103,8 @@ def _status(reading: Reading) -> Iterator[Block]:
     if reading.results.partial:
         yield Words(reading.results.partial, "banner")
     status = status_of(reading.manifest)
+    if missed := not_reached(reading):
+        yield Words(missed, "warning")
     yield Words(size_of(reading), "note")
     yield Words(_KINDS[status.kind], "caution" if status.kind == "exploratory" else "label")
     if status.why:
@@ -172,7 +173,8 @@ def _comparisons(reading: Reading) -> Iterator[Block]:
 
 def _endings(reading: Reading) -> Iterator[Block]:
     """Table of outcomes if some runs went wrong; else a line, unless the answer has one."""
-    endings, view = reading.endings, reading.view
+    endings = reading.endings
+    view = reading.view
     if endings is None or view is None:
         return
     if endings.is_right.all():
@@ -204,8 +206,7 @@ def _found(reading: Reading) -> Iterator[Block]:
         yield from numbers
     if reading.robustness is not None:
         yield Heading("Under other models of the persons")
-        for sentence in sentences(reading.robustness):
-            yield Words(sentence)
+        yield from map(Words, repeated(reading.robustness))
 
 
 def _what_varied(reading: Reading) -> Iterator[Block]:
@@ -221,7 +222,11 @@ def _what_varied(reading: Reading) -> Iterator[Block]:
         names = [f"{factor_name(f.name)} ({len(f.levels)})" for f in factors]
         names += [with_unit(name) for name in ranges]
         levels = Words(f"{capital(_how(design, len(factors)))}: {'; '.join(lines)}.")
-        changes = tuple(f"{level}: {text}" for level, text in _treatments(reading.study))
+        changes = tuple(
+            f"{level_name(factor, level)}: {setting(changes) or 'nothing'}"
+            for factor, named in reading.study.get("treatments", {}).items()
+            for level, changes in named.items()
+        )
         yield Heading("What was varied")
         yield Folded(
             f"Levels of {listing(names)}", (levels, Items(changes)) if changes else (levels,)
@@ -258,10 +263,7 @@ def _figures(reading: Reading, drawn: Sequence[Drawn]) -> Iterator[Block]:
     yield Words(part)
     if reads:
         yield Folded("How to read the figures", (Words(" ".join(reads)),))
-    shown = leading(drawn, MOST_FIGURES - 1)
-    yield from map(FigureBlock, shown)
-    if rest := [figure for figure in drawn if figure not in shown]:
-        yield Folded(f"{len(rest)} more figures", tuple(map(FigureBlock, rest)))
+    yield from map(FigureBlock, drawn)
 
 
 def _tables(reading: Reading) -> Iterator[Block]:
@@ -280,7 +282,8 @@ def _tables(reading: Reading) -> Iterator[Block]:
         yield Folded(title, (Printed(table),))
     if tuned := tuned_table(reading.manifest):
         yield Heading("Tuning")
-        whose, what = " and ".join(tuned.heads[: tuned.labels]), tuned.heads[tuned.labels]
+        whose = " and ".join(tuned.heads[: tuned.labels])
+        what = tuned.heads[tuned.labels]
         yield Words(
             f"Each {whose} has a {what} that suits it best, so for each the same number of values "
             "was tried. Both tuned and untuned configurations are above."
@@ -297,7 +300,8 @@ def _needed(reading: Reading) -> Iterator[Block]:
 def _method(reading: Reading) -> Iterator[Block]:
     yield Heading("Method")
     yield Folded("How it was run and analysed", (Items(tuple(remarks(reading))),))
-    scenarios, study = reading.scenarios, reading.study
+    scenarios = reading.scenarios
+    study = reading.study
     of_model = reading.page.conditions if reading.view else conditions
     if stated := of_model(scenarios, keys_of(study), _changed(study)):
         rows = [[name, *values] for name, values in stated]
@@ -312,7 +316,7 @@ def _words(blocks: Sequence[Block]) -> Iterator[Block]:
     """Glossary of the terms used in the report."""
     if terms := terms_in(texts_of(blocks)):
         yield Heading(WORDS)
-        entries = tuple((term.key, term.name, f"{term.means}.") for term in terms)
+        entries = tuple((term.name, f"{term.means}.") for term in terms)
         yield Folded(f"What {len(terms)} words in this report mean", (Terms(entries),))
 
 
@@ -337,19 +341,12 @@ def _changed(study: Mapping[str, Any]) -> list[str]:
     return list(dict.fromkeys(key for part in parts for key in part.get("changes") or {}))
 
 
-def _treatments(study: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Named levels and the settings they change."""
-    return [
-        (level_name(factor, level), setting(changes) or "nothing")
-        for factor, named in study.get("treatments", {}).items()
-        for level, changes in named.items()
-    ]
+PAGE = "report.html"
+PAPER = "report.pdf"
+FIGURES = "figures"
 
 
-PAGE, PAPER, FIGURES = "report.html", "report.pdf", "figures"
-
-
-def write_report(folder: Path, pdf: bool = False, *, figures: Sequence[ReportFigure] = ()) -> Path:
+def write_report(folder: Path, pdf: bool = False) -> Path:
     """Make `report.html` and `figures/` from what lies in a results folder.
 
     For an unfinished study, the page shows the results so far.
@@ -358,17 +355,15 @@ def write_report(folder: Path, pdf: bool = False, *, figures: Sequence[ReportFig
         folder: Results folder.
         pdf: Print `report.pdf` too. One that is there already is printed again in any case, so
             that it never says something else than the page.
-        figures: Those of users, of `load_figures`; they come last.
 
     Raises:
-        ConfigError: the folder holds no results; or a figure of a user cannot be drawn, and the
-            report, which is there, is without it.
+        ConfigError: the folder holds no results.
         DvaSimError: the disk is full or refuses to be written, or the page is there and no browser
             prints it.
     """
     reading = Reading(load_so_far(folder))
-    drawn, problems = draw_all(reading, figures)
-    blocks = [*(Words(f"{capital(p)}.", "warning") for p in problems), *blocks_of(reading, drawn)]
+    drawn = draw_all(reading)
+    blocks = blocks_of(reading, drawn)
     question = str(reading.study.get("question", "A study without a question"))
     page = folder / PAGE
     try:
@@ -382,8 +377,6 @@ def write_report(folder: Path, pdf: bool = False, *, figures: Sequence[ReportFig
             f"the report cannot be written in {folder}: {error.strerror}; "
             f"fix that, then run 'dva-sim report {folder}'"
         ) from None
-    if problems:
-        raise ConfigError(f"{'; '.join(problems)}; {page} was made without them")
     return page
 
 
@@ -406,11 +399,10 @@ def _write_figures(folder: Path, drawn: Sequence[Drawn]) -> None:
 def _page(question: str, blocks: Sequence[Block]) -> str:
     """Fill the template."""
     sections = [block.text for block in blocks if isinstance(block, Heading) and block.level == 2]
-    marker = Marker(terms_in(texts_of(blocks)))
-    return _template(marker).render(question=question, blocks=blocks, sections=sections)
+    return _template().render(question=question, blocks=blocks, sections=sections)
 
 
-def _template(marker: Marker) -> jinja2.Template:
+def _template() -> jinja2.Template:
     import jinja2
 
     environment = jinja2.Environment(
@@ -422,24 +414,11 @@ def _template(marker: Marker) -> jinja2.Template:
     )
     environment.filters |= {
         "data_uri": _data_uri,
-        "explained": lambda text: _explained(text, marker),
         "kind": lambda block: type(block).__name__,
         "key": _key,
     }
     environment.filters["sentences"] = first_and_rest
     return environment.get_template("report.html.j2")
-
-
-def _explained(text: str, marker: Marker) -> Markup:
-    """With a link from each word that is said for the first time to what it means."""
-    from markupsafe import Markup
-
-    link = Markup('<dfn><a href="#{}" title="{}">{}</a></dfn>')
-    pieces = [
-        link.format(term.key, f"{term.means}.", piece) if term else Markup.escape(piece)
-        for piece, term in marker.split(text)
-    ]
-    return Markup("").join(pieces)
 
 
 def _key(text: str) -> str:

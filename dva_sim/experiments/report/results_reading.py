@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -13,7 +13,6 @@ from dva_sim import statistics
 from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.choice_map import ChoiceMap, choice_map
 from dva_sim.experiments.analysis.competing_risks import Endings, horizon_of, with_endings
-from dva_sim.experiments.analysis.kept_episodes import KeptEpisode, Tables, typical_and_worst
 from dva_sim.experiments.analysis.robustness import RepeatedAnswer, robustness_of
 from dva_sim.experiments.analysis.run_grid import (
     Floats,
@@ -29,12 +28,17 @@ from dva_sim.experiments.analysis.study_view import (
     with_rows,
 )
 from dva_sim.experiments.analysis.support import support_of_part
-from dva_sim.experiments.report.event_outcomes import EventOutcomes, outcomes_of
-from dva_sim.experiments.report.model_page import ModelPage
-from dva_sim.experiments.report.model_pages import page_of
-from dva_sim.experiments.report.people_page import PeoplePage, people_drove
+from dva_sim.experiments.report.model_page import (
+    MiddlewarePage,
+    ModelPage,
+    PeoplePage,
+    TransportPage,
+    people_drove,
+)
+from dva_sim.experiments.report.outcome_table import EventOutcomes, outcomes_of
+from dva_sim.experiments.report.shift_page import ShiftPage
 from dva_sim.experiments.results.results import Results
-from dva_sim.experiments.study.parts import POINT, REPEATS
+from dva_sim.experiments.study.parts import REPEATS
 from dva_sim.simulation.labels import take_up
 
 _FEWEST_PAIRS = 4  # of which a correlation says anything
@@ -49,7 +53,8 @@ class ResultsReading:
 
     def __init__(self, results: Results) -> None:
         self.results = results
-        self.manifest, self.study = results.manifest, results.study
+        self.manifest = results.manifest
+        self.study = results.study
         take_up(self.manifest.get("columns") or {})
         self._tables: dict[str, Table] = {}
 
@@ -184,17 +189,6 @@ class ResultsReading:
         return points_of(self.study, self.runs)
 
     @cached_property
-    def episodes(self) -> tuple[KeptEpisode, KeptEpisode] | None:
-        """A typical run and the worst, of those that were kept."""
-        if self.view is None:
-            return None
-        names = [n for n in self.study.get("factors", {}) if n != POINT and n in self.runs]
-        columns = [*names, *self.points]
-        tables = Tables(self.runs, self.table("tracks"), columns, self.table("events"))
-        part = self.view.part.name
-        return typical_and_worst(self.results.folder, part, self.view.measure, tables)
-
-    @cached_property
     def last_sides(self) -> list[Floats] | None:
         """Both sides of the contrast at the last stop, `(persons, trials)` each."""
         view = self.view
@@ -219,3 +213,16 @@ class ResultsReading:
         """Trials per person in a part; 0 if unknown."""
         own = (self.study.get("parts", {}).get(part) or {}).get("replications")
         return int(own or self.study.get("replications") or 0)
+
+
+PAGES: dict[str, type[ModelPage]] = {
+    "timed": ShiftPage,
+    "transports": TransportPage,
+    "middleware": MiddlewarePage,
+}
+
+
+def page_of(scenarios: Iterable[Mapping[str, Any]]) -> type[ModelPage]:
+    """The page of a study: that of the first of its models that has one of its own."""
+    models = (str(scenario.get("model")) for scenario in scenarios)
+    return next((PAGES[model] for model in models if model in PAGES), ModelPage)

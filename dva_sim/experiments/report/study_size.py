@@ -1,11 +1,16 @@
-"""The size of a study as it was run, and whether that is its usual size."""
+"""The size of a study as it was run, and the persons needed to settle what stayed open."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from dva_sim.experiments.analysis.sample_size import MOST_PERSONS, POWERS, Count, SizePlan
+from dva_sim.experiments.report.cell_table import CellTable
+from dva_sim.experiments.report.prose import note, sentence
 from dva_sim.experiments.study.parts import POINT
+from dva_sim.kernel.units import unit_of
 from dva_sim.simulation.labels import factor_name
 
 if TYPE_CHECKING:
@@ -13,9 +18,48 @@ if TYPE_CHECKING:
 
 
 def size_of(reading: Reading) -> str:
-    """`A smaller version of X: 4 persons × 2 trials, 440 runs ... The whole study has ...`."""
+    """`A smaller version of X: 4 persons × 2 trials, 440 runs ... Its usual size: ...`."""
+    study = reading.study
     usual = reading.manifest.get("usual") or {}
-    return f"{_version(reading, usual)}{_as_run(reading)}.{_whole(reading, usual)}"
+    return sentence(
+        "size",
+        usual=usual,
+        weight=_weight(study) / _weight(usual) if usual else 0.0,
+        by_people=reading.by_people,
+        here=_people(reading.persons, study.get("replications"), reading.cluster),
+        runs=f"{runs_of(reading):,}",
+        cells=f"{cells:,}" if (cells := len(reading.manifest.get("cells", []))) else "",
+        seed=study.get("seed"),
+        usually=_usually(reading, usual) if usual else [],
+    )
+
+
+def not_reached(reading: Reading) -> str:
+    """Say what half-width a stopping rule asked for and the study did not reach; else empty."""
+    stop = reading.study.get("stop")
+    stopped = reading.manifest.get("stopped") or {}
+    if not stop or stopped.get("why") not in ("limit", "budget"):
+        return ""
+    reached = stopped.get("half_width")  # older results do not say how far a study had come
+    if reached is not None and reached <= stop["half_width"]:
+        return ""
+    return sentence(
+        "not_reached",
+        half_width=stop["half_width"],
+        unit=unit_of(_measure_of(reading.study, stop)),
+        persons=reading.persons,
+        cluster=reading.cluster,
+        why=stopped["why"],
+        reached=reached,
+    )
+
+
+def _measure_of(study: Mapping[str, Any], stop: Mapping[str, Any]) -> str:
+    """Column that a stopping rule looks at."""
+    if stop.get("measure"):
+        return str(stop["measure"])
+    contrasts = {**study.get("comparisons", {}), "answer": study.get("answer")}
+    return str((contrasts.get(stop["comparison"]) or {}).get("measure", ""))
 
 
 def runs_of(reading: Reading) -> int:
@@ -24,30 +68,11 @@ def runs_of(reading: Reading) -> int:
     return sum(reading.results.table(name).rows for name in tables)
 
 
-def _as_run(reading: Reading) -> str:
-    study, cells = reading.study, len(reading.manifest.get("cells", []))
-    if reading.by_people:
-        return f"1 run in real time, in which people drove, seed {study.get('seed')}"
-    persons = _people(reading.persons, study.get("replications"), reading.cluster)
-    configurations = f" in {cells:,} configurations" if cells else ""
-    return f"{persons}, {runs_of(reading):,} runs{configurations}, seed {study.get('seed')}"
-
-
 def _people(persons: int, trials: int | None, cluster: str) -> str:
     counted = f"{persons} {cluster}{'' if persons == 1 else 's'}"
     if cluster != "person":
         return counted
     return f"{counted} × {trials} trial{'' if trials == 1 else 's'}"
-
-
-def _version(reading: Reading, usual: Mapping[str, Any]) -> str:
-    """Name of the study, and whether this is a smaller or larger version of it."""
-    if not usual:
-        return ""
-    name, weight = usual["name"], _weight(reading.study) / _weight(usual)
-    if weight == 1:
-        return f"Study {name}: "
-    return f"A {'smaller' if weight < 1 else 'larger'} version of {name}: "
 
 
 def _weight(size: Mapping[str, Any]) -> float:
@@ -58,19 +83,59 @@ def _weight(size: Mapping[str, Any]) -> float:
     return count
 
 
-def _whole(reading: Reading, usual: Mapping[str, Any]) -> str:
+def _usually(reading: Reading, usual: Mapping[str, Any]) -> list[str]:
     """Settings of the study's own file that this run changed."""
-    if not usual or _weight(reading.study) == _weight(usual):
-        return ""
-    persons = _people(usual["persons"], usual["replications"], reading.cluster)
-    return f" Its usual size: {', '.join([persons, *_levels(reading.study, usual)])}."
-
-
-def _levels(study: Mapping[str, Any], usual: Mapping[str, Any]) -> list[str]:
-    """Factors with more or fewer levels than in the study's file."""
-    here = study.get("factors") or {}
-    return [
+    here = reading.study.get("factors") or {}
+    levels = [
         f"{len(levels)} levels of {factor_name(name)} (here {len(here.get(name, ()))})"
         for name, levels in (usual.get("factors") or {}).items()
         if name != POINT and len(levels) != len(here.get(name, ()))
     ]
+    return [_people(usual["persons"], usual["replications"], reading.cluster), *levels]
+
+
+def plan_table(found: Sequence[SizePlan], cluster: str) -> CellTable:
+    """A line for each plan."""
+    heads = ["to show", "if the true difference is"]
+    heads += [f"{cluster}s for {100 * p:.0f} % power" for p in POWERS]
+    rows = [
+        [f"{p.name}: {p.what}", p.assumed, *(map(_count_text, p.counts) if p.counts else _NEVER)]
+        for p in found
+    ]
+    return CellTable("", heads, len(heads), rows, note=_assumes(found, cluster))
+
+
+def plan_lines(found: Sequence[SizePlan], cluster: str) -> list[str]:
+    """A line for each plan, and what they assume."""
+    lines = [
+        f"To show {p.name} ({p.what}), if the true difference is {p.assumed}: {_line(p, cluster)}."
+        for p in found
+    ]
+    return [*lines, _assumes(found, cluster)] if found else []
+
+
+_NEVER = ["no number: it is not true then"] * len(POWERS)
+
+
+def _line(plan: SizePlan, cluster: str) -> str:
+    if not plan.counts:
+        return "no number of them, for it is not true then"
+    needed = [
+        f"{_count_text(count)} {cluster}s for {100 * wanted:.0f} % power"
+        for count, wanted in zip(plan.counts, POWERS, strict=True)
+    ]
+    return ", ".join(needed)
+
+
+def _count_text(count: Count) -> str:
+    return f"{_persons(count.persons)} ({_persons(count.low)} to {_persons(count.high)})"
+
+
+def _persons(count: float) -> str:
+    return f"{count:.0f}" if math.isfinite(count) else f"more than {MOST_PERSONS:,}"
+
+
+def _assumes(found: Sequence[SizePlan], cluster: str) -> str:
+    counts = sorted({plan.known_from for plan in found})
+    known = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+    return note("sample_size", cluster=cluster, known=known)

@@ -5,37 +5,48 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dva_sim import statistics
-from dva_sim.experiments.analysis.answer import Answer
+from dva_sim.experiments.analysis.answer import Answer, Finding, OtherRuns
+from dva_sim.experiments.analysis.conditions import get
 from dva_sim.experiments.analysis.hypothesis_tests import Judgement, Tested, judged
+from dva_sim.experiments.analysis.robustness import RepeatedAnswer
 from dva_sim.experiments.analysis.run_grid import (
+    Floats,
     RunGrid,
     Table,
     as_floats,
+    person_means,
 )
 from dva_sim.experiments.analysis.sample_size import SizePlan, plans
 from dva_sim.experiments.analysis.study_view import (
     StudyView,
     covariates_of,
+    keys_of,
     layout_of,
     possible_values,
 )
 from dva_sim.experiments.analysis.support import support_of_part
 from dva_sim.experiments.report.answer_conditions import depends
-from dva_sim.experiments.report.answer_context import in_context, only_model
+from dva_sim.experiments.report.answer_sentences import telling_stop
 from dva_sim.experiments.report.cell_table import CellTable, cell_table
 from dva_sim.experiments.report.choice_table import lead_of
-from dva_sim.experiments.report.heavy_runs import few_that_weigh
 from dva_sim.experiments.report.hypothesis_tables import verdict_lead
+from dva_sim.experiments.report.prose import sentence
 from dva_sim.experiments.report.results_reading import ResultsReading
 from dva_sim.experiments.report.tuning_table import tuning_warning
 from dva_sim.experiments.results.manifest import status_of
-from dva_sim.kernel.wording import listing
+from dva_sim.experiments.study.parts import STRATEGY, Level
+from dva_sim.kernel.wording import listing, quantity
+from dva_sim.simulation.labels import factor_name, level_name, measure_called
+from dva_sim.statistics import band, quantile_interval
 
 _MOST_ERRORS = 3
+ROBOT_SHARE = "robot_share"
 
 
 class Reading(ResultsReading):
@@ -56,8 +67,19 @@ class Reading(ResultsReading):
         if self.map is not None:
             found = replace(found, lead=lead_of(self.map), notes=[found.lead, *found.notes])
         weighed = [few_that_weigh(self.finding, self.view)] if self.finding is not None else []
-        notes = [*found.notes, *self._undeclared, *filter(None, weighed)]
+        notes = [*self._why_nothing, *found.notes, *self._undeclared, *filter(None, weighed)]
         return replace(found, depends=found.depends | depends(self), notes=notes)
+
+    @property
+    def _why_nothing(self) -> Sequence[str]:
+        """A note on a contrast of which every pair of runs gives the same value."""
+        finding = self.finding
+        view = self.view
+        if finding is None or view is None or np.nanmax(finding.bounds, initial=-1.0) != 0.0:
+            return []
+        has_robots = view.part.has(ROBOT_SHARE)
+        share = float(np.nanmean(view.part.grid(ROBOT_SHARE))) if has_robots else None
+        return [sentence("same_everywhere", factor=factor_name(finding.factor), share=share)]
 
     @property
     def _undeclared(self) -> Sequence[str]:
@@ -66,14 +88,15 @@ class Reading(ResultsReading):
         return ["No answer was declared for these levels: this is their only contrast."] * is_taken
 
     def _verdicts(self, tested: Sequence[Tested]) -> str:
-        """The registered hypotheses in at most two sentences, and what they depend on."""
+        """The registered hypotheses and what they depend on."""
         beyond = any(self._is_extrapolated(claim) for claim in tested)
         model = only_model(self, tested[0].contrast.part)
         return verdict_lead(tested, self.cluster, is_extrapolated=beyond, only_model=model)
 
     def _is_extrapolated(self, claim: Tested) -> bool:
         """True if a side of a hypothesis lies beyond the delays people were watched at."""
-        name, factor = claim.contrast.part, claim.contrast.factor
+        name = claim.contrast.part
+        factor = claim.contrast.factor
         table, factors = layout_of(self.study, self.runs)
         part = RunGrid(table, name, factors)
         support = support_of_part(part, self.scenario_of(name)) if self.page.has_support else None
@@ -110,7 +133,8 @@ class Reading(ResultsReading):
     @property
     def _decided(self) -> set[str]:
         """Hypotheses and comparisons that need no more persons."""
-        tested, shown = self.judgement.tested, 1 - statistics.LEVEL
+        tested = self.judgement.tested
+        shown = 1 - statistics.LEVEL
         at_last = {c.name: c.adjusted <= shown for c in self.judgement.compared}  # as planned
         decided = {name for name, is_shown in at_last.items() if is_shown}
         return decided | {claim.name for claim in tested if claim.verdict != "open"}
@@ -126,7 +150,8 @@ class Reading(ResultsReading):
         return [self._cells_of(part, self.view) for part in parts if len(part)]
 
     def _cells_of(self, part: RunGrid, view: StudyView) -> CellTable:
-        page, scenario = self.page, self.scenario_of(part.name)
+        page = self.page
+        scenario = self.scenario_of(part.name)
         return page.cells(part) or cell_table(
             part,
             view.measure,
@@ -181,3 +206,108 @@ def _broken(runs: Table) -> str:
     parts = np.asarray(runs["part"])[as_floats(runs["violations"]) > 0].tolist()
     counts = {part: parts.count(part) for part in dict.fromkeys(parts)}
     return listing([f"{n} run{'s' * (n > 1)} of part {part}" for part, n in counts.items()])
+
+
+def few_that_weigh(finding: Finding, view: StudyView) -> str:
+    """Warn where runs that count with the whole horizon dominate the mean; give the median."""
+    if finding.horizon is None or not view.part.has("confirmed"):
+        return ""
+    grid = view.part.grid("confirmed")
+    stops = []
+    for stop in range(len(view.stops)):
+        sides = [
+            view.curve(grid, view.panels[0], side)[stop] for side in (finding.first, finding.second)
+        ]
+        runs = sum(int(np.isfinite(side).sum()) for side in sides)
+        missed = sum(int((side < 1).sum()) for side in sides)
+        if 0 < missed < runs / 4:
+            place = level_name(finding.over, view.stops[stop]) if view.over else ""
+            median = quantile_interval(*_differences(finding, view, stop))
+            stops.append((place, missed, runs, median))
+    horizon = quantity(finding.horizon, "s")
+    return sentence("weighed", horizon=horizon, stops=stops, unit=finding.unit) if stops else ""
+
+
+def _differences(finding: Finding, view: StudyView, stop: int) -> tuple[Floats, NDArray[Any]]:
+    """First minus second, run by run, and whose they are."""
+    values = view.values
+    panel = view.panels[0]
+    first, second = (
+        view.curve(values, panel, side)[stop] for side in (finding.first, finding.second)
+    )
+    person = np.repeat(view.part.persons, len(view.part.trials))
+    return (first - second).ravel(), person
+
+
+def in_context(reading: ResultsReading) -> Finding | None:
+    """The finding with the range over other settings and over models of the persons."""
+    view = reading.view
+    finding = reading.finding
+    if view is None or finding is None or (stop := telling_stop(finding)) is None:
+        return finding
+    return replace(
+        finding,
+        models=_models(reading.robustness, finding, stop),
+        elsewhere=_elsewhere(view, finding, stop),
+        only_model=only_model(reading, finding.part),
+        useful=useful_counts(view),
+    )
+
+
+def only_model(reading: ResultsReading, part: str) -> str:
+    """`strategy adaptive`, if the persons of a part steer by one strategy and no other was run."""
+    strategy = get(reading.scenario_of(part), STRATEGY)
+    if not strategy or reading.cluster != "person" or reading.robustness is not None:
+        return ""
+    if STRATEGY in {key.name for key in keys_of(reading.study)}:
+        return ""
+    return f"strategy {level_name(STRATEGY, strategy)}"
+
+
+def _models(found: RepeatedAnswer | None, finding: Finding, at: int) -> OtherRuns | None:
+    """The difference under other models of the persons, if it was repeated at this stop."""
+    stops = found.stops if found is not None else ()
+    others = [r for s in stops if s.level == finding.levels[at] for r in s.others]
+    return _together(finding.mean[at], [(r.mean, r.low, r.high) for r in others])
+
+
+def _elsewhere(view: StudyView, finding: Finding, at: int) -> OtherRuns | None:
+    """The difference in the other settings that were run."""
+    bands = [view.band_of(p, finding.first, finding.second) for p in view.panels[1:]]
+    found = [(float(b.mean[at]), float(b.low[at]), float(b.high[at])) for b in bands]
+    return _together(finding.mean[at], [each for each in found if np.isfinite(each[0])])
+
+
+def _together(own: float, found: list[tuple[float, float, float]]) -> OtherRuns | None:
+    """The outer limits of intervals, and the range of their means; None without any."""
+    if not found:
+        return None
+    means, lows, highs = zip(*found, strict=True)
+    return OtherRuns(
+        low=min(lows),
+        high=max(highs),
+        means=(min(means), max(means)),
+        count=len(found),
+        turns=any(high < 0 if own > 0 else low > 0 for _, low, high in found),
+    )
+
+
+def useful_counts(view: StudyView) -> tuple[tuple[Level, Level], ...]:
+    """Each side of the contrast with the last count that is shown to help more than the one before.
+
+    The band covers all steps of both sides at once. Where no step helps, the count is the first.
+
+    Returns:
+        Pairs of side and count; nothing where the answer does not run over a count.
+    """
+    over = view.over
+    better = measure_called(view.measure).better
+    if over is None or view.contrast is None or not over.name.endswith(".count") or not better:
+        return ()
+    sign = 1.0 if better == "large" else -1.0
+    grid = view.part.grid(view.measure)
+    curves = [view.curve(grid, view.panels[0], side) for side in view.contrast]
+    steps = np.concatenate([sign * np.diff(curve, axis=0) for curve in curves])
+    helps = (band(person_means(steps)).low > 0).reshape(len(curves), -1)
+    last = [int(np.flatnonzero([True, *row])[-1]) for row in helps]
+    return tuple(zip(view.contrast, (over.levels[stop] for stop in last), strict=True))

@@ -13,8 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from dva_sim.experiments.report.size_plan_table import plan_lines
-from dva_sim.experiments.report.study_size import runs_of
+from dva_sim.experiments.report.study_size import not_reached, plan_lines, runs_of
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.results.results import Results, plain
@@ -23,7 +22,7 @@ _GAP = 2  # between columns
 _ENDS = {
     "enough": "its interval is narrow enough",
     "budget": "its time is spent",
-    "limit": "no more were allowed, and its interval is wider than was asked",
+    "limit": "no more were allowed",
 }
 
 
@@ -50,6 +49,8 @@ def show_results(results: Results, console: Console) -> None:
     console.print(f"[bold]{escape(results.question)}[/bold]", soft_wrap=True)
     if results.partial:
         console.print(f"[bold yellow]{escape(results.partial)}[/]", soft_wrap=True)
+    if missed := not_reached(reading):
+        console.print(f"[bold yellow]{escape(missed)}[/]", soft_wrap=True)
     for line in _facts(reading):
         console.print(escape(line), soft_wrap=True)
     console.print()
@@ -154,7 +155,9 @@ def _is_number(text: str) -> bool:
 
 def _facts(reading: Reading) -> Iterator[str]:
     """Status, size, program and machine, each in a line."""
-    results, manifest, study = reading.results, reading.manifest, reading.study
+    results = reading.results
+    manifest = reading.manifest
+    study = reading.study
     yield _status(manifest)
     cells = len(manifest.get("cells", []))
     size = f"{runs_of(reading)} runs in {cells} configurations"

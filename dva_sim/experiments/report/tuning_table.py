@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from dva_sim.experiments.report.cell_table import CellTable
-from dva_sim.experiments.report.prose import note
+from dva_sim.experiments.report.prose import note, sentence
 from dva_sim.experiments.study.tuning import TunedValues, TuningBasis
 from dva_sim.kernel.config import validate
-from dva_sim.kernel.wording import listing, number
+from dva_sim.kernel.wording import number
 from dva_sim.simulation.labels import factor_name, level_name, measure_name, setting
 
 
@@ -18,7 +18,8 @@ def tuned_table(manifest: Mapping[str, Any]) -> CellTable | None:
     if not manifest.get("tuned"):
         return None
     tuned = validate(TunedValues, manifest["tuned"])
-    rule, chosen = tuned.tuning, {(str(c.when), c.value) for c in tuned.chosen}
+    rule = tuned.tuning
+    chosen = {(str(c.when), c.value) for c in tuned.chosen}
     rows = [
         [
             *(level_name(name, level) for name, level in seen.when.items()),
@@ -40,10 +41,8 @@ def tuning_warning(manifest: Mapping[str, Any]) -> str:
     if not manifest.get("tuned"):
         return ""
     tuned = validate(TunedValues, manifest["tuned"])
-    others = listing(tuned.basis.unlike(validate(TuningBasis, manifest["basis"])))
+    others = tuned.basis.unlike(validate(TuningBasis, manifest["basis"]))
     if not others:
         return ""
-    return (
-        f"The {factor_name(tuned.tuning.key)} was tuned with other {others} than the study was run "
-        f"with: 'dva-sim tune {tuned.study}' chooses again."
-    )
+    factor = factor_name(tuned.tuning.key)
+    return sentence("tuned_otherwise", factor=factor, others=others, study=tuned.study)

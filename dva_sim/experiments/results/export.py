@@ -75,7 +75,8 @@ def _files(
         raise ConfigError(
             f"{out} is a file; give a folder, or a name that ends in .csv or .parquet"
         )
-    names, ending = tables or results.tables, form or "csv"
+    names = tables or results.tables
+    ending = form or "csv"
     files = {out / f"{name}.{ending}": _writer(results, name, ending) for name in names}
     return files | {out / DICTIONARY: partial(_write_dictionary, results, names)}
 

@@ -72,7 +72,8 @@ class FolderLock:
     def close(self) -> None:
         """Let others write into the folder."""
         if self._file is not None:
-            file, self._file = self._file, None
+            file = self._file
+            self._file = None
             with suppress(OSError):
                 self._path.unlink()
             os.close(file)

@@ -37,7 +37,8 @@ def manifest_of(plan: StudyPlan) -> dict[str, Any]:
 
     Its `hash` is the identity of the results: a folder holds one study, of one program.
     """
-    study, cells = plan.study, plan.cells
+    study = plan.study
+    cells = plan.cells
     content: dict[str, Any] = {
         "question": study.question,
         "study": study.asked(),
@@ -64,7 +65,7 @@ def manifest_of(plan: StudyPlan) -> dict[str, Any]:
         },
         "versions": _simulating(),
     }
-    if columns := own_columns(plan.measures.values(), (cell.scenario for cell in cells)):
+    if columns := own_columns(plan.measures.values()):
         content["columns"] = columns
     identity = stable_hash(content)
     content["versions"] = versions()

@@ -437,7 +437,8 @@ class Results:
 
     def __repr__(self) -> str:
         """Summary of contents and queries, without reading a table."""
-        runs, cells = self.manifest.get("runs", 0), len(self.manifest.get("cells", ()))
+        runs = self.manifest.get("runs", 0)
+        cells = len(self.manifest.get("cells", ()))
         failed = f", {len(self.failures)} failed" if self.failures else ""
         return "\n".join(
             (
@@ -487,7 +488,8 @@ def _failures_in(runs: Mapping[str, Any], here: NDArray[np.bool_]) -> str:
     """Say how often user classes failed in some runs; empty if never."""
     columns = [np.asarray(runs[name], dtype=np.float64)[here] for name in _FAILED if name in runs]
     counts = np.nan_to_num(columns).sum(axis=0) if columns else np.zeros(0)
-    times, failed = int(counts.sum()), int(np.count_nonzero(counts))
+    times = int(counts.sum())
+    failed = int(np.count_nonzero(counts))
     if not times:
         return ""
     return f"a class of yours failed {times} times, in {failed} of {here.sum()} runs"

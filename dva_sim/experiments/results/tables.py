@@ -126,7 +126,8 @@ class _Table:
     """
 
     def __init__(self, folder: Path, name: str, seen: Columns) -> None:
-        self._folder, self._name = folder, name
+        self._folder = folder
+        self._name = name
         self._seen = {column: set(types) for column, types in seen.items()}
         self._waiting: list[Row] = []
         self._kinds: dict[str, str] = {}  # of the table in the database, once it is made
@@ -171,7 +172,8 @@ class _Table:
 
     def _pass_on(self) -> None:
         """A batch of what waits goes to the database, as long as the table there fits."""
-        batch, self._waiting = self._waiting[:_BATCH_ROWS], self._waiting[_BATCH_ROWS:]
+        batch = self._waiting[:_BATCH_ROWS]
+        self._waiting = self._waiting[_BATCH_ROWS:]
         columns = dict.fromkeys(chain(self._seen, *batch))
         values = {column: [row.get(column) for row in batch] for column in columns}
         for column, found in values.items():

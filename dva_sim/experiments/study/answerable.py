@@ -44,7 +44,8 @@ def compared_factors(study: Study) -> dict[str, Sequence[Level]]:
     kept: dict[str, Sequence[Level]] = {
         name: levels for name, levels in study.factors.items() if name not in aside
     }
-    rows, grid = len(study.listed_rows), math.prod(map(len, kept.values()))
+    rows = len(study.listed_rows)
+    grid = math.prod(map(len, kept.values()))
     return {"row": range(rows)} if 2 * rows < grid and rows else kept
 
 

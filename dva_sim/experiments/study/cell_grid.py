@@ -10,13 +10,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from dva_sim.experiments.study.change_places import located
 from dva_sim.experiments.study.factor_levels import (
     PARAMETERS,
     TRAITS,
     factors_of_repeats,
     levels_at_ends,
     levels_of_cells,
+    path_in_design,
     settings_of_repeats,
 )
 from dva_sim.experiments.study.hashing import stable_hash
@@ -32,6 +32,48 @@ from dva_sim.kernel.yaml_files import KeyPath
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.models import AnyScenario, model_for, model_of
 from dva_sim.simulation.run_measures import COVARIATES
+
+
+def located(study: Study, part: str, error: ConfigError, changes: Mapping[str, Any]) -> ConfigError:
+    """The mistake at what makes it; as it is if a file has been named.
+
+    Args:
+        study: Study that runs the scenario.
+        error: Error with the keys at fault, if changes of the scenario caused it.
+        changes: All changes of the scenario.
+    """
+    if error.file is not None:
+        return error
+    problem = error.problem
+    named = [
+        k for k, v in changes.items() if k in problem or (isinstance(v, str) and repr(v) in problem)
+    ]
+    keys = error.keys if len(error.keys) == 1 else (named or list(error.keys))
+    for key in keys:
+        if pair := study.setting_of(tuple(key.split("."))):
+            return ConfigError(f"--set {pair}: {error.problem.removeprefix(f'{key}: ')}")
+    for key in keys:
+        for path in _places(study, part, key, changes[key]):
+            if study.is_from_file(path):
+                return study.error(error.problem, path)
+    # What the study's file does not say is in the settings, if there are any.
+    pairs = ", ".join(f"--set {pair}" for pair in study.settings)
+    return ConfigError(f"{pairs}: {error.problem}") if keys and pairs else error
+
+
+def _places(study: Study, part: str, key: str, value: Any) -> Iterator[KeyPath]:
+    """Places where the study may give a scenario key that value."""
+    yield "factors", key
+    yield "parts", part, "reference", key
+    yield "parts", part, "changes", key
+    for factor, levels in study.treatments.items():
+        for level in levels:
+            yield "treatments", factor, level, key
+    if study.version is not None:
+        yield study.version, key
+    if (in_design := path_in_design(study, key, value)) is not None:
+        yield in_design
+
 
 REFERENCE = -1
 _IN_FILES = {"dispatch.policy", "events", "events.table"}
@@ -212,7 +254,8 @@ def runs_in(manifest: Mapping[str, Any]) -> list[StudyRun]:
     Args:
         manifest: Manifest of a study that may be running; only its study and cells are read.
     """
-    study, rows = Study.model_validate(manifest["study"]), manifest["cells"]
+    study = Study.model_validate(manifest["study"])
+    rows = manifest["cells"]
     return [
         StudyRun(part, tuple(row["levels"].items()), row["cell"], *draw, row["config"])
         for part in dict.fromkeys(row["part"] for row in rows)
@@ -301,7 +344,8 @@ def _cell(
 
 def _every_change(inputs: StudyInputs, part: str, changes: Mapping[str, Any]) -> dict[str, Any]:
     """All changes to a scenario's file: by the part, by `--set` and by the cell."""
-    study, part = inputs.study, _source_of(inputs.study, part)
+    study = inputs.study
+    part = _source_of(inputs.study, part)
     fixed = {**study.parts[part].changes, **study.changes}
     of_study = model_of(inputs.scenarios[part]).set_by_study(study.seed)
     return _located({**fixed, **of_study, **changes}, study.folder)

@@ -94,7 +94,7 @@ Dyadic = Annotated[
 Rows = Annotated[tuple[Annotated[Row, SPARES_THE_DESIGN], ...], Field(min_length=1)]
 
 LISTED = ("zip", "rows", "csv")
-SAMPLED = ("latin_hypercube", "sobol", "saltelli")
+SAMPLED = ("latin_hypercube", "sobol")
 KINDS = (*LISTED, *SAMPLED)
 
 _ONE_KIND: list[Any] = [
@@ -104,7 +104,7 @@ _ONE_KIND: list[Any] = [
 
 
 class Design(Config):
-    """Experimental design: which levels are combined. One of the first six keys chooses how.
+    """Experimental design: which levels are combined. One of the first five keys chooses how.
 
     Attributes:
         zip: Factors whose levels are taken together: the first of each, the second of each, ...
@@ -112,8 +112,6 @@ class Design(Config):
         csv: File of such rows beside the study; its first line names the factors.
         latin_hypercube: Number of points in the ranges, one in each equal slice of each range.
         sobol: Number of points in the ranges by a scrambled Sobol' sequence; a power of 2.
-        saltelli: Number of base points, a power of 2, of the sample that Sobol' indices are
-            estimated from: it has two more points for each than there are ranges.
         ranges: Continuous factors: `[low, high]`, or `{low, high, scale}`.
     """
 
@@ -124,7 +122,6 @@ class Design(Config):
     csv: str | None = None
     latin_hypercube: Points | None = None
     sobol: Dyadic | None = None
-    saltelli: Dyadic | None = None
     ranges: Annotated[Ranges, SPARES_THE_DESIGN] = Field(default_factory=dict)
 
     @model_validator(mode="after")
@@ -144,8 +141,6 @@ class Design(Config):
     @property
     def points(self) -> int:
         """Number of points in ranges; 0 for listed levels."""
-        if self.saltelli is not None:
-            return self.saltelli * (len(self.ranges) + 2)
         return self.latin_hypercube or self.sobol or 0
 
 
@@ -196,36 +191,9 @@ def _places(design: Design, axes: int, rng: np.random.Generator) -> Floats:
     """
     from scipy.stats import qmc  # late: start-up
 
-    if design.saltelli is not None:
-        return saltelli(axes, design.saltelli, rng)
     if design.sobol is not None:
-        return _sobol(axes, design.sobol, rng)
+        return np.asarray(qmc.Sobol(axes, rng=rng).random_base2(int(math.log2(design.sobol))))
     return np.asarray(qmc.LatinHypercube(axes, rng=rng).random(design.points))
-
-
-def _sobol(axes: int, points: int, rng: np.random.Generator) -> Floats:
-    from scipy.stats import qmc  # late: start-up
-
-    return np.asarray(qmc.Sobol(axes, rng=rng).random_base2(int(math.log2(points))))
-
-
-def saltelli(axes: int, base: int, rng: np.random.Generator) -> Floats:
-    """Pairs of independent points A and B, and for each axis A with that coordinate of B.
-
-    Returns:
-        Points `(base * (axes + 2), axes)`, pair by pair: A, A with coordinate 0, 1, ... of B, B.
-
-    References:
-        Saltelli, Annoni, Azzini, Campolongo, Ratto & Tarantola, Computer Physics Communications
-        181 (2010), 259-270.
-    """
-    both = _sobol(2 * axes, base, rng)
-    first, second = both[:, :axes], both[:, axes:]
-    blocks = np.repeat(first[:, np.newaxis], axes + 2, axis=1)
-    for axis in range(axes):
-        blocks[:, axis + 1, axis] = second[:, axis]
-    blocks[:, -1] = second
-    return blocks.reshape(-1, axes)
 
 
 def value_at(span: ValueRange, share: float) -> float | int:

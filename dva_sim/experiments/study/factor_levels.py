@@ -63,7 +63,8 @@ class Bands(Config):
 
 def factors_of_repeats(study: Study) -> dict[str, tuple[Level, ...]]:
     """Factors varied between and within repeats, in order; empty if none are declared."""
-    robustness, answer = study.robustness, study.answer
+    robustness = study.robustness
+    answer = study.answer
     if robustness is None or answer is None or answer.over is None:
         return {}
     strategies = {STRATEGY: robustness.strategies} if robustness.strategies else {}
@@ -180,7 +181,8 @@ def _ranges_of(study: Study) -> Mapping[str, ValueRange]:
 
 def size(study: Study) -> int:
     """Number of cells in each part, without making them."""
-    design, in_rows = study.design, factors_in_rows(study)
+    design = study.design
+    in_rows = factors_in_rows(study)
     crossed = math.prod(len(levels) for f, levels in study.factors.items() if f not in in_rows)
     if design is None:
         return crossed

@@ -26,7 +26,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.ros.profile import RosProfile
 from dva_sim.simulation.middleware import MiddlewareScenario
-from dva_sim.simulation.models import MODELS, PLUGINS, OwnScenario
+from dva_sim.simulation.models import MODELS
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.simulation.task import TaskScenario
 from dva_sim.simulation.timed.scenario import TimedScenario
@@ -53,8 +53,11 @@ class FileKind(NamedTuple):
     borrowed: frozenset[str] = frozenset()
 
 
-_RUN, _PLAY, _DRAW = "dva-sim run", "dva-sim episode", "dva-sim site show"
-_SCENARIOS, EVIDENCE = "experiments/scenarios", "experiments/validation"
+_RUN = "dva-sim run"
+_PLAY = "dva-sim episode"
+_DRAW = "dva-sim site show"
+_SCENARIOS = "experiments/scenarios"
+EVIDENCE = "experiments/validation"
 KINDS: Final = (
     FileKind("study", Study, "experiments", _RUN),
     FileKind("scenario", Scenario, _SCENARIOS, _PLAY),
@@ -62,7 +65,6 @@ KINDS: Final = (
     FileKind("task", TaskScenario, "experiments/scenarios/tasks", _PLAY),
     FileKind("transports", TransportScenario, _SCENARIOS, _PLAY),
     FileKind("middleware", MiddlewareScenario, _SCENARIOS, _PLAY),
-    FileKind("own scenario", OwnScenario, _SCENARIOS, _PLAY),
     FileKind("targets", TargetFile, EVIDENCE),
     FileKind("split", SplitFile, EVIDENCE),
     FileKind("site", SiteFile, "worlds", _DRAW),
@@ -84,14 +86,7 @@ def recognise(document: Document, kinds: Sequence[FileKind] = KINDS) -> FileKind
     """The kind that knows most of the keys; among equals, the one whose folder it lies in."""
     keys = document.data.keys() - {"description"}
     model = document.data.get("model")
-    if (
-        isinstance(model, str)
-        and model not in MODELS
-        and (".py:" in model or model in PLUGINS.known())
-    ):
-        return next(kind for kind in kinds if kind.model is OwnScenario)
     named = {each.scenario: name for name, each in MODELS.items() if name != "full"}
-    named[OwnScenario] = "of a user's model"
     fit = [kind for kind in kinds if named.get(kind.model, model) == model]
     shared = {
         kind.name: len(keys & (kind.model.model_fields.keys() - kind.borrowed)) for kind in fit

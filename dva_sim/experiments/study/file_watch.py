@@ -22,7 +22,8 @@ class FileWatch:
     """
 
     def __init__(self, files: Files, folders: Callable[[], Iterable[Path]]) -> None:
-        self._files, self._folders = files, folders
+        self._files = files
+        self._folders = folders
         self._places: tuple[Path, ...] = ()
         self._seen: tuple[Version, ...] = ()
         self._begun = self._look()

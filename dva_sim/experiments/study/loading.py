@@ -72,7 +72,9 @@ def change(
     Raises:
         ConfigError: a key that neither the study nor any scenario has.
     """
-    data, changes, touched = copy.deepcopy(before.data), dict(before.changes), [*before.touched]
+    data = copy.deepcopy(before.data)
+    changes = dict(before.changes)
+    touched = [*before.touched]
     factors = data.setdefault("factors", {})
     for key, value in pairs.items():
         first = key.partition(".")[0]
@@ -109,7 +111,9 @@ def _path(data: Any, key: str, kind: Any) -> tuple[str, ...]:
             step = _entry(there, key) if has_keys else key
         else:
             raise ConfigError(f"{'.'.join(path)!r} has no keys, so no {key!r}")
-        path, key, data = (*path, step), key[len(step) + 1 :], there.get(step)
+        path = (*path, step)
+        key = key[len(step) + 1 :]
+        data = there.get(step)
     return path
 
 
@@ -226,7 +230,8 @@ def load_study(
     usual = study.usual
     if settings := tuple(settings):
         study = _with_settings(data, document, settings)
-    study._version, study._usual = version, usual
+    study._version = version
+    study._usual = usual
     if pilot is not None:
         study = _piloted(study, pilot)
     return settled(study)
@@ -293,7 +298,8 @@ def _located(study: Study, version: Version, error: ConfigError) -> ConfigError:
 
 def _with_settings(data: Changed, document: Document, settings: tuple[str, ...]) -> Study:
     """The study changed by `--set`; claims about levels that are gone are gone, too."""
-    changes, scenarios = parse_changes(settings), _scenarios_of(data, document)
+    changes = parse_changes(settings)
+    scenarios = _scenarios_of(data, document)
 
     def make(some: Mapping[str, Any]) -> Study:
         return _built(change(data, some, Study, scenarios), document, may_lose=True)

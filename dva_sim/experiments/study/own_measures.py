@@ -8,8 +8,7 @@ from typing import Any
 from dva_sim.experiments.study.parts import DESIGN
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.measure import Measure
-from dva_sim.simulation.models import MODELS, AnyScenario, measured_names, model_for
+from dva_sim.simulation.models import measured_names
 from dva_sim.simulation.run_measures import PLUGINS, RunMeasure, load_measure, refuse_twins
 
 
@@ -32,21 +31,13 @@ def own_measures(study: Study) -> dict[str, RunMeasure]:
     return found
 
 
-def own_columns(measures: Iterable[RunMeasure], scenarios: Iterable[AnyScenario]) -> dict[str, Any]:
-    """Descriptions of user-defined columns, by table and name, kept with the results.
+def own_columns(measures: Iterable[RunMeasure]) -> dict[str, Any]:
+    """Describe user-defined columns, by table and name; kept with the results.
 
-    It is read without the files that the columns come from.
+    They are read without the files that the columns come from.
 
     Args:
         measures: Measures that the study itself defines.
-        scenarios: Scenarios of the runs.
     """
-    values: dict[str, list[Measure]] = {}
-    named = {scenario.model: scenario for scenario in scenarios if scenario.model not in MODELS}
-    for scenario in named.values():
-        for table, columns in model_for(scenario).columns.items():
-            values.setdefault(table, []).extend(columns)
-    own = [measure.about for measure in measures]
-    if own:
-        values.setdefault("runs", []).extend(own)
-    return {table: {c.name: c.as_json() for c in columns} for table, columns in values.items()}
+    own = {measure.about.name: measure.about.as_json() for measure in measures}
+    return {"runs": own} if own else {}

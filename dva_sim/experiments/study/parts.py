@@ -14,7 +14,8 @@ from dva_sim.statistics import LEVEL
 SET_BY_DESIGN = {"operator.person": "persons", "operator.population_seed": "seed"}
 
 TUNING = "tuning"  # name of the factor whose levels are these:
-UNTUNED, TUNED = "untuned", "tuned"
+UNTUNED = "untuned"
+TUNED = "tuned"
 REPEATS = "robustness"  # name of the table of repeats, so of no part
 STRATEGY = "operator.strategy"
 ANSWER = "answer"  # the declared contrast, where a comparison is named

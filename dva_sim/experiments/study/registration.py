@@ -116,7 +116,8 @@ def register(study: Study, again: bool = False) -> str:
     made = made.model_copy(update={"hash": made.proper_hash})
     cell_grid.cells(study.model_copy(update={"seed": made.seed}))  # its points are valid, too
     _write(path, _as_text(made), found is not None)
-    names, size = ", ".join(study.hypotheses), f"{study.persons} persons x {study.replications}"
+    names = ", ".join(study.hypotheses)
+    size = f"{study.persons} persons x {study.replications}"
     return f"Registered {names} on {size} trials, in {path}\nRun unchanged, it confirms or refutes"
 
 

@@ -133,7 +133,8 @@ def folder_of_screening(name: str) -> Path:
 
 @cache
 def _range_of(number: Assumption) -> ValueRange:
-    low, high = number.low, number.high
+    low = number.low
+    high = number.high
     if number.is_whole:
         return ValueRange(low=low, high=high, scale="whole")
     return ValueRange(low=low, high=high, scale="log" if 0 < low * _WIDE < high else "linear")

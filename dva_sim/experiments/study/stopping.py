@@ -39,11 +39,13 @@ def is_enough(study: Study, rows: Sequence[Row]) -> bool:
     Args:
         rows: Rows of the table `runs` so far, in the order of the design.
     """
-    stop = study.stop
-    if stop is None:
-        return False
+    return study.stop is not None and widest(study, study.stop, rows) <= study.stop.half_width
+
+
+def widest(study: Study, stop: StopRule, rows: Sequence[Row]) -> float:
+    """Half of the widest interval that the rule looks at; infinite where there is none yet."""
     found = half_widths(study, stop, rows)
-    return bool(len(found)) and bool(np.all(found <= stop.half_width))
+    return float(found.max()) if len(found) and np.isfinite(found).all() else math.inf
 
 
 def half_widths(study: Study, stop: StopRule, rows: Sequence[Row]) -> Floats:

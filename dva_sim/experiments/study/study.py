@@ -84,7 +84,6 @@ class Study(Config):
             mean over all persons and trials is zero: the answer is adjusted for what they happen
             to be.
         record: Episodes to keep as recordings.
-        figures: Figures of one's own that its report has, such as `mine.py:Mine`.
         quick: Keys that are otherwise in the small version, which `--quick` runs.
         full: Keys that are otherwise in the larger version, which `--full` runs.
     """
@@ -110,7 +109,6 @@ class Study(Config):
     measures: tuple[str, ...] = ()
     covariates: tuple[str, ...] = ()
     record: Literal["all", "worst", "sample"] | None = None
-    figures: tuple[str, ...] = ()
     quick: Changes = Field(default_factory=dict)
     full: Changes = Field(default_factory=dict)
 
@@ -155,7 +153,7 @@ class Study(Config):
     def asked(self) -> dict[str, Any]:
         """All keys that say what is run and how it is read, as JSON would hold them."""
         unasked = [key for key in ("measures", "covariates", "map") if not getattr(self, key)]
-        apart = {"record", "figures", "screening", *VERSIONS, *unasked}
+        apart = {"record", "screening", *VERSIONS, *unasked}
         return self.model_dump(mode="json", exclude=apart)
 
     @property

@@ -78,7 +78,8 @@ class TuningBasis(Config):
 
     def unlike(self, other: TuningBasis) -> list[str]:
         """Names of the entries that differ."""
-        ours, theirs = self.model_dump(), other.model_dump()
+        ours = self.model_dump()
+        theirs = other.model_dump()
         return [name for name in ours if ours[name] != theirs[name]]
 
 
@@ -223,7 +224,8 @@ def trials_of(
     )
     for problem, _ in validation.of_size(trials):
         raise study.error(f"{key}: {problem}", (key,))
-    trials._status, trials._table = Status(), None
+    trials._status = Status()
+    trials._table = None
     return trials
 
 

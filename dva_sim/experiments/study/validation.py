@@ -60,7 +60,8 @@ def _faults_of_zip(study: Study, names: Sequence[str]) -> Iterator[Problem]:
         elif name in names[:index]:
             yield f"{name!r} appears twice", path
         elif names[0] in study.factors:
-            wanted, count = len(study.factors[names[0]]), len(study.factors[name])
+            wanted = len(study.factors[names[0]])
+            count = len(study.factors[name])
             if count != wanted:
                 yield f"{name!r} should have {wanted} levels as {names[0]!r}, not {count}", path
 
@@ -138,7 +139,8 @@ def _faults_of_name(study: Study, factor: str) -> Iterator[Problem]:
 
 def of_size(study: Study) -> Iterator[Problem]:
     """A slip in a grid, or in how many persons there are, would take years to run."""
-    count, has_points = size(study), POINT in study.factors
+    count = size(study)
+    has_points = POINT in study.factors
     most = MOST_POINTS if has_points else MOST_CELLS
     if count > most:
         how = "points or levels" if has_points else "levels, or draw points with 'design'"
@@ -164,7 +166,8 @@ def _place(study: Study, factor: str, level: Level = None) -> KeyPath:
 
 
 def _faults_of_tuning(study: Study) -> Iterator[Problem]:
-    levels, tuning = study.factors.get(TUNING, ()), study.tuning
+    levels = study.factors.get(TUNING, ())
+    tuning = study.tuning
     if TUNING in study.factors and tuning is None:
         yield "the factor 'tuning' needs a rule: the key 'tuning'", ("factors", TUNING)
     for level in (level for level in levels if level not in (UNTUNED, TUNED)):
@@ -313,7 +316,8 @@ def _fault_of_place(study: Study, asked: Contrast, path: KeyPath) -> Iterator[Pr
 
 
 def _faults_of_hypothesis(study: Study, name: str) -> Iterator[Problem]:
-    hypothesis, path = study.hypotheses[name], ("hypotheses", name)
+    hypothesis = study.hypotheses[name]
+    path = ("hypotheses", name)
     yield from _fault_of_comparison(study, (*path, "comparison"), hypothesis.comparison)
     if (asked := study.contrasts.get(hypothesis.comparison)) is None:
         return
@@ -372,7 +376,8 @@ def of_map(study: Study) -> Iterator[Problem]:
     """Yield why the map cannot be drawn."""
     if study.map is None:
         return
-    answer, models = study.answer, study.map.models
+    answer = study.answer
+    models = study.map.models
     if answer is None or answer.over is None:
         yield "a map needs an answer that runs over a factor", ("map",)
         return

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import asyncio
 import socket
-import subprocess
 import sys
 from contextlib import ExitStack, suppress
 from pathlib import Path
@@ -22,6 +21,7 @@ from dva_sim.network.emulator.needs import EmulatorError
 from dva_sim.network.emulator.process import ADDRESSES, LinkEnded, LinkProcess
 from dva_sim.network.emulator.report import LinkReport
 from dva_sim.network.link import LinkConfig
+from dva_sim.serving.processes import Child, end_all
 
 PORT = 7000  # at which each relay takes connections across the link
 ENDS = {NEAR: FAR, FAR: NEAR}
@@ -60,11 +60,11 @@ class CrossedLink:
         self._relays = {end: self._started(end) for end in ENDS}
         self._led: set[tuple[str, int]] = set()
 
-    def _started(self, end: str) -> subprocess.Popen[bytes]:
+    def _started(self, end: str) -> Child:
         words = [sys.executable, "-P", "-m", __name__, self._folder.name, end]
         self._controls[end], there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with there:
-            return self._link.start(end, words, stdin=there)
+            return self._link.start(end, words, f"the relay at the {end} end", stdin=there)
 
     def begin(self) -> None:
         """Let the link's time begin now: the moment that outages and recordings count from."""
@@ -91,6 +91,12 @@ class CrossedLink:
         """Return True if the link or a relay has ended by itself."""
         return self._link.has_ended or any(r.poll() is not None for r in self._relays.values())
 
+    def ended(self) -> LinkEnded:
+        """Make the error of a link that has ended by itself, or whose relay has."""
+        relays = () if self._link.has_ended else self._relays.values()
+        gone = next((relay for relay in relays if relay.poll() is not None), None)
+        return self._link.ended() if gone is None else LinkEnded(gone.why())
+
     def report(self) -> LinkReport | None:
         """End the link, and count what became of its packets; None if it has ended by itself."""
         with suppress(LinkEnded):
@@ -99,10 +105,9 @@ class CrossedLink:
 
     def close(self) -> None:
         """End the link and its relays, and remove their files."""
-        for end, relay in self._relays.items():
-            relay.kill()
-            relay.wait()
-            self._controls[end].close()
+        end_all(self._relays.values(), 0.0)
+        for control in self._controls.values():
+            control.close()
         self._link.close()
         self._folder.cleanup()
 
@@ -115,7 +120,8 @@ class _Relay:
     """The relay at one end."""
 
     def __init__(self, folder: str, end: str) -> None:
-        self._folder, self._end = folder, end
+        self._folder = folder
+        self._end = end
         self._led: list[asyncio.Task[asyncio.Server]] = []
         self._control = socket.socket(fileno=sys.stdin.fileno())
 

@@ -29,7 +29,8 @@ _BY_SIGNAL = 128  # exit codes of programs that a signal has ended, as shells gi
 def words_of(user_space: int | None, network: int, program: list[str]) -> list[str]:
     """The command line that runs a program in namespaces, given by their open files."""
     user = _NONE if user_space is None else str(user_space)
-    parent, numbers = str(os.getpid()), [str(os.getuid()), str(os.getgid())]
+    parent = str(os.getpid())
+    numbers = [str(os.getuid()), str(os.getgid())]
     # -P: a file of the user that is called like a module of Python is not imported.
     words = [sys.executable, "-P", "-m", __name__, parent, *numbers, user, str(network)]
     return [*words, *program]

@@ -24,7 +24,8 @@ from dva_sim.network.emulator.report import Durations, LinkFlow, LinkReport
 from dva_sim.network.link import Link, LinkConfig, make_link, part_links
 
 FORWARDER_PRIORITY = 20  # real-time, above the programs'
-NEAR, FAR = "near", "far"
+NEAR = "near"
+FAR = "far"
 _LARGEST = 65_536
 _MOST_AT_ONCE = 32  # packets of one device before what is due is looked at again
 _VERSION_4 = 4

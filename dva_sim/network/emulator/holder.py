@@ -13,7 +13,8 @@ from dva_sim.network.emulator import linux_calls
 from dva_sim.network.emulator.forwarder import FORWARDER_PRIORITY, Forwarder, links_of
 from dva_sim.network.link import LinkConfig
 
-BEGIN, END = b"begin", b"end"
+BEGIN = b"begin"
+END = b"end"
 _A_WHILE_S = 60.0  # no call of the system waits for ever
 
 

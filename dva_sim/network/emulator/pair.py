@@ -9,24 +9,22 @@ from __future__ import annotations
 import os
 import select
 import shutil
-import signal
 import socket
 import subprocess
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 
 from dva_sim.network.emulator import publishing
-from dva_sim.network.emulator.enter import KILL_ALL
 from dva_sim.network.emulator.forwarder import FAR, NEAR
 from dva_sim.network.emulator.needs import EmulatorError
 from dva_sim.network.emulator.process import LinkProcess
 from dva_sim.network.emulator.report import LinkReport
+from dva_sim.serving.processes import END_WITHIN, Child, end_all
+from dva_sim.serving.signals import caught_signals
 
-GRACE_S = 5.0  # for a command to end by itself once a signal has asked it to
-_PATIENCE_S = 10.0  # for the kernel to end what does not
-_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+GRACE_S = END_WITHIN  # for a command to end by itself once a signal has asked it to
 
 Tell = Callable[[str], object]
 
@@ -69,22 +67,22 @@ def run_pair(
     if shutil.which("sh") is None:
         raise EmulatorError("a shell is needed: there is no `sh` on the PATH")
     with ExitStack() as at_end:
-        signals = at_end.enter_context(_caught_signals())
+        signals = at_end.enter_context(caught_signals())
         if published:
             files = [listener.fileno() for listener in published]
             leading = link.start(NEAR, publishing.words_of(published), pass_fds=files)
-            at_end.callback(_end, leading, 0.0)
+            at_end.callback(end_all, [leading], 0.0)
         link.begin()
         commands = {}
         for end, command, stdin in ((FAR, far, subprocess.DEVNULL), (NEAR, near, None)):
             process = link.start(end, ["sh", "-c", command], stdin=stdin)
-            at_end.callback(_end, process, 0.0)
+            at_end.callback(end_all, [process], 0.0)
             commands[end] = _Command(end, process)
             at_end.callback(os.close, commands[end].ended)
         grace = _wait_for(commands[NEAR], commands[FAR], link, signals, tell)
-        code = _end(commands[NEAR].process, 0.0)
-        _end(commands[FAR].process, grace)
-        return PairOutcome(code, link.report())
+        end_all([commands[NEAR].process], 0.0)
+        end_all([commands[FAR].process], grace)
+        return PairOutcome(commands[NEAR].process.returncode, link.report())
 
 
 class _Command:
@@ -94,8 +92,10 @@ class _Command:
         ended: File descriptor that becomes readable when it ends.
     """
 
-    def __init__(self, name: str, process: subprocess.Popen[bytes]) -> None:
-        self.name, self.process, self.ended = name, process, os.pidfd_open(process.pid)
+    def __init__(self, name: str, process: Child) -> None:
+        self.name = name
+        self.process = process
+        self.ended = os.pidfd_open(process.pid)
 
 
 def _wait_for(
@@ -124,39 +124,5 @@ def _wait_for(
             if deadline is not None or len(asked) > 1:
                 return 0.0
             for command in (near, far):
-                with suppress(ProcessLookupError):
-                    command.process.send_signal(asked[0])
+                command.process.send_signal(asked[0])
             deadline = time.monotonic() + GRACE_S
-
-
-def _end(process: subprocess.Popen[bytes], grace: float) -> int:
-    """End a command with all that it has started; its exit code."""
-    asks = ((signal.SIGTERM, grace),) if grace else ()
-    for number, patience in (*asks, (KILL_ALL, _PATIENCE_S)):
-        if process.poll() is None:
-            process.send_signal(number)
-            with suppress(subprocess.TimeoutExpired):
-                process.wait(patience)
-    process.kill()  # not of any use unless the machine is so busy that patience has ended
-    return process.wait()
-
-
-@contextmanager
-def _caught_signals() -> Iterator[socket.socket]:
-    """A socket that gives the number of each signal that would end this process, as a byte.
-
-    Signals that are ignored, as SIGHUP by `nohup`, stay so.
-    """
-    reads, writes = socket.socketpair()
-    writes.setblocking(False)
-    # A handler of Python's own may run too late: another thread may have got the signal.
-    woken = signal.set_wakeup_fd(writes.fileno())
-    heard = [n for n in _SIGNALS if signal.getsignal(n) is not signal.SIG_IGN]
-    before = {number: signal.signal(number, lambda *_: None) for number in heard}
-    with reads, writes:
-        try:
-            yield reads
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
-            signal.set_wakeup_fd(woken)

@@ -11,22 +11,38 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Any
 
-from dva_sim.kernel.errors import RunsFailed
+from typing_extensions import override
+
 from dva_sim.network.emulator import enter, holder
 from dva_sim.network.emulator.forwarder import FAR, NEAR
 from dva_sim.network.emulator.linux_calls import FAR_END, NEAR_END
 from dva_sim.network.emulator.needs import NEEDS, EmulatorError
 from dva_sim.network.emulator.report import LinkReport
 from dva_sim.network.link import LinkConfig
+from dva_sim.serving.processes import Child, ChildFailed, end_all
 
 ADDRESSES = {NEAR: NEAR_END.address, FAR: FAR_END.address}
 _VARIABLES = {f"DVA_LINK_{end.upper()}": address for end, address in ADDRESSES.items()}
 _SPACES = 3  # a user namespace, and a network namespace for each end
+_KILLED_WITHIN_S = 10.0  # for the kernel to end all that a program has started
 _PATIENCE_S = 30.0  # for the link to stand, and for its report
 
 
-class LinkEnded(RunsFailed):
+class LinkEnded(ChildFailed):
     """The process of an emulated link has ended by itself."""
+
+
+class LinkedChild(Child):
+    """A program at one end of an emulated link, and all that it has started (`enter`)."""
+
+    @override
+    def kill(self) -> None:
+        """End all of it at once; when it has ended, nothing of it is left."""
+        if self.poll() is None:
+            self.send_signal(enter.KILL_ALL)
+            with suppress(subprocess.TimeoutExpired):
+                self.wait(_KILLED_WITHIN_S)
+        super().kill()  # not of any use unless the machine is so busy that patience has ended
 
 
 class LinkProcess:
@@ -51,12 +67,12 @@ class LinkProcess:
         self._spaces: list[int] = []
         numbers = [str(os.getpid()), str(there.fileno())]
         with there:
-            self._process = subprocess.Popen(
+            self._process = Child(
+                "the emulated link",
                 # -P: a file of the user that is called like a module of Python is not imported.
                 [sys.executable, "-P", "-m", "dva_sim.network.emulator.start", *numbers],
-                stdin=subprocess.DEVNULL,
+                self._channel.close,
                 pass_fds=(there.fileno(),),
-                start_new_session=True,  # Ctrl-C is for the programs, the link outlasts them
             )
         try:
             job = {"link": config.model_dump(mode="json"), "seed": seed, "rootless": rootless}
@@ -82,12 +98,21 @@ class LinkProcess:
         """Let the link's time begin now: the moment that outages and recordings count from."""
         self._send(holder.BEGIN)
 
-    def start(self, end: str, words: list[str], **options: Any) -> subprocess.Popen[bytes]:
+    def start(
+        self,
+        end: str,
+        words: list[str],
+        name: str = "",
+        keeps_errors: bool = False,
+        **options: Any,
+    ) -> LinkedChild:
         """Start a program at one end; it ends with this process, and all that it started with it.
 
         Args:
             end: `near` or `far`.
             words: Its command line.
+            name: See `Child`; empty: the end at which it is.
+            keeps_errors: See `Child`; False: they go where this process's go.
             options: See `subprocess.Popen`.
         """
         *user, near, far = self._spaces
@@ -96,7 +121,9 @@ class LinkProcess:
         options["pass_fds"] = (*options.get("pass_fds", ()), *files)
         options["env"] = {**options.get("env", os.environ), **_VARIABLES}
         called = enter.words_of(*spaces, words)
-        return subprocess.Popen(called, start_new_session=True, **options)
+        return LinkedChild(
+            name or f"the {end} program", called, keeps_errors=keeps_errors, **options
+        )
 
     def report(self) -> LinkReport:
         """End the link, and count what became of its packets.
@@ -118,14 +145,11 @@ class LinkProcess:
 
     def ended(self) -> LinkEnded:
         """Make the error of a link that has ended by itself."""
-        code = self._process.wait(_PATIENCE_S)
-        return LinkEnded(f"the emulated link has ended by itself (exit code {code})")
+        return LinkEnded(self._process.why())
 
     def close(self) -> None:
         """End the link; programs at its ends hear nothing of each other from now on."""
-        self._process.kill()
-        self._process.wait()
-        self._channel.close()
+        end_all([self._process], 0.0)
         while self._spaces:
             os.close(self._spaces.pop())
 
@@ -139,7 +163,7 @@ class LinkProcess:
         except OSError:
             data = b""
         if not data:
-            raise EmulatorError("the process of the emulated link ended before it was ready")
+            raise EmulatorError(self._process.why())
         problem = json.loads(data).get("problem")
         if problem is not None:
             raise EmulatorError(f"the emulated link {NEEDS}; here {problem}")

@@ -13,7 +13,8 @@ from dva_sim.network.link import Link
 LATE_S = 0.005
 """A forwarder whose 99th percentile of lateness is above this has disturbed the run [s]."""
 
-_LEAST_S, _STEP = 1e-6, math.log(1.01)
+_LEAST_S = 1e-6
+_STEP = math.log(1.01)
 
 
 class Durations:
@@ -57,7 +58,8 @@ class LinkFlow:
 
     def report(self) -> DirectionReport:
         """Count as far as it has come."""
-        link, quantile = self.link, self.waits.quantile
+        link = self.link
+        quantile = self.waits.quantile
         return DirectionReport(
             offered_packets=link.offered,
             passed_packets=self.passed,

@@ -46,7 +46,8 @@ def main(parent: int, control: int) -> None:
 
         from dva_sim.network.emulator.holder import hold  # late: start-up
 
-        tuns, drops = (ends[0][0], ends[1][0]), [dropped for *_, dropped in ends]
+        tuns = (ends[0][0], ends[1][0])
+        drops = [dropped for *_, dropped in ends]
         hold(channel, job, tuns, drops, spaces)
 
 

@@ -64,9 +64,9 @@ class LinkConfig(Config):
     """
 
     delay_s: Annotated[
-        Seconds, AlsoCalled("delay", "latency", "latency_s"), Key("one-way delay", zero="delay")
+        Seconds, AlsoCalled("delay", "latency", "latency_s"), Key("one-way delay")
     ] = 0.0
-    jitter_s: Annotated[Seconds, Key("jitter", stated="jitter (half-width)", zero=True)] = 0.0
+    jitter_s: Annotated[Seconds, Key("jitter", stated="jitter (half-width)")] = 0.0
     delay_law: Annotated[DelayLaw | None, Key("law of the delay")] = None
     delay_log: Annotated[str | None, AlsoCalled("recorded", "ping_log"), Key("recorded delays")] = (
         None
@@ -76,7 +76,7 @@ class LinkConfig(Config):
     loss: Annotated[
         Loss,
         AlsoCalled("packet_loss", "loss_rate", "loss_share"),
-        Key("packet loss", stated="packet loss, each way", zero=True),
+        Key("packet loss", stated="packet loss, each way"),
     ] = 0.0
     bursts: Annotated[Bursts | None, Key("bursts of losses")] = None
     rate_bps: Annotated[
@@ -92,14 +92,14 @@ class LinkConfig(Config):
         Way | None,
         Key(
             "otherwise towards the robot",
-            inner={"delay_s": Key("delay of commands", zero=True)},
+            inner={"delay_s": Key("delay of commands")},
         ),
     ] = None
     down: Annotated[
         Way | None,
         Key(
             "otherwise from the robot",
-            inner={"delay_s": Key("delay of frames", zero=True)},
+            inner={"delay_s": Key("delay of frames")},
         ),
     ] = None
 

@@ -235,7 +235,8 @@ class _Run:
         """Return True if this reply is of another run: its number starts again, or jumps far."""
         if not self.replies:
             return False
-        full, top = self._unwrapped(number), max(self.replies)
+        full = self._unwrapped(number)
+        top = max(self.replies)
         if full > top:
             return number < self.last % _NUMBERS and full - self.newest > _NUMBERS // 4
         same, _ = self.replies.get(full, (sent, 0.0))
@@ -268,7 +269,8 @@ def _ping_output(path: str, lines: list[tuple[int, str]]) -> DelayLog:
         if text.startswith(_BEGIN):
             runs.append(_Run())
             continue
-        reply, other = _REPLY.match(text), _NO_REPLY.match(text)
+        reply = _REPLY.match(text)
+        other = _NO_REPLY.match(text)
         if reply is not None:
             delay = parse_delay(reply[3], path, line)
             sent = float(reply[1]) - delay

@@ -142,7 +142,8 @@ class GammaDelay(_Law):
         from scipy.special import gammaincinv  # late: few runs need it, and it is slow to import
 
         above = delay - self.least_s
-        shape, scale = (above / self.sd_s) ** 2, self.sd_s**2 / above
+        shape = (above / self.sd_s) ** 2
+        scale = self.sd_s**2 / above
         return lambda u: scale * float(gammaincinv(shape, u)) - above
 
 

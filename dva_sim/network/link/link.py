@@ -68,19 +68,26 @@ class Link:
         self._make_numbers: MakeNumbers = FastNoise
         if by_packet:
             self._make_numbers = partial(PacketNumbers, number=lambda: self.offered)
-        self.name, self.rate_bps, self.room = name, serialiser.rate_bps, way.queue_bytes
-        self._line, self._streams, self._direction = serialiser, streams, direction
+        self.name = name
+        self.rate_bps = serialiser.rate_bps
+        self.room = way.queue_bytes
+        self._line = serialiser
+        self._streams = streams
+        self._direction = direction
         if way.queue_packets is not None:
             serialiser = PacketQueue(serialiser, way.queue_packets)
             self.room = way.queue_packets * SMALLEST_PACKET
-        self._serialiser, self._offer = serialiser, serialiser.offer
-        self._counts_packets, self._last_arrival = way.queue_packets is not None, 0.0
+        self._serialiser = serialiser
+        self._offer = serialiser.offer
+        self._counts_packets = way.queue_packets is not None
+        self._last_arrival = 0.0
         self._take(way)
 
     def _take(self, way: LinkConfig) -> None:
         """Be like this from now on, but for the queue."""
         replay = _make_replay(way, self._direction, self._streams, self.name)
-        self.delay, self._base = way.moments()[0], way.delay_s
+        self.delay = way.moments()[0]
+        self._base = way.delay_s
         drawing = self._streams, self.name, self._make_numbers
         self._fates = _make_fates(way, replay, *drawing)
         self._outage = gaps_of(way.outages) if way.outages else None
@@ -237,7 +244,8 @@ def _make_replay(
         return None
     log = read_delay_log(way.delay_log)
     rng = streams.fresh(f"{name.removesuffix(f'/{direction}')}/delay-log")
-    offset, coins = rng.random() * period_of(log), rng.random(len(log.times))
+    offset = rng.random() * period_of(log)
+    coins = rng.random(len(log.times))
     share = way.delay_log_share
     here = coins < share if direction == "up" else coins >= 1.0 - share
     return Replay(log, share, here, offset)
@@ -255,7 +263,8 @@ class PartedLink(Link):
     """
 
     def __init__(self, whole: Link, gaps: Sequence[Gap]) -> None:
-        self._whole, self._gaps = whole, gaps
+        self._whole = whole
+        self._gaps = gaps
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._whole, name)
@@ -365,7 +374,8 @@ class RadioLink(Link):
         way = config.toward(direction)
         self._reception = reception
         self._uniforms = FastNoise(streams, f"{name}/radio")
-        self._air, self._air_room = ConstantRate(way.rate_bps), way.queue_bytes
+        self._air = ConstantRate(way.rate_bps)
+        self._air_room = way.queue_bytes
         self._newest = 0.0
 
     @override
@@ -447,7 +457,8 @@ def make_link(
     Raises:
         ConfigError: a file that it names cannot be read.
     """
-    serialiser, own_name = make_serialiser(config, direction, streams, name), f"{name}/{direction}"
+    serialiser = make_serialiser(config, direction, streams, name)
+    own_name = f"{name}/{direction}"
     if reception is None:
         return Link(config, serialiser, streams, own_name, direction, by_packet)
     return RadioLink(config, serialiser, streams, own_name, direction, reception)

@@ -99,7 +99,8 @@ def counted_bursts(
         loss: Probability in a burst.
         uniforms: Random number of each packet.
     """
-    ends, begins = 1.0 / length, share / (1.0 - share) / length
+    ends = 1.0 / length
+    begins = share / (1.0 - share) / length
     steps = _uniform(rng)
     is_on = next(steps) < share
 

@@ -53,7 +53,8 @@ class ConstantRate(Serialiser):
     def change_rate(self, now: float, rate_bps: float) -> None:
         """Go on at another rate [bit/s] with the bytes that wait."""
         waiting = self.backlog_bytes(now)
-        self.rate_bps, self._seconds_per_byte = rate_bps, 8.0 / rate_bps
+        self.rate_bps = rate_bps
+        self._seconds_per_byte = 8.0 / rate_bps
         self._free_at = now + waiting * self._seconds_per_byte
 
     @override
@@ -73,7 +74,8 @@ class ConstantRate(Serialiser):
 
     def offer(self, now: float, size: int, room: int) -> float | None:
         """See `Serialiser`: both steps in one, because every packet comes here."""
-        start, seconds_per_byte = self._free_at, self._seconds_per_byte
+        start = self._free_at
+        seconds_per_byte = self._seconds_per_byte
         if start > now:
             if (start - now) / seconds_per_byte + size > room:
                 return None
@@ -132,11 +134,13 @@ class TraceRate(Serialiser):
     def depart(self, now: float, size: int) -> float:
         first = self._first_at(now)
         if first > self._index:
-            self._index, self._left = first, OPPORTUNITY_BYTES
+            self._index = first
+            self._left = OPPORTUNITY_BYTES
         rest = size
         while rest > self._left:
             rest -= self._left
-            self._index, self._left = self._index + 1, OPPORTUNITY_BYTES
+            self._index += 1
+            self._left = OPPORTUNITY_BYTES
         self._left -= rest
         left_at = max(now, self._time_of(self._index))
         self._queued.append((left_at, size))
@@ -153,7 +157,8 @@ class PacketQueue(Serialiser):
     """
 
     def __init__(self, line: Serialiser, packets: int) -> None:
-        self._line, self._room = line, packets
+        self._line = line
+        self._room = packets
         self._leaving: deque[float] = deque()
         self.rate_bps = line.rate_bps
 

@@ -45,9 +45,11 @@ class FastNoise:
     """
 
     def __init__(self, streams: Streams, name: str) -> None:
-        self._streams, self._name = streams, name
+        self._streams = streams
+        self._name = name
         self._blocks: dict[int, NDArray[np.float64]] = {}
-        self._slot, self._count = -1, 0
+        self._slot = -1
+        self._count = 0
 
     def draw(self, now: float) -> float:
         """Implement `UniformNumbers`."""
@@ -77,8 +79,11 @@ class PacketNumbers:
     """
 
     def __init__(self, streams: Streams, name: str, number: Callable[[], int]) -> None:
-        self._streams, self._name, self._number = streams, name, number
-        self._place, self._block = -1, np.empty(0)
+        self._streams = streams
+        self._name = name
+        self._number = number
+        self._place = -1
+        self._block = np.empty(0)
 
     def draw(self, now: float) -> float:
         """Implement `UniformNumbers`."""
@@ -122,7 +127,8 @@ class SlowNoise:
         self._rng = streams.fresh(name)
         self._keep = math.exp(-SLOT_S / time)
         self._fresh = math.sqrt(1.0 - self._keep**2)
-        self._number, self._last = -1, float(self._rng.standard_normal())
+        self._number = -1
+        self._last = float(self._rng.standard_normal())
         self._block: list[float] = []
 
     def draw(self, now: float) -> float:
@@ -138,7 +144,8 @@ class SlowNoise:
         keep = self._keep
         chain = accumulate(steps.tolist(), lambda x, step: keep * x + step, initial=self._last)
         self._block = list(chain)[1:]
-        self._number, self._last = self._number + 1, self._block[-1]
+        self._number += 1
+        self._last = self._block[-1]
 
 
 class Spells:

@@ -18,7 +18,8 @@ from dva_sim.network.middleware.ends import (
     TransportError,
 )
 
-COMMANDS, PICTURES = "command", "picture"
+COMMANDS = "command"
+PICTURES = "picture"
 _STEP: Final = 0.01  # between two looks whether the other end is there [s]
 
 
@@ -30,12 +31,15 @@ class DdsTransport(CommandTransport):
         depth: Messages kept for a reader that has not read them.
     """
 
-    title, library, extra = "DDS", "cyclonedds", "dds"
+    title = "DDS"
+    library = "cyclonedds"
+    extra = "dds"
 
     def __init__(self, reliable: bool = False, depth: int = 1) -> None:
         if depth < 1:
             raise ConfigError(f"depth {depth!r} should be 1 or more")
-        self.reliable, self.depth = reliable, depth
+        self.reliable = reliable
+        self.depth = depth
 
     @override
     def near(self, place: Rendezvous, receive: Receive) -> TransportEnd:
@@ -62,7 +66,9 @@ class _DdsEnd(TransportEnd):
 
         from dva_sim.network.middleware.dds_types import Bytes  # late: start-up
 
-        self._make, self._receive, self._duration = Bytes, receive, duration
+        self._make = Bytes
+        self._receive = receive
+        self._duration = duration
         reliability = (
             Policy.Reliability.Reliable(duration(milliseconds=100))
             if options.reliable

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import socket
 import threading
 import time
 from contextlib import suppress
@@ -10,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from typing_extensions import override
 
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.network.emulator.linux_calls import die_with_parent
 from dva_sim.network.middleware.ends import (
     SIDES,
     CommandTransport,
@@ -20,12 +24,18 @@ from dva_sim.network.middleware.ends import (
     TransportError,
     connected,
 )
-from dva_sim.network.mqtt_broker import PROGRAM, Broker, new_client
+from dva_sim.serving.processes import Child, end_all
 
 if TYPE_CHECKING:
     from paho.mqtt.client import Client
 
-COMMANDS, PICTURES = "command", "picture"
+_SYSTEM: Final = os.pathsep.join(
+    (os.environ.get("PATH", os.defpath), "/usr/local/sbin", "/usr/sbin")
+)
+# Where Debian puts it is not on the path of everybody.
+PROGRAM: Final = shutil.which("mosquitto", path=_SYSTEM) or "mosquitto"
+COMMANDS = "command"
+PICTURES = "picture"
 HERE: Final = "robot"  # where the robot's end says that it hears commands; the broker keeps it
 _AGAIN: Final = 0.1  # between two attempts to connect [s]
 
@@ -40,7 +50,9 @@ class MqttTransport(CommandTransport):
         broker: The end at which the broker is.
     """
 
-    title, library, extra = "MQTT", "paho", "mqtt"
+    title = "MQTT"
+    library = "paho"
+    extra = "mqtt"
     program = PROGRAM
 
     def __init__(
@@ -54,7 +66,10 @@ class MqttTransport(CommandTransport):
             raise ConfigError(f"qos {qos!r} should be one of 0, 1, 2")
         if broker not in SIDES:
             raise ConfigError(f"broker {broker!r} should be one of {', '.join(SIDES)}")
-        self.qos, self.nodelay, self.expiry_s, self.broker = qos, nodelay, expiry_s, broker
+        self.qos = qos
+        self.nodelay = nodelay
+        self.expiry_s = expiry_s
+        self.broker = broker
 
     @override
     def near(self, place: Rendezvous, receive: Receive) -> TransportEnd:
@@ -75,17 +90,26 @@ class _MqttEnd(TransportEnd):
     def __init__(
         self, options: MqttTransport, place: Rendezvous, receive: Receive, side: Side
     ) -> None:
-        self._options, self._receive = options, receive
+        self._options = options
+        self._receive = receive
         self._hears, self._tells = (PICTURES, COMMANDS)[:: 1 if side == "near" else -1]
         self._broker = None
         if side == options.broker:
-            self._broker = Broker(place.address(side), place.port, nodelay=options.nodelay)
+            self._broker = _Broker(place.address(side), place.port, options.nodelay)
         self._is_near = side == "near"
         self._is_ready = threading.Event()
         self._client = self._made()
 
     def _made(self) -> Client:
-        client = new_client("", self._options.nodelay)
+        from paho.mqtt.client import Client, MQTTv5  # late: an extra
+        from paho.mqtt.enums import CallbackAPIVersion
+
+        client = Client(CallbackAPIVersion.VERSION2, protocol=MQTTv5)
+        if self._options.nodelay:
+            client.on_socket_open = lambda _, __, opened: opened.setsockopt(
+                socket.IPPROTO_TCP, socket.TCP_NODELAY, 1
+            )
+        client.reconnect_delay_set(1, 1)
         client.on_connect = self._on_connect
         client.on_subscribe = self._on_subscribe
         client.on_message = self._on_message
@@ -140,3 +164,63 @@ class _MqttEnd(TransportEnd):
         self._client.disconnect()
         if self._broker is not None:
             self._broker.close()
+
+
+class _Broker:
+    """A mosquitto that listens at one address alone, and ends with this process.
+
+    Its files have no names: nothing is left behind, whatever ends it. It stays root, which inside a
+    user namespace is nobody else's: there it could not become another user.
+
+    Args:
+        address: IPv4 address of this machine.
+        port: Port.
+        nodelay: True to send small messages at once (TCP_NODELAY).
+
+    Raises:
+        TransportError: it cannot be started.
+    """
+
+    def __init__(self, address: str, port: int, nodelay: bool) -> None:
+        self._place = address, port
+        self._refuse_taken_port()
+        configuration = _nameless(
+            "configuration",
+            f"listener {port} {address}\nallow_anonymous true\nuser root\nlog_dest stderr\n"
+            f"log_type error\nset_tcp_nodelay {str(nodelay).lower()}\n",
+        )
+        me = os.getpid()
+        try:
+            self._process = Child(
+                "the MQTT broker",
+                [PROGRAM, "-c", f"/proc/self/fd/{configuration}"],
+                pass_fds=(configuration,),
+                preexec_fn=lambda: die_with_parent(me),
+            )
+        except OSError as error:
+            raise TransportError(f"{PROGRAM} cannot be started: {error.strerror}") from None
+        finally:
+            os.close(configuration)
+
+    def _refuse_taken_port(self) -> None:
+        """Say so now: who waits for the broker would take another program for it."""
+        with socket.socket() as one:
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                one.bind(self._place)
+            except OSError as error:
+                at = ":".join(map(str, self._place))
+                problem = f"{PROGRAM} cannot listen at {at}: {error.strerror}"
+                raise TransportError(problem) from None
+
+    def close(self) -> None:
+        """End it."""
+        end_all([self._process], 0.0)
+
+
+def _nameless(name: str, text: str) -> int:
+    """Return the open file, of this process alone, with a text."""
+    file = os.memfd_create(name)
+    os.fchmod(file, 0o600)
+    os.write(file, text.encode())
+    return file

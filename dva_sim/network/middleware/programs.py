@@ -136,8 +136,10 @@ class RobotProgram:
     """Obeys what is newer than everything before it, and sends pictures."""
 
     def __init__(self, transport: CommandTransport, plan: Plan, notes: ProgramNotes) -> None:
-        self._notes, self._plan = notes, plan
-        self._newest, self._replies = 0, 0
+        self._notes = notes
+        self._plan = plan
+        self._newest = 0
+        self._replies = 0
         self._turn = threading.Lock()
         self._end = transport.far(plan.place(), self._hear)
 
@@ -161,14 +163,17 @@ class RobotProgram:
 
     def run(self) -> None:
         """Until killed, or some time after the operator has sent its last command."""
-        plan, number = self._plan, 0
-        over, period = plan.until + 60.0, 1.0 / (plan.picture_hz or 1.0)
+        plan = self._plan
+        number = 0
+        over = plan.until + 60.0
+        period = 1.0 / (plan.picture_hz or 1.0)
         due = time.monotonic()
         filling = b"\xff" * (plan.picture_bytes - _PICTURE.size)
         while (now := time.monotonic()) < over:
             self._end.serve(min(due, over))
             if plan.picture_hz and now >= due:
-                number, due = number + 1, due + period
+                number += 1
+                due += period
                 self._notes.add(ProgramNoteKind.PICTURE_TAKEN, number)
                 self._end.send(_PICTURE.pack(number) + filling)
             elif now >= due:
@@ -179,7 +184,8 @@ class OperatorProgram:
     """Sends a command at every step of a grid, or the newest as soon as one can be sent."""
 
     def __init__(self, transport: CommandTransport, plan: Plan, notes: ProgramNotes) -> None:
-        self._notes, self._plan = notes, plan
+        self._notes = notes
+        self._plan = plan
         self._sent = 0
         self._end = transport.near(plan.place(), self._see)
         notes.add(ProgramNoteKind.READY, 0)
@@ -189,8 +195,11 @@ class OperatorProgram:
 
     def run(self) -> None:
         """Until the plan says."""
-        plan, waits = self._plan, False
-        start, step, period = time.monotonic(), 0, 1.0 / self._plan.command_hz
+        plan = self._plan
+        waits = False
+        start = time.monotonic()
+        step = 0
+        period = 1.0 / self._plan.command_hz
         while (now := time.monotonic()) < plan.until:
             is_due = now >= start + step * period
             if is_due or waits:

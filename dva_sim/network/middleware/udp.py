@@ -56,7 +56,8 @@ class _Datagrams(TransportEnd):
 
     def find(self, peer: tuple[str, int], ready_by: float) -> None:
         """Greet the robot until it greets back."""
-        self._peer, self._is_near = peer, True
+        self._peer = peer
+        self._is_near = True
         while time.monotonic() < ready_by:
             self.send(_GREETING)
             if select.select([self._socket], [], [], _AGAIN)[0]:

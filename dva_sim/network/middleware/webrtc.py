@@ -36,10 +36,13 @@ class WebRtcTransport(CommandTransport):
         retransmits: Number of times a lost message is sent again; None: until it arrives.
     """
 
-    title, library, extra = "WebRTC", "aiortc", "webrtc"
+    title = "WebRTC"
+    library = "aiortc"
+    extra = "webrtc"
 
     def __init__(self, ordered: bool = True, retransmits: int | None = None) -> None:
-        self.ordered, self.retransmits = ordered, retransmits
+        self.ordered = ordered
+        self.retransmits = retransmits
 
     @override
     def near(self, place: Rendezvous, receive: Receive) -> TransportEnd:

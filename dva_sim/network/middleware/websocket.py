@@ -49,7 +49,8 @@ class WebSocketTransport(CommandTransport):
 class _WebSocketEnd(LoopEnd):
     def __init__(self, receive: Receive, nodelay: bool) -> None:
         super().__init__()
-        self._receive, self._nodelay = receive, nodelay
+        self._receive = receive
+        self._nodelay = nodelay
         self._connection: ClientConnection | ServerConnection | None = None
 
     async def _hear(self, connection: ClientConnection | ServerConnection) -> None:

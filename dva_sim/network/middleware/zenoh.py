@@ -17,7 +17,8 @@ from dva_sim.network.middleware.ends import (
     TransportError,
 )
 
-COMMANDS, PICTURES = "command", "picture"
+COMMANDS = "command"
+PICTURES = "picture"
 _AGAIN: Final = 0.1  # between two looks whether the other end is there [s]
 
 
@@ -31,7 +32,9 @@ class ZenohTransport(CommandTransport):
         express: True to send messages at once instead of in batches.
     """
 
-    title, library, extra = "Zenoh", "zenoh", "zenoh"
+    title = "Zenoh"
+    library = "zenoh"
+    extra = "zenoh"
 
     def __init__(
         self,
@@ -46,8 +49,10 @@ class ZenohTransport(CommandTransport):
         ):
             if value not in known:
                 raise ConfigError(f"{key} {value!r} should be one of {', '.join(known)}")
-        self.carrier, self.congestion = carrier, congestion
-        self.reliable, self.express = reliable, express
+        self.carrier = carrier
+        self.congestion = congestion
+        self.reliable = reliable
+        self.express = express
 
     @override
     def near(self, place: Rendezvous, receive: Receive) -> TransportEnd:

@@ -49,7 +49,9 @@ class ZeroMqTransport(CommandTransport):
     ) -> None:
         if pattern not in _SOCKETS:
             raise ConfigError(f"pattern {pattern!r} should be one of {', '.join(_SOCKETS)}")
-        self.pattern, self.timeout_s, self.high_water_mark = pattern, timeout_s, high_water_mark
+        self.pattern = pattern
+        self.timeout_s = timeout_s
+        self.high_water_mark = high_water_mark
 
     @override
     def near(self, place: Rendezvous, receive: Receive) -> TransportEnd:
@@ -79,7 +81,9 @@ class _Sockets(TransportEnd):
     def __init__(
         self, options: ZeroMqTransport, place: Rendezvous, receive: Receive, is_near: bool
     ) -> None:
-        self._options, self._receive, self._context = options, receive, zmq.Context[_Socket]()
+        self._options = options
+        self._receive = receive
+        self._context = zmq.Context[_Socket]()
         self._commands_at = f"tcp://{place.far}:{place.port}"
         pictures_at = f"tcp://{place.far}:{place.port + 1}"
         near, far = _SOCKETS[options.pattern]
@@ -151,7 +155,8 @@ class _Requests(_Sockets):
     def send(self, data: bytes) -> bool:
         if self._is_busy() or not super().send(data):
             return False
-        self._sent_at, self._data = time.monotonic(), data
+        self._sent_at = time.monotonic()
+        self._data = data
         return True
 
     @override

@@ -31,7 +31,8 @@ class Reno:
 
     def __init__(self, options: TcpOptions) -> None:
         self._start = float(options.initial_window)
-        self.window, self.threshold = self._start, inf
+        self.window = self._start
+        self.threshold = inf
 
     def grow(self, segments: int, now: float, ahead: float) -> None:
         """Segments have been delivered while the window was in use.
@@ -94,7 +95,8 @@ class Cubic(Reno):
     @override
     def reduce(self, now: float) -> float:
         # With fast convergence (RFC 9438, section 4.7).
-        self._epoch, self._saved = -1.0, 0
+        self._epoch = -1.0
+        self._saved = 0
         whole = float(int(self.window))
         falling = whole < self._peak
         self._peak = float(int(whole * (1 + self.BACKOFF) / 2)) if falling else whole
@@ -133,7 +135,8 @@ class Cubic(Reno):
 
     def _begin(self, now: float) -> None:
         """A new epoch: where the curve has its inflection (RFC 9438, figure 2)."""
-        self._epoch, self._estimate = now, self.window
+        self._epoch = now
+        self._estimate = self.window
         self._plateau = max(self._peak, self.window)
         self._inflection = float(((self._plateau - self.window) / self.C) ** (1 / 3))
 
@@ -146,12 +149,17 @@ class HyStart:
     an eighth more (at least 4 ms, at most 16 ms) means that a queue has built up.
     """
 
-    SAMPLES, LOW_WINDOW, LEAST, MOST = 8, 16, 0.004, 0.016
+    SAMPLES = 8
+    LOW_WINDOW = 16
+    LEAST = 0.004
+    MOST = 0.016
 
     __slots__ = ("_count", "_end", "_shortest")
 
     def __init__(self) -> None:
-        self._end, self._count, self._shortest = -1, 0, inf
+        self._end = -1
+        self._count = 0
+        self._shortest = inf
 
     def ends(self, window: float, rtt: float, minimum: float, acknowledged: int, sent: int) -> bool:
         """Return True if slow start should end.
@@ -169,7 +177,9 @@ class HyStart:
             verdict = self._count == self.SAMPLES and self._grown(minimum)
             self._count = min(self._count + 1, self.SAMPLES)
         if acknowledged > self._end:
-            self._end, self._count, self._shortest = sent, 0, inf
+            self._end = sent
+            self._count = 0
+            self._shortest = inf
         return verdict
 
     def _grown(self, minimum: float) -> bool:
@@ -212,7 +222,8 @@ class RateReduction:
     __slots__ = ("_at_start", "_delivered", "_threshold", "sent")
 
     def __init__(self, threshold: float, in_flight: int) -> None:
-        self._threshold, self._at_start = threshold, max(1, in_flight)
+        self._threshold = threshold
+        self._at_start = max(1, in_flight)
         self._delivered = self.sent = 0
 
     def allows(self, delivered: int, in_flight: int, advanced: bool) -> int:

@@ -60,8 +60,11 @@ class TcpConnection:
         opener: TcpOptions | None = None,
         peer: TcpOptions | None = None,
     ) -> None:
-        self._clock, self._out, self._back = clock, out, back
-        self._options, peer = opener or TcpOptions(), peer or TcpOptions()
+        self._clock = clock
+        self._out = out
+        self._back = back
+        self._options = opener or TcpOptions()
+        peer = peer or TcpOptions()
         self.opener = TcpEndpoint(clock, self._options, out)
         self.peer = TcpEndpoint(clock, peer, back, self._accept)
         self.opener.join(self.peer)
@@ -77,7 +80,8 @@ class TcpConnection:
         self, then: Callable[[], object], accepted: Callable[[], object] | None = None
     ) -> None:
         """Shake hands: `then()` when the opener may write, `accepted()` when the peer may."""
-        self._then, self._accepted = then, accepted or _nothing
+        self._then = then
+        self._accepted = accepted or _nothing
         if self._options.handshake:
             self._ask()
         else:
@@ -94,7 +98,8 @@ class TcpConnection:
 
     def _ask(self) -> None:
         """Send the opening segment, again and again."""
-        tried, linear = self._asked, self._options.syn_linear
+        tried = self._asked
+        linear = self._options.syn_linear
         if self.opener.gone:
             return
         if tried > self._options.syn_retries + linear:

@@ -44,7 +44,9 @@ class TcpEndpoint:
         link: Link,
         greet: Callable[[], object] = _nothing,
     ) -> None:
-        self._clock, self._link, self._greet = clock, link, greet
+        self._clock = clock
+        self._link = link
+        self._greet = greet
         self._headers = options.headers
         self.on_readable: Callable[[], object] = _nothing
         self.on_writable: Callable[[], object] = _nothing
@@ -148,7 +150,9 @@ class TcpEndpoint:
             if end > start:
                 self.refuse()
             return
-        now, receiver, sender = self._clock.now, self._receiver, self.sender
+        now = self._clock.now
+        receiver = self._receiver
+        sender = self.sender
         if stamp > receiver.stamp and start <= receiver.acknowledged:
             receiver.stamp = stamp
         fresh = end > start and receiver.take(start, end, now, pushes)

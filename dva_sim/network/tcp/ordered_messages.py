@@ -26,8 +26,11 @@ class OrderedMessages:
     def __init__(
         self, writer: TcpEndpoint, reader: TcpEndpoint, deliver: Callable[[Any], object]
     ) -> None:
-        self._writer, self._reader, self._deliver = writer, reader, deliver
-        self._read, self._ends_at = 0, 0
+        self._writer = writer
+        self._reader = reader
+        self._deliver = deliver
+        self._read = 0
+        self._ends_at = 0
         self._ends: deque[tuple[int, Any]] = deque()  # of the messages under way
         self._is_open = False
         self.waiting = 0

@@ -56,7 +56,9 @@ class Receiver:
         times: RoundTrip,
         acknowledge: Callable[[], object],
     ) -> None:
-        self._clock, self._options, self._times = clock, options, times
+        self._clock = clock
+        self._options = options
+        self._times = times
         self._acknowledge = acknowledge
         self.next = self.read_to = self.acknowledged = 0
         self._automatic = options.receive_buffer is None
@@ -68,7 +70,8 @@ class Receiver:
         self.duplicate = self.urgent = self.dialogue = False
         self.stamp = 0.0
         self.pending = 0
-        self._quick, self._last_data = 0, -inf
+        self._quick = 0
+        self._last_data = -inf
         self._patience = options.delayed_ack
         self._largest = 536  # segment seen [B]; RFC 9293's default to start with
         self._pushed = 0  # segments that are small or have PSH, not acknowledged
@@ -130,7 +133,9 @@ class Receiver:
             self.dialogue = True
         if self.pending and self._quick:
             self._quick -= 1
-        self.pending, self.urgent, self.duplicate = 0, False, False
+        self.pending = 0
+        self.urgent = False
+        self.duplicate = False
         self._pushed = 0
         self.acknowledged = self.next
         self.edge = max(self.edge, self.read_to + self._window)
@@ -143,7 +148,8 @@ class Receiver:
     def _waited(self) -> None:
         """Nothing came to ride on."""
         if self.dialogue:
-            self.dialogue, self._patience = False, self._options.delayed_ack
+            self.dialogue = False
+            self._patience = self._options.delayed_ack
         else:
             self._patience = min(2 * self._patience, self._times.timeout)
         if self.pending:
@@ -151,7 +157,8 @@ class Receiver:
 
     def _reopened(self) -> bool:
         """Return True if the window at least doubled, by a segment (RFC 9293, 3.8.6.2.2)."""
-        before, after = self.edge - self.next, self.read_to + self._window - self.next
+        before = self.edge - self.next
+        after = self.read_to + self._window - self.next
         least = min(self._options.mss, self._window // 2)
         return after >= 2 * before and after - before >= least
 
@@ -173,7 +180,8 @@ class Receiver:
 
     def _note_rhythm(self, now: float) -> None:
         """Note how soon the next data can be expected."""
-        gap, base = now - self._last_data, self._options.delayed_ack
+        gap = now - self._last_data
+        base = self._options.delayed_ack
         self._last_data = now
         if gap > self._times.timeout:
             self._quick = QUICK
@@ -183,8 +191,10 @@ class Receiver:
             self._patience = min(self._patience / 2 + gap, self._times.timeout)
 
     def _hurry(self) -> None:
-        self.urgent, self.dialogue = True, False
-        self._quick, self._patience = QUICK, self._options.delayed_ack
+        self.urgent = True
+        self.dialogue = False
+        self._quick = QUICK
+        self._patience = self._options.delayed_ack
 
     def _keep(self, start: int, end: int) -> None:
         """Put bytes that came too early first among the blocks, with those they touch."""
@@ -193,7 +203,8 @@ class Receiver:
             if last < start or first > end:
                 apart.append((first, last))
             else:
-                start, end = min(start, first), max(end, last)
+                start = min(start, first)
+                end = max(end, last)
         self.blocks = [(start, end), *apart]
 
     def _absorb(self) -> None:

@@ -49,10 +49,14 @@ class ByTime:
 
     def __init__(self, times: RoundTrip) -> None:
         self._times = times
-        self._latest, self._latest_end, self._furthest = -1.0, 0, 0
+        self._latest = -1.0
+        self._latest_end = 0
+        self._furthest = 0
         self.round_trip = 0.0
         self._reordering = False
-        self._steps, self._persist, self._duplicate_round = 1, 0, -1
+        self._steps = 1
+        self._persist = 0
+        self._duplicate_round = -1
 
     def delivered(self, sent: SentSegment, now: float, echo: float) -> None:
         """Learn from a segment acknowledged at `now` [s] with a time stamp's `echo` [s]."""
@@ -68,7 +72,8 @@ class ByTime:
                 return  # an earlier sending of it has arrived
         self.round_trip = taken
         if (sent.sent_at, sent.end) > (self._latest, self._latest_end):
-            self._latest, self._latest_end = sent.sent_at, sent.end
+            self._latest = sent.sent_at
+            self._latest_end = sent.end
 
     def needless(self, acknowledged: int, next_byte: int) -> None:
         """A segment arrived twice: widen the window, once per round trip."""
@@ -98,7 +103,9 @@ class ByTime:
             How long until the next one would be [s]; 0 if none is in doubt.
         """
         patience = self.round_trip + self.reordering_window(board, recovering)
-        latest, latest_end, wait = self._latest, self._latest_end, 0.0
+        latest = self._latest
+        latest_end = self._latest_end
+        wait = 0.0
         for sent in board.queue:
             if sent.sacked or (sent.lost and not sent.resent):
                 continue
@@ -144,7 +151,9 @@ class ByCount(ByTime):
                 board.mark_lost(sent)
 
 
-OPEN, RECOVERY, LOSS = "open", "recovery", "loss"
+OPEN = "open"
+RECOVERY = "recovery"
+LOSS = "loss"
 
 
 class Recovery:
@@ -181,14 +190,19 @@ class Recovery:
     def __init__(
         self, options: TcpOptions, times: RoundTrip, window: Reno, board: Scoreboard
     ) -> None:
-        self._window, self._board = window, board
-        self._limited, self._undo = options.congestion_window, options.undo
+        self._window = window
+        self._board = board
+        self._limited = options.congestion_window
+        self._undo = options.undo
         self.losses = ByTime(times) if options.rack else ByCount(times)
-        self.state, self._until, self._timed_out = OPEN, 0, -1
+        self.state = OPEN
+        self._until = 0
+        self._timed_out = -1
         self._before = window.window, window.threshold
         self._first_repeat: float = inf
         self._reduction = RateReduction(0.0, 0)
-        self.probe_end, self._probe_repeats = -1, False
+        self.probe_end = -1
+        self._probe_repeats = False
 
     def repeated(self, now: float) -> None:
         """A segment held to be lost is sent again at `now` [s]."""
@@ -209,7 +223,8 @@ class Recovery:
 
     def probed(self, end: int, repeats: bool) -> None:
         """A tail-loss probe has been sent, up to byte `end`, new or again."""
-        self.probe_end, self._probe_repeats = end, repeats
+        self.probe_end = end
+        self._probe_repeats = repeats
 
     def judge_probe(self, now: float, acknowledged: int, news: bool, duplicate: bool) -> None:
         """Did the probe mend a loss by itself? RFC 8985, section 7.4.
@@ -279,14 +294,17 @@ class Recovery:
             self._begin(LOSS, next_byte)
             self._window.reduce(now)
         self._timed_out = first
-        self.state, self._until = LOSS, next_byte
+        self.state = LOSS
+        self._until = next_byte
         self.losses.on_timeout(self._board, now)
         if self._limited:
             self._window.window = float(self._board.in_flight + 1)
 
     def _begin(self, state: str, next_byte: int) -> None:
         self._before = self._window.window, self._window.threshold
-        self.state, self._until, self.probe_end = state, next_byte, -1
+        self.state = state
+        self._until = next_byte
+        self.probe_end = -1
         board = self._board
         if not (board.resent or board.queue[0].repeated):
             self._first_repeat = inf  # otherwise the one of the recovery before still counts

@@ -79,7 +79,8 @@ class RoundTrip:
             self.variance = self._largest = max(self._variation, self._floor)
             self._round_end = sent
         spread = 4 * self.variance if self._options.rtt_variance else self._options.min_rto
-        timeout, tick = min(self.smoothed + spread, self._options.max_rto), self._options.tick
+        timeout = min(self.smoothed + spread, self._options.max_rto)
+        tick = self._options.tick
         self.timeout = ceil(timeout / tick - 1e-6) * tick if tick else timeout
 
     def shortest(self, rtt: float) -> None:
@@ -101,7 +102,8 @@ class RoundTrip:
         self.variance = max(self.variance, self._largest)
         if acknowledged > self._round_end:
             self.variance -= (self.variance - self._largest) / 4
-            self._round_end, self._largest = sent, self._floor
+            self._round_end = sent
+            self._largest = self._floor
 
 
 _SLACK_S = 1e-6  # the clock counts whole microseconds
@@ -124,7 +126,9 @@ class Timer:
     __slots__ = ("_action", "_clock", "_due", "_tick", "deadline")
 
     def __init__(self, clock: Clock, action: Callable[[], object], tick: float = 0.0) -> None:
-        self._clock, self._action, self._tick = clock, action, tick
+        self._clock = clock
+        self._action = action
+        self._tick = tick
         self.deadline = self._due = inf
 
     def set(self, deadline: float) -> None:
@@ -162,7 +166,8 @@ def next_on_grid(now: float, wait: float, tick: float) -> float:
     The time is rounded down and the wait up to ticks; the ring is then the next one of the
     wheel, never this one.
     """
-    ticks, step = ceil(wait / tick - 1e-6), 1
+    ticks = ceil(wait / tick - 1e-6)
+    step = 1
     due = int(now / tick + 1e-6) + ticks
     while ticks >= _INNERMOST * step:
         step *= _COARSER
@@ -171,7 +176,10 @@ def next_on_grid(now: float, wait: float, tick: float) -> float:
 
 SOONEST_S = 0.002
 """Time that Linux adds to the waits for a probe and for a segment in doubt (TCP_TIMEOUT_MIN)."""
-TIMEOUT, PROBE, REORDER, WINDOW = "timeout", "probe", "reorder", "window"
+TIMEOUT = "timeout"
+PROBE = "probe"
+REORDER = "reorder"
+WINDOW = "window"
 
 
 class Alarm:
@@ -195,9 +203,11 @@ class Alarm:
     def __init__(
         self, clock: Clock, options: TcpOptions, times: RoundTrip, ring: Callable[[], object]
     ) -> None:
-        self._options, self._times = options, times
+        self._options = options
+        self._times = times
         self._timer = Timer(clock, ring, options.tick)
-        self.kind, self.back_off = TIMEOUT, 0
+        self.kind = TIMEOUT
+        self.back_off = 0
         self._timeout_at = self.doubt = 0.0
 
     def timeout(self) -> float:
@@ -206,7 +216,6 @@ class Alarm:
 
     def stop(self) -> None:
         """Wait for nothing."""
-        self.kind = TIMEOUT
         self._timer.stop()
 
     def restart(self, now: float) -> None:
@@ -243,9 +252,11 @@ class Alarm:
             self._timeout_at = now + self.timeout()
         elif self.kind != TIMEOUT or self._timer.deadline == inf:
             self._timeout_at = board.queue[0].sent_at + self.timeout()
-        self.kind, at = TIMEOUT, self._timeout_at
+        self.kind = TIMEOUT
+        at = self._timeout_at
         if self.doubt and self.doubt < at:
-            self.kind, at = REORDER, self.doubt
+            self.kind = REORDER
+            at = self.doubt
         elif probing and (advanced or fresh):
             self.kind, at = PROBE, min(at, now + self._probe_time(len(board.queue)))
         self._timer.set(max(at, now))

@@ -77,7 +77,8 @@ class SendBuffer:
 
     def take(self, count: int) -> int:
         """Charge up to `count` bytes [B]; returns how many found room."""
-        waiting, taken = self._waiting, 0
+        waiting = self._waiting
+        taken = 0
         if waiting and waiting[-1] < self._packet:
             taken = min(count, self._packet - waiting[-1])
             waiting[-1] += taken
@@ -92,7 +93,9 @@ class SendBuffer:
 
     def depart(self, size: int) -> int:
         """A segment of `size` bytes [B] leaves: what it is charged until it is acknowledged [B]."""
-        waiting, left, packets = self._waiting, size, 0
+        waiting = self._waiting
+        left = size
+        packets = 0
         while waiting and left >= waiting[0]:
             left -= waiting.popleft()
             packets += 1
@@ -156,7 +159,10 @@ class SentSegment:
     def __init__(
         self, start: int, end: int, sent_at: float, charge: int, pushes: bool = True
     ) -> None:
-        self.start, self.end, self.sent_at, self.charge = start, end, sent_at, charge
+        self.start = start
+        self.end = end
+        self.sent_at = sent_at
+        self.charge = charge
         self.pushes = pushes
         self.repeated = self.sacked = self.lost = self.resent = False
 
@@ -206,7 +212,9 @@ class Scoreboard:
 
     def take(self, acknowledged: int, blocks: tuple[tuple[int, int], ...]) -> Gain:
         """Remove what is acknowledged in order, mark what is acknowledged selectively."""
-        gain, queue, count = Gain(), self.queue, 0
+        gain = Gain()
+        queue = self.queue
+        count = 0
         for sent in queue:
             if sent.end > acknowledged:
                 break
@@ -240,14 +248,16 @@ class Scoreboard:
 
         One that probes for a tail loss is not counted in flight once more, as in Linux.
         """
-        sent.repeated, sent.sent_at = True, now
+        sent.repeated = True
+        sent.sent_at = now
         if not (sent.resent or probes):
             sent.resent = True
             self.resent += 1
 
     def merge(self, index: int, mss: int) -> int:
         """Let a segment swallow its small neighbours behind it: the charge set free [B]."""
-        sent, free = self.queue[index], 0
+        sent = self.queue[index]
+        free = 0
         while index + 1 < len(self.queue):
             other = self.queue[index + 1]
             if other.sacked or other.end - sent.start > mss:
@@ -284,6 +294,8 @@ class Scoreboard:
             if sent.start >= start and sent.end <= end and not sent.sacked:
                 self.lost -= sent.lost
                 self.resent -= sent.resent
-                sent.sacked, sent.lost, sent.resent = True, False, False
+                sent.sacked = True
+                sent.lost = False
+                sent.resent = False
                 self.sacked += 1
                 gain.delivered.append(sent)

@@ -51,7 +51,10 @@ class Sender:
     def __init__(
         self, clock: Clock, options: TcpOptions, emit: Emit, give_up: Callable[[], object]
     ) -> None:
-        self._clock, self._options, self._emit, self._give_up = clock, options, emit, give_up
+        self._clock = clock
+        self._options = options
+        self._emit = emit
+        self._give_up = give_up
         self.total = self.next = self.first = self.edge = 0
         self.end_mark: float = inf
         self.segments = self.retransmitted = self.timeouts = self.tail_probes = 0
@@ -63,9 +66,12 @@ class Sender:
         self._hystart = HyStart()
         self._alarm = Alarm(clock, options, self.times, self._ring)
         self._unanswered = 0
-        self._nodelay, self._small_end = options.nodelay, 0
+        self._nodelay = options.nodelay
+        self._small_end = 0
         self._last_sent = 0.0
-        self._window_used, self._most_out, self._use_round = False, 0, 0
+        self._window_used = False
+        self._most_out = 0
+        self._use_round = 0
 
     def established(self, round_trip: float | None, repeated: int, edge: int) -> None:
         """The opening is over: its round trip [s] if one was measured, its repetitions."""
@@ -142,8 +148,10 @@ class Sender:
     def _digest(
         self, now: float, acknowledged: int, blocks: Blocks, duplicate: bool, echo: float
     ) -> None:
-        board, recovery = self.board, self.recovery
-        gain, advanced = board.take(acknowledged, blocks), acknowledged > self.first
+        board = self.board
+        recovery = self.recovery
+        gain = board.take(acknowledged, blocks)
+        advanced = acknowledged > self.first
         if advanced:
             self.first = acknowledged
             self.buffer.release(gain.released)
@@ -157,7 +165,8 @@ class Sender:
             recovery.judge_probe(now, acknowledged, advanced or bool(blocks), duplicate)
         if advanced:
             recovery.progress(acknowledged, echo)
-        lost, self._alarm.doubt = board.lost, 0.0
+        lost = board.lost
+        self._alarm.doubt = 0.0
         if board.sacked or gain.ambiguous or recovery.state != OPEN:
             self._alarm.doubt = recovery.find(now, self.next)
         if not recovery.hold(len(gain.delivered), advanced and board.lost <= lost) and advanced:
@@ -218,7 +227,8 @@ class Sender:
             self._repeat_lost(now)
         if self.total == self.next:
             return
-        room, mss = int(self.window.window) - self.board.in_flight, self._options.mss
+        room = int(self.window.window) - self.board.in_flight
+        mss = self._options.mss
         edge = self.edge + (self.end_mark < inf)  # the end itself takes no room
         while room > 0 and self.next < self.total:
             end = min(self.next + mss, self.total)
@@ -239,10 +249,13 @@ class Sender:
         out = len(self.board.queue)
         fuller = not self._window_used and out > self._most_out
         if used or fuller or self.first >= self._use_round:
-            self._window_used, self._most_out, self._use_round = used, out, self.next
+            self._window_used = used
+            self._most_out = out
+            self._use_round = self.next
 
     def _send(self, end: int, now: float) -> None:
-        start, self.next = self.next, end
+        start = self.next
+        self.next = end
         if end - start < self._options.mss:
             self._small_end = end
         charge = self.buffer.depart(end - start)
@@ -251,7 +264,8 @@ class Sender:
         self._leave(sent, now)
 
     def _repeat_lost(self, now: float) -> None:
-        queue, index = self.board.queue, 0
+        queue = self.board.queue
+        index = 0
         room = int(self.window.window) - self.board.in_flight
         while index < len(queue) and room > 0:
             if queue[index].lost and not queue[index].resent:
@@ -291,7 +305,8 @@ class Sender:
         return quiet and self._options.tail_probe
 
     def _ring(self) -> None:
-        now, kind = self._clock.now, self._alarm.kind
+        now = self._clock.now
+        kind = self._alarm.kind
         if kind == REORDER:
             self._doubt_over(now)
         elif kind == PROBE:

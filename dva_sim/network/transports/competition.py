@@ -26,7 +26,7 @@ from dva_sim.kernel.config import Config, Key
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Direction, Link, LinkConfig, Serialiser
 from dva_sim.network.tcp import TcpConnection
-from dva_sim.network.transports.config import Rtnp, TransportConfig, Udp
+from dva_sim.network.transports.config import Datagrams, TransportConfig, Udp
 from dva_sim.network.transports.interface import Ends, TransportMessage, TransportSession
 from dva_sim.network.transports.sessions import open_session
 
@@ -64,7 +64,8 @@ class Bottleneck:
     """
 
     def __init__(self, config: BottleneckConfig, streams: Streams) -> None:
-        self._config, self._streams = config, streams
+        self._config = config
+        self._streams = streams
         self._link = LinkConfig(
             delay_s=config.delay_s,
             loss=config.loss,
@@ -94,7 +95,8 @@ class SharedLine(Serialiser):
     """
 
     def __init__(self, rate_bps: float) -> None:
-        self.rate_bps, self._line = rate_bps, ConstantRate(rate_bps)
+        self.rate_bps = rate_bps
+        self._line = ConstantRate(rate_bps)
         self._ends: deque[float] = deque()
 
     @override
@@ -131,8 +133,10 @@ class Passing(Serialiser):
     """
 
     def __init__(self, line: SharedLine, rate_bps: float) -> None:
-        self.rate_bps, self._line = rate_bps, line
-        self._seconds_per_byte, self._free_at = 8.0 / rate_bps, 0.0
+        self.rate_bps = rate_bps
+        self._line = line
+        self._seconds_per_byte = 8.0 / rate_bps
+        self._free_at = 0.0
 
     @override
     def backlog_bytes(self, now: float) -> float:
@@ -253,7 +257,7 @@ class Fates:
     arrived: list[float] = field(default_factory=list)
     crucial: list[bool] = field(default_factory=list)
 
-    def add(self, now: float, crucial: bool) -> int:
+    def add(self, now: float, *, crucial: bool = False) -> int:
         """A new message; its number."""
         self.made.append(now)
         self.arrived.append(math.inf)
@@ -290,9 +294,11 @@ def play(config: ContestConfig, seed: int) -> Contest:
         config: Senders, receivers and link.
         seed: Seed of start times and of the link's random numbers.
     """
-    clock, streams = Clock(), Streams(seed)
+    clock = Clock()
+    streams = Streams(seed)
     bottleneck = Bottleneck(config.bottleneck, streams)
-    commands, pictures = Fates(), Fates()
+    commands = Fates()
+    pictures = Fates()
 
     def applied(number: int) -> None:
         commands.arrived[number] = clock.now
@@ -353,11 +359,11 @@ def _feed(
 
     def command() -> None:
         crucial = every > 0 and len(commands.made) % every == every - 1
-        number = commands.add(clock.now, crucial)
+        number = commands.add(clock.now, crucial=crucial)
         session.command(TransportMessage(number, config.commands.bytes, crucial))
 
     def picture() -> None:
-        number = pictures.add(clock.now, crucial=False)
+        number = pictures.add(clock.now)
         session.picture(TransportMessage(number, config.pictures.bytes))
 
     for action, rate in ((command, config.commands.rate_hz), (picture, config.pictures.rate_hz)):
@@ -375,6 +381,7 @@ def ends_at(
     on_picture: Callable[[int], object],
 ) -> Ends:
     """Return the two links of a session, with priority at the hosts if it has that."""
-    first = isinstance(config, Rtnp)
-    up, down = bottleneck.link(NAME, "up", first), bottleneck.link(NAME, "down", first)
+    first = isinstance(config, Datagrams) and config.priority
+    up = bottleneck.link(NAME, "up", first)
+    down = bottleneck.link(NAME, "down", first)
     return Ends(up, down, on_command, on_picture)

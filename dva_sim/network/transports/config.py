@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dva_sim.kernel.config import Config
 
@@ -24,102 +24,59 @@ class Udp(Config):
     kind: Literal["udp"] = "udp"
 
 
-class Rtnp(Config):
-    """In the manner of RTNP: every message at once, with priority at the end hosts.
+class Datagrams(Config):
+    """Datagrams over UDP, with a rate, repeats and priority as configured.
 
-    **What could be read**: that it is a transport for teleoperation which gives real-time data
-    priority from end to end (the dissertation); of a network for bilateral robot control by the
-    same authors, that it is made for hard real time, with a device and message handler of its own.
-    **The gap**: its formats, its priorities, and what processing at its hosts costs.
-    **Simplification**: one priority, strict but not preemptive, in the queue of the end hosts; a
-    queue in the network knows nothing of it.
+    Four published transports are configurations of it, **in the manner of** their papers, of which
+    only abstracts and descriptions by others could be read. Aims are the papers', laws and numbers
+    are not: the additive law stands in for each law of rate.
+
+    ========= =========================================== =====================================
+    name      what could be read                          configuration
+    ========= =========================================== =====================================
+    RTNP      priority for real-time data, end to end     `priority`
+    IRTP      error control for crucial messages, rate    `increase`, `decrease`,
+              control for the rest                        `repeats_crucial`
+    Trinomial a rate with three terms, TCP-friendly       `increase`, `decrease`
+    BTP       least round trip and gap between arrivals   `increase`, `decrease`, `tolerance_s`
+    ========= =========================================== =====================================
 
     Attributes:
-        header_bytes: Header besides IP and UDP, in each datagram.
+        header_bytes: Header besides IP and UDP, in each datagram and acknowledgement.
+        increase: Datagrams per round trip, with each round trip; None: every message at once.
+        decrease: Share of the rate that a loss costs.
+        tolerance_s: Queueing in the round trip beyond which it counts as a loss; None: any.
+        repeats_crucial: True to send crucial messages again until they have arrived.
+        priority: True if the end hosts send its packets first. A queue in the network knows nothing
+            of it.
 
     References:
         Y. Uchimura, T. Yakoh: Bilateral robot system on the real-time network structure. IEEE
-        Transactions on Industrial Electronics 51(5), 2004 (from memory, not read).
-        Y. Uchimura, N. Yamasaki, T. Yakoh, K. Ohnishi: Real-time network system by responsive
-        processor and its application to bilateral robot control. Transactions of the SICE E-4(1),
-        2005 (only its beginning could be read).
-        J. Lee, S. Payandeh, L. Trajkovic: Performance evaluation of transport protocols for
-        Internet-based teleoperation systems (names RTNP, IRTP and ETP; only its beginning read).
-    """
-
-    kind: Literal["rtnp"]
-    header_bytes: Header
-
-
-class Trinomial(Config):
-    """In the manner of the trinomial protocol: see `laws.ThreeTerms`.
-
-    Each direction is a flow of its own, and each of its datagrams is acknowledged by one.
-
-    Attributes:
-        header_bytes: Header besides IP and UDP, in each datagram and acknowledgement.
-        linear: Datagrams per round trip, with each round trip since the last loss.
-        square: Datagrams per round trip, with the square of that number.
-        decrease: Share of the rate that a loss costs.
-    """
-
-    kind: Literal["trinomial"]
-    header_bytes: Header
-    linear: Annotated[float, Field(ge=0, le=100)]
-    square: Annotated[float, Field(ge=0, le=100)]
-    decrease: Share
-
-
-class Irtp(Config):
-    """In the manner of IRTP: error control for crucial data, rate control for the rest.
-
-    Crucial messages go at once, and again until they have arrived; the others are sent as often as
-    a law of additive increase and multiplicative decrease lets them, and never again.
-
-    **What could be read**: that data of a teleoperation are either crucial, for which loss must be
-    low, or real-time, for which delay and jitter must be; that one protocol reconfigures itself for
-    both; that it is connection-oriented over IP, with error control for the crucial, rate control
-    for the real-time data, and small headers (the dissertation).
-    **The gap**: its law of rate (that of `laws.Aimd` stands in), its way of error control (TCP's
-    time-out and reordering threshold stand in), and the size of its header.
-    **Simplifications**: no handshake; it runs over UDP here, not over IP.
-
-    Attributes:
-        header_bytes: Header besides IP and UDP, in each datagram and acknowledgement.
-        increase: Datagrams per round trip, with each round trip.
-        decrease: Share of the rate that a loss costs.
-
-    References:
+        Transactions on Industrial Electronics 51(5), 2004 (from memory).
         Transport layer protocol reconfiguration for network-based robot control system. IEEE
-        Networking, Sensing and Control 2005 (only the abstract could be read, in which IRTP is not
-        named; that it is this paper is from memory).
+        Networking, Sensing and Control 2005 (IRTP, from memory).
+        P. X. Liu, M. Meng, X. Ye, J. Gu: An UDP-based protocol for Internet robots. World Congress
+        on Intelligent Control and Automation 2002, DOI 10.1109/WCICA.2002.1022068.
+        R. Wirz, R. Marin, M. Ferre, J. Barrio, J. M. Claver, J. Ortego: Bidirectional transport
+        protocol for teleoperated robots. IEEE Transactions on Industrial Electronics 56(9), 2009,
+        DOI 10.1109/TIE.2009.2025291.
     """
 
-    kind: Literal["irtp"]
+    kind: Literal["datagrams"]
     header_bytes: Header
-    increase: Positive
-    decrease: Share
+    increase: Positive | None = None
+    decrease: Share | None = None
+    tolerance_s: Positive | None = None
+    repeats_crucial: bool = False
+    priority: bool = False
 
-
-class Btp(Config):
-    """In the manner of BTP: see `laws.LeastRoundTrip`.
-
-    Both directions are one session: acknowledgements ride on the datagrams of the other.
-
-    Attributes:
-        header_bytes: Header besides IP and UDP, in each datagram, with the acknowledgements.
-        tolerance_s: Queueing in the round trip that is taken for none.
-        widen: Factor of the gap where there is more, or something is lost.
-        narrow: Divisor of the gap where there is not.
-        longest_gap_s: Between two datagrams.
-    """
-
-    kind: Literal["btp"]
-    header_bytes: Header
-    tolerance_s: Positive
-    widen: Annotated[float, Field(gt=1, le=10)]
-    narrow: Annotated[float, Field(gt=1, le=10)]
-    longest_gap_s: Positive
+    @model_validator(mode="after")
+    def _has_a_whole_law(self) -> Datagrams:
+        if (self.increase is None) != (self.decrease is None):
+            raise ValueError("should have both increase and decrease, or neither")
+        if self.increase is None and (self.repeats_crucial or self.tolerance_s is not None):
+            raise ValueError("repeats_crucial and tolerance_s need increase and decrease")
+        return self
 
 
 class Tcp(Config):
@@ -146,7 +103,5 @@ class Zeromq(Config):
     send_buffer_bytes: Buffer = None
 
 
-TransportConfig = Annotated[
-    Udp | Rtnp | Trinomial | Irtp | Btp | Tcp | Zeromq, Field(discriminator="kind")
-]
+TransportConfig = Annotated[Udp | Datagrams | Tcp | Zeromq, Field(discriminator="kind")]
 """Called with the number of a message once all of it has arrived."""

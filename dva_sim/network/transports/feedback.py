@@ -28,7 +28,8 @@ class RoundTrips:
 
     def __init__(self) -> None:
         self.smoothed: float | None = None
-        self._variation, self._backoff = 0.0, 1.0
+        self._variation = 0.0
+        self._backoff = 1.0
 
     @property
     def timeout(self) -> float:
@@ -41,7 +42,8 @@ class RoundTrips:
     def add(self, sample: float) -> None:
         """Learn from a round trip [s]."""
         if self.smoothed is None:
-            self.smoothed, self._variation = sample, 0.5 * sample
+            self.smoothed = sample
+            self._variation = 0.5 * sample
         else:
             self._variation += 0.25 * (abs(sample - self.smoothed) - self._variation)
             self.smoothed += 0.125 * (sample - self.smoothed)
@@ -62,7 +64,8 @@ class Feedback:
     """
 
     def __init__(self) -> None:
-        self.round_trips, self.lost = RoundTrips(), 0
+        self.round_trips = RoundTrips()
+        self.lost = 0
         self._pending: dict[int, float] = {}  # in order of sending
         self._passed_by: dict[int, int] = {}
         self._heard = 0.0

@@ -1,11 +1,65 @@
-"""Pace of the datagrams: a law of congestion control, and the round trips it goes by."""
+"""Pace of the datagrams: a law of rate, and the round trips it goes by."""
 
 from __future__ import annotations
 
+import math
+
 from dva_sim.network.transports.feedback import Feedback
-from dva_sim.network.transports.rate_control import RateLaw
 
 FIRST_FLIGHT = 10  # datagrams before the first answer: the initial window of RFC 6928
+
+
+class Aimd:
+    """Additive increase, multiplicative decrease of a rate; begins with one per round trip.
+
+    The rate r grows by `increase` datagrams per round trip with each round trip R, so
+    r <- r + increase / R, and gives up the share `decrease` at a loss, r <- (1 - decrease) r. With
+    increase 1 and decrease 0.5 this is RAP without its fine grain (from memory of the paper). It
+    never gives up the last datagram of a round trip. A rate that nobody used says nothing about the
+    network, so it does not grow while the gap holds nothing back (RFC 7661 gives the reason).
+
+    Args:
+        increase: Datagrams per round trip, with each round trip.
+        decrease: Share of the rate that a loss costs.
+        tolerance: Queueing in the round trip beyond which it counts as a loss [s].
+
+    References:
+        R. Rejaie, M. Handley, D. Estrin: RAP, an end-to-end rate-based congestion control mechanism
+        for realtime streams in the Internet. INFOCOM 1999.
+        D.-M. Chiu, R. Jain: Analysis of the increase and decrease algorithms for congestion
+        avoidance in computer networks. Computer Networks and ISDN Systems 17, 1989.
+    """
+
+    def __init__(self, increase: float, decrease: float, tolerance: float = math.inf) -> None:
+        self.increase = increase
+        self.decrease = decrease
+        self.tolerance = tolerance
+        self.rate = 0.0
+        self._least = math.inf
+        self._last = math.inf
+
+    @property
+    def gap(self) -> float:
+        """Least time between the starts of two datagrams [s]."""
+        return 1.0 / self.rate if self.rate else math.inf
+
+    def begin(self, round_trip: float) -> None:
+        """Take in the first round trip [s]."""
+        self.rate = 1.0 / round_trip
+        self._least = self._last = round_trip
+
+    def passed(self, round_trip: float, held: bool) -> None:
+        """Take in a round trip [s] without loss; `held`: the gap held something back in it."""
+        self._least = min(self._least, round_trip)
+        self._last = round_trip
+        if round_trip - self._least > self.tolerance:
+            self.lost()
+        elif held:
+            self.rate += self.increase / round_trip
+
+    def lost(self) -> None:
+        """Take in a loss; told once per round trip."""
+        self.rate = max((1.0 - self.decrease) * self.rate, 1.0 / self._last)
 
 
 class Pace:
@@ -19,10 +73,14 @@ class Pace:
         held: True if the gap has delayed a message since the round trip began.
     """
 
-    def __init__(self, law: RateLaw, feedback: Feedback) -> None:
-        self._law, self._feedback = law, feedback
-        self._begun, self._unanswered, self.held = False, 0, False
-        self._since, self._deaf_until = 0.0, 0.0
+    def __init__(self, law: Aimd, feedback: Feedback) -> None:
+        self._law = law
+        self._feedback = feedback
+        self._begun = False
+        self._unanswered = 0
+        self.held = False
+        self._since = 0.0
+        self._deaf_until = 0.0
 
     @property
     def gap(self) -> float:
@@ -37,11 +95,13 @@ class Pace:
 
     def heard(self, now: float) -> None:
         """An acknowledgement has come at `now` [s]; perhaps a round trip has passed."""
-        samples, smoothed = self._feedback.samples, self._feedback.round_trips.smoothed
+        samples = self._feedback.samples
+        smoothed = self._feedback.round_trips.smoothed
         if not samples or smoothed is None:
             return
         if not self._begun:
-            self._begun, self._since = True, now
+            self._begun = True
+            self._since = now
             self._law.begin(samples[0])
         elif now - self._since >= smoothed:
             self._law.passed(sum(samples) / len(samples), self.held)
@@ -56,4 +116,5 @@ class Pace:
 
     def _restart(self, now: float) -> None:
         self._feedback.samples.clear()
-        self._since, self.held = now, False
+        self._since = now
+        self.held = False

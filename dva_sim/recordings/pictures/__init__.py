@@ -1,4 +1,4 @@
-"""Pictures of runs: films, stills and strips from above, and what a robot's camera sees."""
+"""Pictures of runs: films and stills from above, and what a robot's camera sees."""
 
 from dva_sim.recordings.pictures.requests import Wanted, joined
 

@@ -38,8 +38,10 @@ class DrawnBody:
     """
 
     def __init__(self, ax: Axes, moments: Moments, name: str) -> None:
-        self.name, self.kind = name, kind_of(name)
-        self._ax, self._moments = ax, moments
+        self.name = name
+        self.kind = kind_of(name)
+        self._ax = ax
+        self._moments = moments
         person = self.kind == BYSTANDER
         self._trail = LineCollection(
             [], linewidths=0.7 if person else 1.5, zorder=5, capstyle="round", animated=True

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-ROBOT, GUARD, BYSTANDER = "robot", "guard", "bystander"
+ROBOT = "robot"
+GUARD = "guard"
+BYSTANDER = "bystander"
 
 # What somebody is doing; what is not listed has the colour of its kind.
 ROBOT_MODES = {"Idle": "#8b95a1", "Mission": "#2f7fd0", "Teleoperation": "#7d2fb8"}

@@ -37,7 +37,8 @@ class DrawnFields:
     """
 
     def __init__(self, ax: Axes, moments: Moments) -> None:
-        self._ax, self._moments = ax, moments
+        self._ax = ax
+        self._moments = moments
         west, south, east, north = moments.recording.site.extent
         self._cell = max(CELL, ((east - west) * (north - south) / MOST_CELLS) ** 0.5)
         lower = _lower_limit(moments)
@@ -134,7 +135,8 @@ def _lower_limit(moments: Moments) -> float:
 
 def _over(upper: NDArray[Any], under: NDArray[Any]) -> NDArray[Any]:
     """One translucent picture over another `(rows, columns, 4)`."""
-    a, b = upper[..., 3:], under[..., 3:]
+    a = upper[..., 3:]
+    b = under[..., 3:]
     cover = a + b * (1 - a)
     colours = (upper[..., :3] * a + under[..., :3] * b * (1 - a)) / np.maximum(cover, 1e-6)
     return np.concatenate([colours, cover], axis=2)

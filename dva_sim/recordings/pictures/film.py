@@ -17,7 +17,6 @@ from dva_sim.recordings.pictures.moments import Moments
 from dva_sim.recordings.pictures.picture_layout import Sheet, heading_of
 from dva_sim.recordings.pictures.run_endings import pattern_name, verdicts
 from dva_sim.recordings.pictures.scene import Scene
-from dva_sim.recordings.pictures.traffic_strip import Traffic
 from dva_sim.simulation.full import Playback
 
 FPS = 8
@@ -27,7 +26,9 @@ GLANCES = 2  # pictures of a camera that a film shows in a second: more are no e
 DPI = 100
 TRAFFIC, EYE = 0.8, 1.5  # heights of what is below maps, without a camera's picture and with it
 # What is there: its place from the left and from the top, its width and height, as shares.
-ALONE, STRIP, SCREEN = (0.18, 0.0, 0.79, 0.68), (0.62, 0.12, 0.35, 0.65), (0.02, 0.12, 0.4, 0.84)
+ALONE = (0.18, 0.0, 0.79, 0.68)
+STRIP = (0.62, 0.12, 0.35, 0.65)
+SCREEN = (0.02, 0.12, 0.4, 0.84)
 
 
 class Film:
@@ -61,7 +62,8 @@ class Film:
         canvas.draw()
         for scene in scenes:
             scene.freeze(canvas)
-        self._canvas, self._background = canvas, canvas.copy_from_bbox(self.figure.bbox)
+        self._canvas = canvas
+        self._background = canvas.copy_from_bbox(self.figure.bbox)
 
     def __len__(self) -> int:
         return math.ceil(self.duration / self.speed * FPS) + round(HELD_S * FPS)
@@ -97,7 +99,8 @@ class _Eye:
     """
 
     def __init__(self, ax: Axes, moments: Moments, step: float) -> None:
-        self._moments, self._step = moments, step
+        self._moments = moments
+        self._step = step
         self._shown: tuple[str, float] | None = None  # which robot's picture, and of when [s]
         self._image = ax.imshow(np.zeros((240, 320, 3), np.uint8), animated=True)
         self._title = ax.set_title(" ", fontsize=style.FONT, loc="left")
@@ -115,12 +118,53 @@ class _Eye:
             time -= time % self._step
         glance = self._moments.glance(time)
         if glance is None:
-            robot, captured, title = robots[0], time, f"{robots[0]}'s camera"
+            robot = robots[0]
+            captured = time
+            title = f"{robots[0]}'s camera"
         else:
-            robot, captured = glance.robot, glance.captured
+            robot = glance.robot
+            captured = glance.captured
             title = f"{glance.operator}'s screen, {time - captured:.1f} s old"
         if self._shown != (robot, captured):
             self._image.set_data(self._moments.eye(robot, captured))
             self._shown = robot, captured
         self._title.set_text(title)
         return [self._image, self._title]
+
+
+WINDOW_S = 10.0
+
+
+class Traffic:
+    """Messages to the robots above the line, from them below.
+
+    Args:
+        ax: Axes to draw on.
+        moments: A run made with `keep_traffic`.
+    """
+
+    def __init__(self, ax: Axes, moments: Moments) -> None:
+        self._moments = moments
+        robots = set(moments.recording.radii)
+        traffic = moments.recording.recorder.traffic or []
+        up = np.array([sent.time for sent in traffic if sent.destination in robots])
+        down = np.array([sent.time for sent in traffic if sent.source in robots])
+        ax.set_xlim(-WINDOW_S, 0)
+        ax.set_ylim(-1, 1)
+        ax.set_yticks([0.5, -0.5], ["to robots", "from robots"], fontsize=style.FONT)
+        ax.set_xticks([-10, -5, 0], ["10 s ago", "5 s ago", "now"], fontsize=style.FONT)
+        ax.spines[["top", "right", "left"]].set_visible(False)
+        ax.axhline(0, color="0.7", lw=0.6)
+        ax.tick_params(length=0)
+        self._strips = [
+            (times, height, ax.vlines([], 0, height, color=colour, lw=0.7, animated=True))
+            for times, height, colour in ((up, 0.85, "#3f90da"), (down, -0.85, "0.55"))
+        ]
+
+    def show(self, time: float) -> list[Artist]:
+        """The strip at a moment [s]; after the end of the run its last one."""
+        time = self._moments.within(time)
+        for times, height, lines in self._strips:
+            inside = times[(times > time - WINDOW_S) & (times <= time)] - time
+            lines.set_segments([np.array([[x, 0.0], [x, height]]) for x in inside])
+        return [lines for *_, lines in self._strips]

@@ -72,13 +72,16 @@ class Moments:
 
     def past(self, name: str, time: float) -> list[TrackPoint]:
         """Return the track of an agent up to `time` [s]."""
-        track, index = self.tracks[name], bisect_right(self._times[name], time)
+        track = self.tracks[name]
+        index = bisect_right(self._times[name], time)
         return [*track[: max(1, index)], self.at(name, time)]
 
     def at(self, name: str, time: float) -> TrackPoint:
         """Return the position of an agent at `time` [s], interpolated between two samples."""
-        track, index = self.tracks[name], bisect_right(self._times[name], time)
-        before, after = track[max(0, index - 1)], track[min(index, len(track) - 1)]
+        track = self.tracks[name]
+        index = bisect_right(self._times[name], time)
+        before = track[max(0, index - 1)]
+        after = track[min(index, len(track) - 1)]
         gap = after.time - before.time
         share = (time - before.time) / gap if gap > 0 else 0.0
         turn = (after.heading - before.heading + math.pi) % (2 * math.pi) - math.pi
@@ -147,7 +150,8 @@ class Moments:
         return [self._figure(name, time) for name in others if self.is_there(name, time)]
 
     def _figure(self, name: str, time: float) -> Figure:
-        here, number = self.at(name, time), name.rpartition("-")[2]
+        here = self.at(name, time)
+        number = name.rpartition("-")[2]
         return Figure(
             kind_of(name),
             here.x,

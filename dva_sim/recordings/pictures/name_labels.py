@@ -55,7 +55,8 @@ class Names:
     """
 
     def __init__(self, ax: Axes, bodies: Sequence[DrawnBody]) -> None:
-        self._ax, self._bodies = ax, bodies
+        self._ax = ax
+        self._bodies = bodies
         self._fixed = [text for text in ax.texts if text.get_text()]
         halo = [withStroke(linewidth=2.2, foreground=style.HALO)]
         self._texts = {
@@ -97,7 +98,8 @@ class Names:
     ) -> Box:
         """Write a name where it is least in the way."""
         extent = text.get_window_extent(renderer)
-        mark, size = self._box_of(body.place(time), body.size()), (extent.width, extent.height)
+        mark = self._box_of(body.place(time), body.size())
+        size = (extent.width, extent.height)
         boxes = [_beside(mark, size, side) for side in SIDES]
         kept = self._side.get(body.name, 0)
         costs = [
@@ -116,7 +118,8 @@ class Names:
 
 def _beside(mark: Box, size: tuple[float, float], side: tuple[int, int]) -> Box:
     """A box of a size on one side of another."""
-    x, y = (mark.x0 + mark.x1) / 2, (mark.y0 + mark.y1) / 2
+    x = (mark.x0 + mark.x1) / 2
+    y = (mark.y0 + mark.y1) / 2
     half = (mark.x1 - mark.x0) / 2 + 1.5
     # At a corner it comes nearer, for a body is round.
     near = 0.75 if side[0] and side[1] else 1.0

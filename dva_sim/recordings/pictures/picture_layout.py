@@ -72,7 +72,8 @@ class Sheet:
     def below(self, column: int, left: float, top: float, width: float, height: float) -> Axes:
         """A part of what is left free below a column: its place and size, as shares of that."""
         begins, high = self._below
-        x, y = self._left(column) + left * self._across, begins + top * high
+        x = self._left(column) + left * self._across
+        y = begins + top * high
         return self._axes(x, y, width * self._across, height * high)
 
     def _left(self, column: int) -> float:
@@ -88,12 +89,14 @@ class Sheet:
 
     def _axes(self, left: float, top: float, width: float, height: float) -> Axes:
         """Axes by their place from the upper left corner."""
-        wide, high = WIDTH, self._height
+        wide = WIDTH
+        high = self._height
         box = left / wide, 1.0 - (top + height) / high, width / wide, height / high
         return self.figure.add_axes(box)
 
     def _add_heading(self, text: str) -> None:
-        x, y = MARGIN / WIDTH, 1.0 - MARGIN / self._height
+        x = MARGIN / WIDTH
+        y = 1.0 - MARGIN / self._height
         self.figure.text(x, y, text, va="top", fontsize=TITLE, color=INK)
 
 

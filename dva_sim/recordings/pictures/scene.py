@@ -44,7 +44,10 @@ class Scene:
         title: str = "",
         outlook: str | None = None,
     ) -> None:
-        self._ax, self._moments, self._verdict, self._outlook = ax, moments, verdict, outlook
+        self._ax = ax
+        self._moments = moments
+        self._verdict = verdict
+        self._outlook = outlook
         limits = self._draw_ground()
         names = moments.names(BYSTANDER, GUARD, ROBOT)
         self._fields = DrawnFields(ax, moments)
@@ -54,14 +57,16 @@ class Scene:
         self._clock = ax.set_title("", loc="right", fontsize=style.TITLE, pad=2)
         self._clock.set_animated(True)
         ax.set_title(title, fontsize=style.TITLE, fontweight="bold", loc="left", pad=2)
-        self._story_line, self._ended = self._line(), self._line(_colour_of(verdict))
+        self._story_line = self._line()
+        self._ended = self._line(_colour_of(verdict))
         self._ended.set(text=verdict.full_text, fontsize=style.FONT + 0.5)
         if len(verdict.full_text) * BOLD * style.TITLE < self._across():
             self._ended.set_fontsize(style.TITLE)
 
     def _draw_ground(self) -> tuple[Any, Any]:
         """The site; the limits of what is seen."""
-        ax, site = self._ax, self._moments.recording.site
+        ax = self._ax
+        site = self._moments.recording.site
         draw_site(ax, site, small_marks=points_per_metre(ax) > style.ROOMY, least=style.LEAST)
         # What hazards must not cover is drawn after them.
         self._upper: list[Any] = [

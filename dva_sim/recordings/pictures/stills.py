@@ -1,4 +1,4 @@
-"""Single pictures of runs: one moment, a strip of moments, a robot's-eye view."""
+"""Single pictures of runs: one moment, or a robot's-eye view."""
 
 from __future__ import annotations
 
@@ -18,31 +18,36 @@ DPI = 200
 
 
 def still(recordings: Sequence[Playback], time: float) -> Figure:
-    """Runs side by side at one moment [s]."""
-    return _sheet(recordings, [time], len(recordings))
+    """Draw runs side by side at one moment [s], and a key."""
+    runs = [Moments(recording) for recording in recordings]
+    several = len(runs) > 1
+    ends = verdicts(recordings)
+    sheet = Sheet(runs, len(runs), len(runs), heading_of(recordings), dpi=DPI)
+    scenes = []
+    for ax, run, end in zip(sheet.maps, runs, ends, strict=True):
+        title = pattern_name(run.recording) if several else sheet.title
+        scenes.append(Scene(ax, run, end, title, _outlook(end) if several else None))
+    sheet.figure.draw_without_rendering()  # names are placed when sizes are known
+    for scene in scenes:
+        scene.fix(time)
+    return sheet.figure
 
 
-def strip(recordings: Sequence[Playback], times: Sequence[float]) -> Figure:
-    """A run at several moments [s], from left to right and from top to bottom; of several runs
-    each has a column."""
-    count = len(recordings)
-    # Of a single run one column or two: more would be too small to read.
-    return _sheet(recordings, times, count if count > 1 else min(len(times), 2))
+def time_of_still(recordings: Sequence[Playback], at: float | None) -> float:
+    """Return the moment to draw [s].
 
+    By default, of one run its end, of several the moment when the first one is done.
 
-def best_time(recordings: Sequence[Playback]) -> float:
-    """The moment that shows most [s]: of one run its end, of several when the first one is done."""
+    Raises:
+        ConfigError: a moment before the beginning or after the end of all runs.
+    """
     ends = max(recording.duration for recording in recordings)
-    if len(recordings) == 1:
-        return ends
-    first = decided_at(verdicts(recordings))
+    if at is not None:
+        if not 0 <= at <= ends:
+            raise ConfigError(f"--at {at:g} is not within the run, which lasts {ends:.0f} s")
+        return at
+    first = decided_at(verdicts(recordings)) if len(recordings) > 1 else None
     return ends if first is None else first
-
-
-def even_times(recordings: Sequence[Playback], panels: int) -> list[float]:
-    """Moments spread evenly over the runs, the end among them [s]."""
-    ends = max(recording.duration for recording in recordings)
-    return [ends * (n + 1) / panels for n in range(panels)]
 
 
 def save_eye(recording: Playback, robot: str, time: float, path: Path) -> None:
@@ -54,35 +59,6 @@ def save_eye(recording: Playback, robot: str, time: float, path: Path) -> None:
     from PIL import Image
 
     Image.fromarray(Moments(recording).eye(robot, time, 640, 480)).save(path)
-
-
-def check_times(recordings: Sequence[Playback], times: Sequence[float]) -> None:
-    """Refuse moments that no run has.
-
-    Raises:
-        ConfigError: before the beginning or after the end.
-    """
-    ends = max(recording.duration for recording in recordings)
-    wrong = [time for time in times if not 0 <= time <= ends]
-    if wrong:
-        raise ConfigError(f"--at {wrong[0]:g} is not within the run, which lasts {ends:.0f} s")
-
-
-def _sheet(recordings: Sequence[Playback], times: Sequence[float], columns: int) -> Figure:
-    """All runs at all moments, and a key."""
-    runs = [Moments(recording) for recording in recordings]
-    several, ends = len(runs) > 1, verdicts(recordings)
-    panels = [(time, *each) for time in times for each in zip(runs, ends, strict=True)]
-    sheet = Sheet(runs, len(panels), columns, heading_of(recordings), dpi=DPI)
-    scenes = []
-    for ax, (_, run, end) in zip(sheet.maps, panels, strict=True):
-        title = pattern_name(run.recording) if several else sheet.title
-        outlook = _outlook(end) if several and len(times) == 1 else None
-        scenes.append(Scene(ax, run, end, title, outlook))
-    sheet.figure.draw_without_rendering()  # names are placed when sizes are known
-    for scene, (time, *_) in zip(scenes, panels, strict=True):
-        scene.fix(time)
-    return sheet.figure
 
 
 def _outlook(verdict: RunVerdict) -> str | None:

@@ -24,7 +24,9 @@ from dva_sim.recordings.pictures.colours import (
 )
 from dva_sim.recordings.pictures.moments import Moments
 
-INK, HALO, GHOST = "#2b3038", "white", "#e07a00"
+INK = "#2b3038"
+HALO = "white"
+GHOST = "#e07a00"
 WIDTH = 8.4  # of a picture [in]: a page shows 840 pixels of it
 FONT = 8.0  # of labels [points]: 11 pixels on such a page
 TITLE = 10.0  # [points]
@@ -63,7 +65,8 @@ def colour_of(kind: str, mode: str) -> str:
 
 def legend(moments: Iterable[Moments]) -> list[Artist]:
     """A key for what occurs in some runs."""
-    runs, handles = list(moments), []
+    runs = list(moments)
+    handles = []
     for kind in (ROBOT, GUARD, BYSTANDER):
         names = [(run, name) for run in runs for name in run.names(kind)]
         modes = {p.mode: None for run, name in names for p in run.tracks[name]}

@@ -75,7 +75,8 @@ def make_core(stage: Stage, permissions: Permissions) -> Dva:
         ConfigError: a policy that cannot be loaded.
     """
     dispatch = stage.scenario.dispatch
-    permissions.own, rate_hz = DVA, stage.scenario.dva.sensor_rate_hz
+    permissions.own = DVA
+    rate_hz = stage.scenario.dva.sensor_rate_hz
     policy = load_policy(dispatch.policy, dispatch.options)
     return Dva(
         policy,
@@ -193,7 +194,8 @@ def _patrols(stage: Stage) -> Patrols:
     Raises:
         ConfigError: a room that the site does not have, or a place where no robot fits.
     """
-    site, to_latlon = stage.site, stage.site.frame.to_latlon
+    site = stage.site
+    to_latlon = stage.site.frame.to_latlon
     beats: dict[str, tuple[m.Position, ...]] = {}
     for patrol in stage.scenario.patrols:
         if patrol.robot not in stage.labels.values():
@@ -253,7 +255,8 @@ def add_operator(
     Raises:
         ConfigError: the strategy needs the truth, and nobody can tell.
     """
-    scenario, config = stage.scenario, stage.scenario.operator
+    scenario = stage.scenario
+    config = stage.scenario.operator
     device = stage.device("operator", number)
     person = draw_person(population(config), config.population_seed, config.person + number - 1)
     strategy = load_strategy(config.strategy, config.options)

@@ -52,7 +52,8 @@ EVENT_COLUMNS = (
 
 def run_measures(recording: Recording) -> Row:
     """Return the measures of the whole run."""
-    facts, horizon = recording.facts, recording.scenario.horizon_s
+    facts = recording.facts
+    horizon = recording.scenario.horizon_s
     overrides = [fact for fact in facts if fact.overrides]
     orders = [fact for fact in facts if _is_order(fact) and fact.role is not None]
     costs = [cost for fact in overrides if (cost := _cost(fact)) is not None]

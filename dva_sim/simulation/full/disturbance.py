@@ -21,7 +21,9 @@ class Disturbance:
     """
 
     def __init__(self, stage: Stage, dva: DvaAgent, field: Field) -> None:
-        self._stage, self._dva, self._field = stage, dva, field
+        self._stage = stage
+        self._dva = dva
+        self._field = field
         self._config = stage.scenario.disturbance
         if self._config.kind == "take_over":
             self._other: AgentDevice = stage.device("operator", stage.scenario.operator.count + 1)
@@ -41,7 +43,8 @@ class Disturbance:
     def _disturb(self, drive: DriveLog) -> None:
         if drive.ended is not None:
             return
-        clock, recorder = self._stage.clock, self._stage.recorder
+        clock = self._stage.clock
+        recorder = self._stage.recorder
         drive.disturbed = clock.now
         recorder.tell(clock.now, "scenario", f"disturbs the drive: {self._config.kind}", "drive")
         if self._config.kind == "refuse":

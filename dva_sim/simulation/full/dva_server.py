@@ -19,8 +19,15 @@ from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.core.audit import MOST_KEPT, Fact
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import Event, State
-from dva_sim.core.registration_limit import BURST, RATE, RegistrationLimit
-from dva_sim.core.registry import CONTROL_ROOM, DETECTOR, GUARD, ROBOT
+from dva_sim.core.registry import (
+    BURST,
+    CONTROL_ROOM,
+    DETECTOR,
+    GUARD,
+    RATE,
+    ROBOT,
+    RegistrationLimit,
+)
 from dva_sim.core.sessions import Send
 from dva_sim.core.store import Store
 from dva_sim.network.messaging import Request, Subscription
@@ -57,15 +64,18 @@ class DvaAgent:
     def __init__(
         self, device: AgentDevice, core: Dva, memory: Store | None = None, keep_events: bool = True
     ) -> None:
-        self.device, self.core = device, core
+        self.device = device
+        self.core = core
         self.events: dict[int, Event] = {}
         self.facts: deque[Fact] = deque(maxlen=None if keep_events else MOST_KEPT)
         self.on_fact: Callable[[Fact], object] = self.facts.append
         self._asks = core.dispatcher.questions.asks
-        self._memory, self._keep_events = memory, keep_events
+        self._memory = memory
+        self._keep_events = keep_events
         self._last_reported: dict[int, State] = {}
         self._policy_failures = 0
-        self.leave_after, self.is_gone = device.timeout, False
+        self.leave_after = device.timeout
+        self.is_gone = False
         self._problem: str | None = None
         self._turned_away: OrderedDict[tuple[str, str], None] = OrderedDict()
         self.beats: Counter[str] = Counter()
@@ -87,7 +97,8 @@ class DvaAgent:
 
     def crash(self) -> None:
         """Be killed: nothing is said, kept or decided any more, and its memory is put away."""
-        self.is_gone, self.device.silent = True, True
+        self.is_gone = True
+        self.device.silent = True
         self.device.crash()
         for source in list(self._heard):
             self._leave(source)
@@ -120,7 +131,8 @@ class DvaAgent:
             takes: Device that gets it next, if any.
             notify_holder: True if the notice reaches the previous holder.
         """
-        sessions, entries = self.core.sessions, self.core.registry.entries
+        sessions = self.core.sessions
+        entries = self.core.registry.entries
         grant = sessions.permissions.grants.get(robot)
         if grant is None:
             return
@@ -161,7 +173,8 @@ class DvaAgent:
         """
         if not self._problem or isinstance(message.body, NOTHING_TO_KEEP):
             return reply
-        content, ends = reply.content, isinstance(message.body, m.PermissionRevocation)
+        content = reply.content
+        ends = isinstance(message.body, m.PermissionRevocation)
         if isinstance(content, m.Permission) and self._is_kept(content.session):
             return reply
         if reply.code != m.OK and not ends:
@@ -212,7 +225,8 @@ class DvaAgent:
 
         Detectors only speak when they have something to report.
         """
-        source, network = device.id_tag, self.device.network
+        source = device.id_tag
+        network = self.device.network
         self.device.introduce(source, device.address)
         if self._heard.get(source, ("", []))[0] == device.address:
             return
@@ -263,7 +277,9 @@ class DvaAgent:
 
     def _answered(self, send: Send, reply: m.Reply) -> None:
         # Whoever refuses to hear that something is over knows nothing of it: it is over there.
-        if reply.code == m.OK or isinstance(send.body, m.PermissionRevocation | m.OrderProgress):
+        # What arrived unreadable was not heard at all.
+        is_end = isinstance(send.body, m.PermissionRevocation | m.OrderProgress)
+        if reply.code == m.OK or (is_end and reply.code != m.BAD_MESSAGE):
             now = self.device.clock.now
             self._carry_out(self.core.delivered(send, now, reply.content))
         elif isinstance(send.body, m.PermissionGrant):
@@ -289,7 +305,9 @@ class DvaAgent:
 
     def _tell_control_rooms(self, changed: Iterable[Event]) -> None:
         """Publish what is new, if anybody is there who listens for it; facts are kept anyway."""
-        core, now, facts = self.core, self.device.clock.now, self.core.trail.take()
+        core = self.core
+        now = self.device.clock.now
+        facts = self.core.trail.take()
         for fact in facts:
             self.on_fact(fact)
         if not any(core.registry.of_type(CONTROL_ROOM)):
@@ -304,7 +322,8 @@ class DvaAgent:
 
     def _count_failures(self) -> None:
         """Count what a policy got wrong, and tell of the first time."""
-        failures, known = self.core.counters["policy failed"], self._policy_failures
+        failures = self.core.counters["policy failed"]
+        known = self._policy_failures
         if failures > known:
             self.device.recorder.counters["failed: an answer of a policy"] += failures - known
             self._policy_failures = failures

@@ -47,7 +47,8 @@ class TracedDva:
     """
 
     def __init__(self, core: Dva, sink: Sink, stage: Stage, memory: Store | None = None) -> None:
-        self._core, self._sink = core, sink
+        self._core = core
+        self._sink = sink
         self._bits: list[int] = []
         self._numbers: OrderedDict[Send, int] = OrderedDict()
         self._given = 0
@@ -206,7 +207,8 @@ def replay_dva(lines: Iterable[str | bytes], path: Path) -> Iterator[Decided]:
             if again is None:
                 again = _Again(entry)
             else:
-                then, now = entry.get("decided", []), again.decide(entry)
+                then = entry.get("decided", [])
+                now = again.decide(entry)
                 yield Decided(number, entry["do"], then, now)
         except _BROKEN as error:
             text = f"{error} is missing" if isinstance(error, KeyError) else str(error)
@@ -229,7 +231,8 @@ class _Again:
         stage = Stage(plain, start["seed"], cast(Any, None), Recorder(), attended=True)
         self._bits: deque[int] = deque()
         permissions = Permissions(self._draw, count=start["sessions"])
-        self._core, self._sends = make_core(stage, permissions), list[Send]()
+        self._core = make_core(stage, permissions)
+        self._sends = list[Send]()
         self._core.registry.most = start["most_devices"]
         self._memory = start["memory"]
 

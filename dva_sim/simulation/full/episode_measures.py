@@ -197,7 +197,8 @@ TRACK_COLUMNS = (
 
 def measures_of(scenario: Scenario) -> tuple[str, ...]:
     """The measures that a run of a scenario may hold: without robots nobody drives one."""
-    bystanders, guards = scenario.bystander.count, scenario.guard.count
+    bystanders = scenario.bystander.count
+    guards = scenario.guard.count
     there = {_OF_DRIVES: scenario.robot.count, workload.COLUMNS: scenario.operator.count}
     there[_OF_DISTURBANCES] = scenario.disturbance.kind != "none"
     there |= {_OF_PEOPLE: bystanders + guards, _OF_BYSTANDERS: bystanders}
@@ -313,7 +314,8 @@ def drive_measures(recording: Recording) -> Row:
         horizon = recording.scenario.horizon_s
         return {"confirmed": False, "outcome": "no drive", "drive_time_s": horizon} if lost else {}
     attempts = [d for d in drives if d.event == drives[0].event]
-    first, last = attempts[0], attempts[-1]
+    first = attempts[0]
+    last = attempts[-1]
     ended = last.ended if last.ended is not None else recording.duration
     confirmed = last.outcome == "confirmed"
     time = ended - first.ordered if confirmed else recording.scenario.horizon_s
@@ -355,7 +357,8 @@ def _command_measures(attempts: list[DriveLog], recording: Recording) -> Row:
     spans = [_span(d, recording) for d in attempts]
     driving = sum(end - start for start, end in spans)
     drives = [driven(d, end) for d, (_, end) in zip(attempts, spans, strict=True)]
-    applied, in_force = sum(len(d.applied) for d in drives), sum(d.hold.sum() for d in drives)
+    applied = sum(len(d.applied) for d in drives)
+    in_force = sum(d.hold.sum() for d in drives)
     trips = [t for d in attempts for t in d.round_trips]
     robots = _robots_of(attempts, recording)
     if not any(d.sent for d in attempts):

@@ -136,9 +136,14 @@ class EventLedger:
         at_event: float,
         name: Callable[[str], str],
     ) -> None:
-        self._events, self._rules, self._dva, self._name = EventTable(), rules, dva, name
-        self._place_of, self._at_event = place_of, at_event
-        self.knows_places, self._is_new = True, True
+        self._events = EventTable()
+        self._rules = rules
+        self._dva = dva
+        self._name = name
+        self._place_of = place_of
+        self._at_event = at_event
+        self.knows_places = True
+        self._is_new = True
         self._heard: dict[str, float] = {}
         self._held_since: dict[Right, float] = {}
         self._informed: dict[int, None] = {}
@@ -153,7 +158,9 @@ class EventLedger:
         self._open: dict[int, tuple[str, m.Position]] = {}
         self._promised: dict[int, float] = {}  # with the highest severity that was reported
         self._lost: dict[int, tuple[str, m.Position, Word]] = {}
-        self._now, self._was_down, self._not_kept = 0.0, False, 0.0
+        self._now = 0.0
+        self._was_down = False
+        self._not_kept = 0.0
 
     # --- what is said --------------------------------------------------------------------
 
@@ -235,17 +242,21 @@ class EventLedger:
                 del self._uninformed[right]
 
     def _word(self, number: int) -> Word:
-        word = self._words.setdefault(number, Word())
-        _keep_newest(self._words)
+        word = self._words.get(number)
+        if word is None:
+            word = self._words[number] = Word()
+            _keep_newest(self._words)
         return word
 
     def _sends(self, message: m.Message, number: int, goes: str) -> None:
-        word, to = self._word(number), message.destination
+        word = self._word(number)
+        to = message.destination
         if goes == to:  # a person has one order, the newest
             for other in self._words.values():
                 other.ended.add(to)
         is_another = to in word.loose or word.ordered.get(to, goes) != goes
-        word.ordered[to], word.sent_again = goes, word.sent_again or is_another
+        word.ordered[to] = goes
+        word.sent_again = word.sent_again or is_another
         word.went.add((to, goes))
         word.taken.discard(to)
         word.ended.discard(to)
@@ -264,7 +275,8 @@ class EventLedger:
 
         An operator who has been sent again with another robot may still report for the first.
         """
-        event, went = self._events.get(number), [goes for who, goes in word.went if who == source]
+        event = self._events.get(number)
+        went = [goes for who, goes in word.went if who == source]
         if not went or event is None:
             return
         self._takes_up(number, source)
@@ -292,7 +304,9 @@ class EventLedger:
         """Yield what is wrong with the event table now."""
         if now < self._now:
             yield "S7", f"time runs back, from {self._now:g} to {now:g} s"
-        passed, last, self._now = now - self._now, self._now, now
+        passed = now - self._now
+        last = self._now
+        self._now = now
         yield from self._unheard(page.rights, now, page.works)
         if not page.works:  # what it has not kept, nobody knows when it is back
             self._let_no_time_pass(passed)
@@ -301,7 +315,8 @@ class EventLedger:
         if self._was_down:
             self._was_down = False
             self._let_no_time_pass(LOST_BY_RESTART + self._not_kept)
-            self._not_kept, last = 0.0, -math.inf
+            self._not_kept = 0.0
+            last = -math.inf
             self._seen = {n: e._replace(debt=Debt(None, False, now)) for n, e in self._seen.items()}
             self._forget_unpromised(page.events)
         events = self._events = page.events
@@ -334,13 +349,16 @@ class EventLedger:
         self._promised = {n: at for n, at in self._promised.items() if n in events.open}
         for number in self._lost.keys() & events.open.keys():
             self._find_again(events.open[number])
-        known, self._open = self._open, {n: (e.kind, e.position) for n, e in events.open.items()}
+        known = self._open
+        self._open = {n: (e.kind, e.position) for n, e in events.open.items()}
         for number in known.keys() & self._open.keys():
-            (kind, place), (was, before) = self._open[number], known[number]
+            (kind, place) = self._open[number]
+            (was, before) = known[number]
             if kind != was or (place != before and apart(place, before) > MOVED):
                 yield "S6", f"event {number} was a {was} elsewhere before"
         every = (*events.open.values(), *events.closed.values())
-        seen, self._seen = self._seen, {}
+        seen = self._seen
+        self._seen = {}
         for event in every:
             old = seen.get(event.number)
             if old is not None and old.is_over and not event.open and old.times == event.times:
@@ -354,7 +372,8 @@ class EventLedger:
         Another event may have the number of such a one.
         """
         for number in [n for n in self._open if n not in self._promised]:
-            event, (kind, place) = events.open.get(number), self._open[number]
+            event = events.open.get(number)
+            (kind, place) = self._open[number]
             if event is None or event.kind != kind or apart(event.position, place) > MOVED:
                 del self._open[number]
                 self._lost[number] = kind, place, self._words.pop(number, Word())
@@ -383,7 +402,8 @@ class EventLedger:
 
     def _fitting(self, report: m.EventReport) -> Iterator[Event]:
         """Yield the events, open or closed, that fit a report."""
-        near, kind = max(self._rules.merge_distance, SAME_SPOT), report.kind
+        near = max(self._rules.merge_distance, SAME_SPOT)
+        kind = report.kind
         known = (*self._events.open.values(), *self._events.closed.values())
         same = (e for e in known if e.kind == kind)
         return (e for e in same if apart(e.position, report.position) < near)
@@ -412,7 +432,8 @@ class EventLedger:
 
     def _unheard(self, rights: Sequence[Right], now: float, works: bool) -> Iterator[Broken]:
         """Yield permissions whose holders have been silent for longer than the DVA may wait."""
-        before, self._held_since = self._held_since, {}
+        before = self._held_since
+        self._held_since = {}
         yield from self._check_informed(before, rights, now, works)
         for right in rights:
             since = now if not works else before.get(right, now)
@@ -445,14 +466,16 @@ class EventLedger:
                 self._uninformed[right] = now
             elif now - since > INFORMED_WITHIN:
                 del self._uninformed[right]
-                robot, holder = self._name(right.robot), self._name(right.holder)
+                robot = self._name(right.robot)
+                holder = self._name(right.holder)
                 yield "S2", f"has not told {robot} that it is {holder}'s no longer"
 
     def _of_event(
         self, event: Event, old: Seen | None, now: float, last: float
     ) -> Iterator[Broken]:
         """Yield what is wrong with an event; `last` is when the book was last looked at [s]."""
-        new, rules = self._look(event, old, now), self._rules
+        new = self._look(event, old, now)
+        rules = self._rules
         for step, when in event.times.items():
             known = last == -math.inf or (old is not None and old.times.get(step) == when)
             if not known and not last - STEP_SLACK <= when <= now + STEP_SLACK:
@@ -494,7 +517,8 @@ class EventLedger:
 
     def _of_debt(self, event: Event, debt: Debt, now: float) -> Iterator[Broken]:
         """Yield somebody who has not set out, or does not move, and still has the order."""
-        rules, owed = self._rules, now - debt.since
+        rules = self._rules
+        owed = now - debt.since
         # A robot that creeps may pass the DVA's limit once more from where it stood before.
         still = 2 * rules.still_within + HEARD_LATE
         within = still if debt.step else rules.depart_within
@@ -506,7 +530,8 @@ class EventLedger:
         """Track waiting: it ends when somebody accepts the event, and restarts on confirmation."""
         found = FOUND.intersection((*event.times, event.state.value))
         old = old or Seen(found - FOUND, (), now, now, now)
-        word, hands = self._word(event.number), _in_hand(event)
+        word = self._word(event.number)
+        hands = _in_hand(event)
         given = "act_assigned" if hands[:1] == ("act",) else "assigned"
         if word.freed and hands == old.hands and event.times.get(given) != old.times.get(given):
             word.sent_again = True
@@ -536,7 +561,8 @@ class EventLedger:
 
     def _debt(self, event: Event, hands: tuple[str | None, ...], old: Debt, now: float) -> Debt:
         """Return what devices with an event owe; with several orders, they may begin with any."""
-        word, who = self._word(event.number), hands[1] if hands else None
+        word = self._word(event.number)
+        who = hands[1] if hands else None
         if who is None or who not in word.taken or self._has_others(who, event.number):
             return Debt(None, False, now)
         if ("act_arrived" if hands[0] == "act" else "arrived") in event.times:

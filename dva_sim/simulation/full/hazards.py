@@ -85,7 +85,8 @@ def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> RunH
     start, (x, y) = beginning_of(event, site, streams, number)
     hazard = make_hazard(event.kind, (x, y), start, **event.hazard)
     room = site.room_at(x, y) or ""
-    detector, detected = None, start
+    detector = None
+    detected = start
     if not event.reported:
         detector, detected = first_detection(hazard, site)
     rng = streams[f"event-{number}/hearsay"]
@@ -123,8 +124,10 @@ def _hearsay(
     """Somewhere free near the true place, in the same room."""
     time = first + float(rng.uniform(*HEARSAY_LATE))
     for _ in range(TRIES):
-        far, angle = HEARSAY_WITHIN * rng.uniform(), rng.uniform(0.0, 2.0 * math.pi)
-        x, y = place[0] + far * math.cos(angle), place[1] + far * math.sin(angle)
+        far = HEARSAY_WITHIN * rng.uniform()
+        angle = rng.uniform(0.0, 2.0 * math.pi)
+        x = place[0] + far * math.cos(angle)
+        y = place[1] + far * math.sin(angle)
         if site.is_free(x, y, REACHABLE) and site.room_at(x, y) == site.room_at(*place):
             return Hearsay(time, (float(x), float(y)))
     return Hearsay(time, place)
@@ -140,7 +143,8 @@ def _place(event: EventConfig, site: Site, rng: np.random.Generator) -> tuple[fl
     kind = find_hazard(event.kind)
     rooms: list[str | None] = [event.room] if event.room else _watched_rooms(kind, site)
     bases = [*site.robot_bases, *site.guard_posts]
-    farthest, place = -math.inf, None
+    farthest = -math.inf
+    place = None
     for _ in range(TRIES):
         x, y = site.sample_free(rng, REACHABLE, rooms[int(rng.integers(len(rooms)))])
         if not site.is_free(x, y, CLEARANCE):
@@ -149,7 +153,8 @@ def _place(event: EventConfig, site: Site, rng: np.random.Generator) -> tuple[fl
         if event.room is not None or gap >= FAR_ENOUGH:
             return x, y
         if gap > farthest:
-            farthest, place = gap, (x, y)
+            farthest = gap
+            place = (x, y)
     if place is None:
         where = f" in room {event.room!r}" if event.room else ""
         raise ConfigError(f"site {site.name!r} has no free place for a {kind.title}{where}")
@@ -175,7 +180,8 @@ class RunHazards:
     """
 
     def __init__(self, stage: Stage) -> None:
-        self.stage, self._clock = stage, stage.clock
+        self.stage = stage
+        self._clock = stage.clock
         self.incidents = draw_incidents(stage.scenario.events, stage.site, stage.streams)
         self._real = {n: i for n, i in enumerate(self.incidents) if not i.false_alarm}
         self.surroundings = Surroundings(stage.site, [i.hazard for i in self._real.values()])

@@ -145,7 +145,8 @@ def _stages(drive: Driven) -> Floats:
     Returns:
         Shape `(n, 11)`: the stages in order, the whole, the time in force.
     """
-    log, hold = drive.log, drive.hold
+    log = drive.log
+    hold = drive.hold
     made = np.array([(a.issued, a.sent, a.arrived, a.time) for a in drive.applied])
     issued, sent, arrived, time = made.T
     sample_age, captured = np.array([(a.sample_age, a.captured) for a in drive.applied]).T

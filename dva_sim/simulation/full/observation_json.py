@@ -101,7 +101,8 @@ def _write_places(fact: o.PlaceNews) -> Plain:
 
 
 def _write_place(device: str, at: Position) -> Plain:
-    latitude, longitude = round(at.latitude, DEGREES), round(at.longitude, DEGREES)
+    latitude = round(at.latitude, DEGREES)
+    longitude = round(at.longitude, DEGREES)
     return {"device": device, "latitude_deg": latitude, "longitude_deg": longitude}
 
 

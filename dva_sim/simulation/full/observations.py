@@ -225,7 +225,8 @@ class Senders:
     """
 
     def __init__(self, is_ours: Callable[[str], bool], most: int | None = MOST_SENT) -> None:
-        self._is_ours, self._most = is_ours, most
+        self._is_ours = is_ours
+        self._most = most
         self._sent: OrderedDict[tuple[str, int], None] = OrderedDict()
 
     def note(self, source: str, payload: bytes) -> None:
@@ -361,8 +362,12 @@ class FactLog:
         dva: str = DVA,
         keeps_sent: bool = True,
     ) -> None:
-        self._put, self._robots, self._dva, self._look = put, robots, dva, look
-        self._page, self._keeps_sent = page, keeps_sent
+        self._put = put
+        self._robots = robots
+        self._dva = dva
+        self._look = look
+        self._page = page
+        self._keeps_sent = keeps_sent
         self._motions: dict[str, RobotMotion] = {}
         self._places: dict[str, Position] = {}
         self._heard: dict[str, None] = {}
@@ -448,7 +453,9 @@ class FactLog:
 
 # --- the book, told by what changes -------------------------------------------------------
 
-_OPEN, _CLOSED, _BOTH = "open", "closed", "both"
+_OPEN = "open"
+_CLOSED = "closed"
+_BOTH = "both"
 
 
 def event_facts(event: Event, where: str) -> dict[str, Any]:
@@ -479,10 +486,12 @@ class _EventTableDiff:
 
     def news(self, now: float, page: Page) -> BookNews:
         """Return the changes since the last page."""
-        events, changed = page.events, list[dict[str, Any]]()
+        events = page.events
+        changed = list[dict[str, Any]]()
         every = [(e, _BOTH if n in events.closed else _OPEN) for n, e in events.open.items()]
         every += [(e, _CLOSED) for n, e in events.closed.items() if n not in events.open]
-        known, self._events = self._events, {}
+        known = self._events
+        self._events = {}
         for event, where in every:
             shown: tuple[Any, ...] = where, event.state, event.responder, event.operator
             shown = *shown, event.actor, event.needs_containment, *event.times.items()
@@ -501,7 +510,8 @@ class _EventTableDiff:
             rights=rights if rights != self._rights else None,
             works=page.works,
         )
-        self._counts, self._rights = counts, rights
+        self._counts = counts
+        self._rights = rights
         return news
 
 
@@ -515,7 +525,8 @@ class EventTableCopy:
     """
 
     def __init__(self, merge_distance: float) -> None:
-        self.events, self._rights = EventTable(merge_distance), list[Right]()
+        self.events = EventTable(merge_distance)
+        self._rights = list[Right]()
 
     def page(self, news: BookNews) -> Page:
         """Apply changes, and return the present page."""

@@ -51,7 +51,8 @@ class Field(RunHazards):
 
     def populate(self) -> None:
         """Put everybody in place and let them register."""
-        scenario, team = self.stage.scenario, TeamBuilder(self.stage, self.world, self)
+        scenario = self.stage.scenario
+        team = TeamBuilder(self.stage, self.world, self)
         for number in range(1, scenario.robot.count + 1):
             robot = team.add_robot(number)
             self.robots[robot.device.id_tag] = robot
@@ -100,7 +101,8 @@ class Field(RunHazards):
         """Yield the position of everybody on the site, by name."""
         self.world.advance_to(now)
         for robot in self.robots.values():
-            pose, mode = robot.body.pose(), robot.controller.mode.value
+            pose = robot.body.pose()
+            mode = robot.controller.mode.value
             yield robot.device.label, TrackPoint(now, pose.x, pose.y, pose.heading, mode)
         for name, who in self.people():
             x, y = who.walking.place

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event, State
-from dva_sim.core.sensing import REACH
+from dva_sim.core.reports import REACH
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.link import Link
 from dva_sim.simulation.full.hazards import RunHazard
@@ -74,7 +74,8 @@ class RobotLog(NamedTuple):
 
 def log_of(robot: RobotAgent) -> RobotLog:
     """Return the measures of a robot by now."""
-    body, inbox = robot.body, robot.inbox
+    body = robot.body
+    inbox = robot.inbox
     return RobotLog(
         powered=body.powered,
         distance=body.distance,

@@ -164,7 +164,9 @@ class Run:
         watched: Watched | None = None,
     ) -> None:
         watched = watched or Watched(Clock(), Recorder(keep_traffic))
-        self.scenario, self.clock, self.recorder = scenario, watched.clock, watched.recorder
+        self.scenario = scenario
+        self.clock = watched.clock
+        self.recorder = watched.recorder
         self._observers: tuple[Observer, ...] = ()  # the audit first, once all are in place
         self._connector = connector_of(scenario)
         self.network, self.stage = self._connected(seed, watched)
@@ -191,7 +193,8 @@ class Run:
             self._motion_of,
             self.field.place_of,
         )
-        self.recorder.on_accepted, self.recorder.on_hand = self._accepted, self._by_hand
+        self.recorder.on_accepted = self._accepted
+        self.recorder.on_hand = self._by_hand
         self._log = self._keep_facts() if keep_traffic else None
         self.observe(self.audit)
         if self._log is not None:
@@ -206,7 +209,8 @@ class Run:
 
     def _connected(self, seed: int, watched: Watched) -> tuple[Transport, Stage]:
         """Return the transport of the messages, and the stage on it."""
-        scenario, real = self.scenario, watched.real
+        scenario = self.scenario
+        real = watched.real
         if real is None:
             network: Transport = VirtualNetwork(
                 self.clock, self._link_between, self._sent, self._connector, self.delivered
@@ -221,7 +225,8 @@ class Run:
                 attended=watched.attended,
             )
             return network, stage
-        time_of_day, join = real.time_of_day(), real.join
+        time_of_day = real.time_of_day()
+        join = real.join
         stage = Stage(
             scenario,
             seed,
@@ -236,7 +241,8 @@ class Run:
 
     def run(self) -> Recording:
         """Let time pass until all is settled or the horizon is reached."""
-        now, horizon = 0.0, self.scenario.horizon_s
+        now = 0.0
+        horizon = self.scenario.horizon_s
         while now < horizon and not self._settled():
             now = min(now + 1.0, horizon)
             self.clock.run(now)
@@ -251,7 +257,8 @@ class Run:
         if sampled:
             self._watch()
             self._sample()
-        stage, field = self.stage, self.field
+        stage = self.stage
+        field = self.field
         events = list(self.dva.events.values())
         return Recording(
             scenario=self.scenario,
@@ -279,9 +286,11 @@ class Run:
     def _people(self) -> list[PersonLog]:
         logs = []
         for name, who in self.field.people():
-            kind, left = "guard", (math.inf, math.inf)
+            kind = "guard"
+            left = (math.inf, math.inf)
             if isinstance(who, BystanderAgent):
-                kind, left = "bystander", (who.leaves_at, who.out_at)
+                kind = "bystander"
+                left = (who.leaves_at, who.out_at)
             dose = who.dose.heat, who.dose.toxic
             exposure = self.recorder.exposure[name]
             logs.append(PersonLog(name, kind, who.activity, exposure, *dose, *left))
@@ -343,7 +352,8 @@ class Run:
 
     def _link_between(self, source: str, destination: str) -> tuple[Link, Link]:
         """The link from one to another and the one back, as far as they are not parted."""
-        links, partitions = self._unparted(source, destination), self.scenario.link.partitions
+        links = self._unparted(source, destination)
+        partitions = self.scenario.link.partitions
         if not partitions:
             return links
         name_of = self.stage.labels.get

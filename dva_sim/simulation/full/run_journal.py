@@ -18,8 +18,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from dva_sim.core.audit import Fact
-from dva_sim.core.events import Event
-from dva_sim.core.handling import Choice
+from dva_sim.core.events import Choice, Event
 from dva_sim.kernel.recorder import (
     Applied,
     DriveLog,
@@ -68,7 +67,8 @@ class RunJournal:
     """
 
     def __init__(self, run: Run, label_of: Callable[[str], str]) -> None:
-        self._run, self._label_of = run, label_of
+        self._run = run
+        self._label_of = label_of
         self._newest: dict[str, str] = {}
         self._drives: dict[int, tuple[int, DriveLog]] = {}  # by identity: number, and the drive
         self._count = 0
@@ -132,7 +132,8 @@ class RunJournal:
     # --- what changes ----------------------------------------------------------------------
 
     def _states(self) -> Iterable[tuple[str, Any]]:
-        recording, recorder = self._run.recording(sampled=False), self._run.recorder
+        recording = self._run.recording(sampled=False)
+        recorder = self._run.recorder
         yield (
             "run",
             {
@@ -196,8 +197,10 @@ def recording_of(scenario: Scenario, seed: int, lines: Iterable[JournalLine]) ->
 def _assembled(
     scenario: Scenario, seed: int, state: Mapping[str, Any], grown: Iterable[list[Any]]
 ) -> Recording:
-    recorder, run_state = Recorder(), state["run"]
-    recorder.messages, recorder.bytes = run_state["messages"], run_state["bytes"]
+    recorder = Recorder()
+    run_state = state["run"]
+    recorder.messages = run_state["messages"]
+    recorder.bytes = run_state["bytes"]
     for name in _COUNTED:
         getattr(recorder, name).update(state[name])
     drives = {int(n): _drive(facts) for n, facts in _numbered(state, "drive")}
@@ -245,5 +248,6 @@ def _numbered(state: Mapping[str, Any], kind: str) -> Iterable[tuple[str, Any]]:
 
 
 def _drive(facts: dict[str, Any]) -> DriveLog:
-    refused, by = Counter(dict(facts.pop("refused"))), DrivenBy(*facts.pop("by"))
+    refused = Counter(dict(facts.pop("refused")))
+    by = DrivenBy(*facts.pop("by"))
     return DriveLog(**facts, refused=refused, by=by, round_trips=[])

@@ -388,15 +388,20 @@ class SafetyAudit:
         motion_of: Callable[[str], RobotMotion],
         place_of: Callable[[str], m.Position | None],
     ) -> None:
-        self._recorder, self._motors, self._labels = recorder, terms.motors, terms.labels
-        self._watchdog, self._max_age = terms.watchdog, terms.max_age
+        self._recorder = recorder
+        self._motors = terms.motors
+        self._labels = terms.labels
+        self._watchdog = terms.watchdog
+        self._max_age = terms.max_age
         self._release = terms.release
         self._asked_release: dict[tuple[str, str], float] = {}  # by robot and device: when last
         self._hears_dva = False
         self._told_stopped: dict[str, StopTold] = {}
         self._orders_sent: deque[int] = deque(maxlen=MOST_KEPT)  # hashes; each may be sent again
-        self._dva, self._obeys_within = terms.dva, OBEYS_WITHIN + 10 * terms.processing
-        self._motion_of, self._deaf = motion_of, set[str]()
+        self._dva = terms.dva
+        self._obeys_within = OBEYS_WITHIN + 10 * terms.processing
+        self._motion_of = motion_of
+        self._deaf = set[str]()
         self._ledger = EventLedger(terms.rules, terms.dva, place_of, terms.at_event, self._name_of)
         self._witnesses: dict[str, Witness] = {}
         self._takeovers = Takeovers()
@@ -455,7 +460,8 @@ class SafetyAudit:
                 told.at = -math.inf
 
     def _reaches_robot(self, now: float, source: str, robot: str, data: bytes) -> None:
-        witness, message = self.witness(robot), _read(data)
+        witness = self.witness(robot)
+        message = _read(data)
         if message is None or isinstance(message.body, m.Heartbeat):
             return
         if isinstance(message.body, m.Reply):
@@ -480,7 +486,8 @@ class SafetyAudit:
             witness.given(grant.session, Held(grant.holder, grant.level, grant.sensors))
 
     def _dva_hears_of_stops(self, message: m.Message, now: float) -> None:
-        source, body = message.source, message.body
+        source = message.source
+        body = message.body
         if isinstance(body, m.RobotEmergency) and source in self._motors:
             told = self._told_stopped.setdefault(source, StopTold())
             told.at = -math.inf if body.tick == told.released else now
@@ -547,7 +554,8 @@ class SafetyAudit:
             return
         asked = witness.unanswered.pop((reply.destination, reply.body.answers), None)
         if asked is not None:
-            motion, limits = self._motion_of(source), self._motors[source]
+            motion = self._motion_of(source)
+            limits = self._motors[source]
             found = self._answered(witness, motion, limits, asked, reply.body.code, now)
             self._report(found, now, source)
 
@@ -580,7 +588,8 @@ class SafetyAudit:
         now: float,
     ) -> Iterator[Broken]:
         """A robot has answered a request, and so has obeyed it or not."""
-        message, body = asked.message, asked.message.body
+        message = asked.message
+        body = asked.message.body
         match body:
             case m.Emergency():  # it acts whenever it comes, though its bytes never change
                 witness.note_stop(now, self._release)
@@ -636,7 +645,8 @@ class SafetyAudit:
         another = witness.owner not in (None, message.source)
         if another and _goes(motion) and not _pushed(motion, limits, now):
             yield "S2", f"changed its driver to {message.source} while moving at {_pace(motion)}"
-        witness.owner, witness.ordered = message.source, asked.at
+        witness.owner = message.source
+        witness.ordered = asked.at
         witness.hears(now)
         witness.stood_before = witness.stood
         does = Doing(message.source, message.session, level)
@@ -653,7 +663,9 @@ class SafetyAudit:
         broken = witness.permits(command.source, command.session, "teleoperation", command.time)
         if broken is not None:
             found.append(broken)
-        source, session, number = command.source, command.session, command.message_id
+        source = command.source
+        session = command.session
+        number = command.message_id
         if witness.stopped > witness.ordered and witness.stopped > -0.5:
             found.append(("S3", "obeys a command after an emergency, before a new order"))
         elif witness.in_hand(command.time):
@@ -683,9 +695,12 @@ class SafetyAudit:
 
     def by_hand(self, done: ByHand) -> None:
         """Somebody drives a robot at the robot itself: no message tells of that."""
-        witness, now, found = self.witness(done.robot), done.time, list[Broken]()
+        witness = self.witness(done.robot)
+        now = done.time
+        found = list[Broken]()
         if done.what == "takes":
-            motion, limits = self._motion_of(done.robot), self._motors[done.robot]
+            motion = self._motion_of(done.robot)
+            limits = self._motors[done.robot]
             found = [*_taken_by_hand(witness, motion, limits, now)]
             if not witness.starts_again():
                 found.append(("S3", "is taken by hand before anybody has released it"))
@@ -707,7 +722,8 @@ class SafetyAudit:
                 found.append(("S3", "obeys a hand after an emergency, before it is taken again"))
             elif witness.hand != done.who:
                 found.append(("S1", "obeys a hand that has not taken it, or has let it go"))
-            witness.allowed, witness.heard = now + self._watchdog, now
+            witness.allowed = now + self._watchdog
+            witness.heard = now
         self._report(found, now, done.robot)
 
     # --- twice a second, or more often -----------------------------------------------------
@@ -715,7 +731,8 @@ class SafetyAudit:
     def moves(self, now: float, motions: Mapping[str, RobotMotion]) -> None:
         """Implement `Observer`."""
         for robot, motion in motions.items():
-            witness, limits = self.witness(robot), self._motors[robot]
+            witness = self.witness(robot)
+            limits = self._motors[robot]
             self._overdue(witness, motion, now)
             found = [*broken_by_wish(witness, motion, now)]
             found += broken_by_moving(witness, motion, limits, now)
@@ -737,7 +754,8 @@ class SafetyAudit:
     def _hands_over(self, page: Page, now: float) -> Iterator[Broken]:
         """Yield robots that are handed over before they stand and know that they are."""
         for right, session in self._takeovers.given(page.rights, now, page.works):
-            witness, motion = self.witness(right.robot), self._motion_of(right.robot)
+            witness = self.witness(right.robot)
+            motion = self._motion_of(right.robot)
             to = f"hands {right.robot} over to {right.holder}"
             pushed = _pushed(motion, self._motors[right.robot], now)
             if session in witness.sessions and session not in witness.over:
@@ -747,12 +765,14 @@ class SafetyAudit:
 
     def _is_in_hand(self, robot: str, motion: RobotMotion, now: float) -> bool:
         """Return True while somebody drives it by hand, or it still stops after that."""
-        witness, stopping = self.witness(robot), _stopping(motion, self._motors[robot])
+        witness = self.witness(robot)
+        stopping = _stopping(motion, self._motors[robot])
         return witness.in_hand(now) or now <= witness.let_go + stopping
 
     def _overstays(self, witness: Witness, motion: RobotMotion, now: float) -> Iterator[Broken]:
         """Yield a drive that goes on without a valid command for longer than the lease."""
-        does, silent = witness.does, now - witness.heard
+        does = witness.does
+        silent = now - witness.heard
         if does is None or does.level != "teleoperation" or silent <= LEASE + LEASE_SLACK:
             return
         witness.does = None  # whatever it obeys now needs a new order
@@ -769,7 +789,8 @@ class SafetyAudit:
         late = [k for k, v in witness.unanswered.items() if now > v.at + witness.obeys_within]
         for key in late:
             message, at, source = witness.unanswered.pop(key)
-            body, by = message.body, at + witness.obeys_within
+            body = message.body
+            by = at + witness.obeys_within
             if isinstance(body, m.Emergency):
                 if not witness.has_stood_since(at):
                     witness.note_stop(by, self._release)
@@ -817,7 +838,8 @@ def _shown_to(witness: Witness, reader: str, value: m.Body, now: float) -> Itera
     if not isinstance(value, m.SensorValue):
         return
     for session in witness.confirmed:
-        held, over = witness.sessions.get(session), witness.over.get(session, now)
+        held = witness.sessions.get(session)
+        over = witness.over.get(session, now)
         may = held is not None and held.holder == reader and value.sensor in held.sensors
         if may and now <= over + witness.obeys_within:
             return
@@ -854,7 +876,8 @@ def broken_by_moving(
     witness: Witness, motion: RobotMotion, limits: MotorLimits, now: float
 ) -> list[Broken]:
     """Rules that the motion of a robot breaks now; what was pushed breaks none by moving."""
-    speed, turn_rate = motion.speed, motion.turn_rate
+    speed = motion.speed
+    turn_rate = motion.turn_rate
     found: list[Broken] = []
     if _goes(motion):
         allowed = max(witness.allowed, witness.last_mission)

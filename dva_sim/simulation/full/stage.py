@@ -218,7 +218,8 @@ class Stage:
     def dismiss(self, device: AgentDevice) -> None:
         """Remove a device that has left. What it did stays under its label, with its id beside."""
         self.devices.remove(device)
-        id_tag, label = device.id_tag, device.label
+        id_tag = device.id_tag
+        label = device.label
         self.labels[id_tag] = label if id_tag in label else with_id(label, id_tag)
 
 

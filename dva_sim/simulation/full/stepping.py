@@ -49,7 +49,8 @@ class SteppedDrive:
         self._person.device.register(self._begin_shift)
         self._is_known = False
         self._robot = id_of("robot", 1)
-        self._refusal, self._inputs = "", 0
+        self._refusal = ""
+        self._inputs = 0
         x, y = self.run.field.incidents[0].hazard.position
         self.goal: tuple[float, float] = float(x), float(y)
 
@@ -109,7 +110,8 @@ class SteppedDrive:
         seen = None if self.frame is None else self.frame.observation
         if seen is None:
             return False
-        dx, dy = seen.x - self.goal[0], seen.y - self.goal[1]
+        dx = seen.x - self.goal[0]
+        dy = seen.y - self.goal[1]
         return dx * dx + dy * dy < THERE * THERE
 
     def _begin_shift(self) -> None:

@@ -59,7 +59,8 @@ class Takeovers:
         self, rights: Sequence[Right], now: float, works: bool
     ) -> Iterator[tuple[Right, int]]:
         """Yield rights of those for whom a robot was stopped, with the last holder's session."""
-        before, self._held = self._held, {right.robot: right for right in rights}
+        before = self._held
+        self._held = {right.robot: right for right in rights}
         if not works:  # another DVA knows of no hand-over
             self._stopping.clear()
         for robot, right in self._held.items():

@@ -65,8 +65,11 @@ class TeamBuilder:
     """
 
     def __init__(self, stage: Stage, world: World, hazards: RunHazards) -> None:
-        self._stage, self._world, self._hazards = stage, world, hazards
-        self._around, self._lidar = hazards.surroundings, Lidar(world)
+        self._stage = stage
+        self._world = world
+        self._hazards = hazards
+        self._around = hazards.surroundings
+        self._lidar = Lidar(world)
         self._air: AirAt = self._around.at if self._around.has_any else clean_air
         self._refuges = refuges_of(stage.site)
         self._taken: list[Point] = []
@@ -83,7 +86,8 @@ class TeamBuilder:
         Raises:
             ConfigError: there is no place so far from the event, or something is in its way.
         """
-        stage, config = self._stage, self._stage.scenario.robot
+        stage = self._stage
+        config = self._stage.scenario.robot
         profile = stage.robots[number - 1]
         base = self._start("robot", number)
         device = stage.device("robot", number)
@@ -113,8 +117,11 @@ class TeamBuilder:
         return robot
 
     def _setup(self, profile: RobotProfile, body: RobotBody, power: Power) -> RobotSetup:
-        stage, scenario, hazards = self._stage, self._stage.scenario, self._hazards
-        camera, robot = scenario.camera, scenario.robot
+        stage = self._stage
+        scenario = self._stage.scenario
+        hazards = self._hazards
+        camera = scenario.camera
+        robot = scenario.robot
         angle = math.radians(camera.field_of_view_deg)
         sources = sources_of(self._world, body, self._around, self._lidar, power.share)
         processing = profile.processing_s if robot.processing_s is None else robot.processing_s
@@ -144,7 +151,8 @@ class TeamBuilder:
 
     def _look_after(self, robot: RobotAgent) -> None:
         """Once a second: is there power, does its drive answer, and is the floor wet?"""
-        now, body = self._stage.clock.now, robot.body
+        now = self._stage.clock.now
+        body = robot.body
         self._world.advance_to(now)
         robot.power(robot.charge > 0.0)
         self._look_at_drive(robot)
@@ -154,7 +162,8 @@ class TeamBuilder:
 
     def _look_at_drive(self, robot: RobotAgent) -> None:
         """Count what motors of a user got wrong, and tell of the first time."""
-        device, failures = robot.device, robot.body.motors.failures
+        device = robot.device
+        failures = robot.body.motors.failures
         known = self._failures.get(device.label, 0)
         if failures > known:
             device.recorder.counters["failed: an answer of a drive"] += failures - known
@@ -170,7 +179,8 @@ class TeamBuilder:
         Raises:
             ConfigError: there is no place so far from the event, or something is in its way.
         """
-        stage, hazards = self._stage, self._hazards
+        stage = self._stage
+        hazards = self._hazards
         post = self._start("guard", number)
         device = stage.device("guard", number)
         walker = Walker.draw(guard_profile(stage.scenario), stage.streams[f"{device.label}/walker"])
@@ -212,7 +222,8 @@ class TeamBuilder:
         Raises:
             ConfigError: the site has no room for it.
         """
-        stage, name = self._stage, f"bystander-{number}"
+        stage = self._stage
+        name = f"bystander-{number}"
         rng = stage.streams[f"{name}/who"]
         occupant = Occupant.draw(bystander_profile(stage.scenario), rng)
         places = self._places(name)
@@ -278,17 +289,22 @@ class TeamBuilder:
         Raises:
             ConfigError: there is no place so far from the event as it is to begin.
         """
-        scenario, site = self._stage.scenario, self._stage.site
+        scenario = self._stage.scenario
+        site = self._stage.site
         if kind == "robot":
-            way, places = scenario.robot.way_m, site.robot_bases
+            way = scenario.robot.way_m
+            places = site.robot_bases
         else:
-            way, places = scenario.guard.way_m, site.guard_posts
+            way = scenario.guard.way_m
+            places = site.guard_posts
         return places[number - 1] if way is None else self._away(f"{kind}-{number}", way)
 
     def _away(self, label: str, length: float) -> Pose:
         """A place so far [m] from the event, looking along the way there."""
-        site, rng = self._stage.site, self._stage.streams.fresh(f"{label}/start")
-        goal, longest = self._hazards.incidents[0].hazard.position, 0.0
+        site = self._stage.site
+        rng = self._stage.streams.fresh(f"{label}/start")
+        goal = self._hazards.incidents[0].hazard.position
+        longest = 0.0
         for _ in range(TRIES):
             way = self._stage.planner.path(site.sample_free(rng, FOOTPRINT), goal)
             if way is None:
@@ -326,11 +342,14 @@ class Power:
         self._battery = None
         if profile.battery is not None:
             self._battery = Battery(profile.battery, profile.mass_kg, charge)
-        self._body, self._base, self._clock = body, base, clock
+        self._body = body
+        self._base = base
+        self._clock = clock
 
     def share(self) -> float:
         """Return the remaining share of the capacity; 1 without a battery."""
-        battery, body = self._battery, self._body
+        battery = self._battery
+        body = self._body
         if battery is None:
             return 1.0
         near = math.dist((body.x, body.y), (self._base.x, self._base.y)) < AT_BASE
@@ -351,7 +370,8 @@ def _cut(way: NDArray[np.float64], left: float) -> Pose | None:
     if at < 0.0:
         return None
     place = min(int(np.searchsorted(gone, at, side="right")) - 1, len(steps) - 1)
-    (x, y), ahead = way[place], way[place + 1] - way[place]
+    (x, y) = way[place]
+    ahead = way[place + 1] - way[place]
     share = (at - gone[place]) / steps[place] if steps[place] > 0.0 else 0.0
     heading = math.atan2(ahead[1], ahead[0])
     return Pose(float(x + share * ahead[0]), float(y + share * ahead[1]), heading)

@@ -34,7 +34,9 @@ OF_MESSAGES: Final = tuple(sorted({*_AT_ROBOTS, *_AT_THE_DVA}))
 SETTLES: Final = OBEYS_WITHIN  # for which the facts of a gap may still have effects [s]
 EVENTS_UNKNOWN = "what the DVA's book showed is not known here"
 MOST_SPANS: Final = 3  # gaps that a verdict names
-HELD, BROKEN, NOT_JUDGED = "held", "broken", "not judged"
+HELD = "held"
+BROKEN = "broken"
+NOT_JUDGED = "not judged"
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,9 @@ def verdicts(
         until: Time up to which the run was judged, in words; empty: all of it.
         lost: Rules that lack facts which should be there, each with the reason.
     """
-    broken, why_not, lost = broken_lines(recorder.broken.values()), not_judged or {}, lost or {}
+    broken = broken_lines(recorder.broken.values())
+    why_not = not_judged or {}
+    lost = lost or {}
     found: list[Verdict] = []
     for rule, says in RULES.items():
         if rule in broken:
@@ -164,7 +168,8 @@ class Judge:
 
     def __init__(self, terms: o.SafetyTerms) -> None:
         self.recorder = Recorder()
-        self._terms, self._events = terms, o.EventTableCopy(terms.rules.merge_distance)
+        self._terms = terms
+        self._events = o.EventTableCopy(terms.rules.merge_distance)
         self._motions: dict[str, o.RobotMotion] = {}
         self._places: dict[str, Position] = {}
         self._audit = SafetyAudit(self.recorder, terms, self._motion_of, self._places.get)
@@ -176,7 +181,8 @@ class Judge:
 
     def take(self, fact: Any) -> None:
         """Judge one more fact."""
-        audit, now = self._audit, fact.time
+        audit = self._audit
+        now = fact.time
         match fact:
             case Sent():
                 audit.sent(now, fact.source, fact.destination, fact.payload)

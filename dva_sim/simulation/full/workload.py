@@ -89,7 +89,8 @@ OPERATOR_COLUMNS = (
 # --- spans of time -----------------------------------------------------------------------------
 def covered(spans: Iterable[Span]) -> float:
     """Return the length of the union of the spans [s]."""
-    total, end = 0.0, -math.inf
+    total = 0.0
+    end = -math.inf
     for since, until in sorted(spans):
         total += max(0.0, until - max(since, end))
         end = max(end, until)
@@ -128,25 +129,34 @@ def waits(log: DriveLog, end: float) -> list[Span]:
 # --- steering ----------------------------------------------------------------------------------
 def reversals(values: Iterable[float], gap: float = GAP) -> int:
     """Count how often a signal reverses, counting only changes of at least `gap`."""
-    count, direction = 0, 0
-    low, high = math.inf, -math.inf
+    count = 0
+    direction = 0
+    low = math.inf
+    high = -math.inf
     for value in values:
-        low, high = min(low, value), max(high, value)
+        low = min(low, value)
+        high = max(high, value)
         if direction <= 0 and value >= low + gap:
-            count, direction, high = count + (direction < 0), 1, value
+            count += direction < 0
+            direction = 1
+            high = value
             low = value
         elif direction >= 0 and value <= high - gap:
-            count, direction, low = count + (direction > 0), -1, value
+            count += direction > 0
+            direction = -1
+            low = value
             high = value
     return count
 
 
 def changes(commands: Iterable[tuple[float, float]]) -> int:
     """Count how often a command [m/s, rad/s] clearly differed from the last one that counted."""
-    count, last = -1, (math.inf, math.inf)
+    count = -1
+    last = (math.inf, math.inf)
     for speed, turn in commands:
         if abs(speed - last[0]) > LEVEL_SPEED or abs(turn - last[1]) > LEVEL_TURN:
-            count, last = count + 1, (speed, turn)
+            count += 1
+            last = (speed, turn)
     return max(count, 0)
 
 
@@ -164,7 +174,9 @@ def steering_entropy(turn_rate: Floats, band: float = BAND) -> float:
     """
     if len(turn_rate) < 20:
         return math.nan
-    third, second, first = turn_rate[:-3], turn_rate[1:-2], turn_rate[2:-1]
+    third = turn_rate[:-3]
+    second = turn_rate[1:-2]
+    first = turn_rate[2:-1]
     slope = first - second
     predicted = first + slope + 0.5 * (slope - (second - third))
     bins = np.searchsorted(EDGES, (turn_rate[3:] - predicted) / band)
@@ -304,7 +316,8 @@ def operator_row(recording: Recording, operator: str) -> Row:
     logs = [log for log in recording.recorder.drives if log.operator == operator]
     hands = [in_hand(log, end) for log in logs]
     queue = [span for log in logs for span in waits(log, end)]
-    busy, turned = covered(hands), sum(log.turned_to for log in logs)
+    busy = covered(hands)
+    turned = sum(log.turned_to for log in logs)
     judged = [judgement(recording, log) for log in logs]
     return {
         "operator_name": recording.label_of(operator),

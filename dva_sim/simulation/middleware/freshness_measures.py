@@ -135,7 +135,8 @@ def command_row(
         max_age_s: The robot's limit.
         watchdog_s: The robot stops after so long without a newer command.
     """
-    force, pauses = Ages(made, applied, window), gaps(applied, window)
+    force = Ages(made, applied, window)
+    pauses = gaps(applied, window)
     inside = (applied >= window.since) & (applied < window.until)
     ages = (applied - made)[inside]
     return {

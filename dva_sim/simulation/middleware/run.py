@@ -16,7 +16,6 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from dva_sim.kernel.errors import ConfigError, RunsFailed
-from dva_sim.network.emulator.enter import KILL_ALL
 from dva_sim.network.emulator.needs import EmulatorError
 from dva_sim.network.emulator.process import ADDRESSES, LinkProcess
 from dva_sim.network.emulator.report import LinkReport
@@ -29,6 +28,7 @@ from dva_sim.network.middleware.programs import (
     ProgramNoteKind,
     ProgramNotes,
 )
+from dva_sim.serving.processes import Child, end_all
 from dva_sim.simulation.middleware.freshness_measures import (
     Floats,
     Row,
@@ -113,9 +113,8 @@ def _attempt(scenario: MiddlewareScenario, seed: int, attempt: int) -> Middlewar
         near = _started(link, "near", plan)
         _await_end(near, window.until + PATIENCE_S)
         time.sleep(LINGER_S)
-        problem = _problem("near", near, plan) or _problem("far", far, plan)
-        far.send_signal(KILL_ALL)
-        far.wait()
+        problem = _problem(near) or _problem(far)
+        end_all([near, far], 0.0)
         report = link.report()
         notes = [ProgramNotes.read(plan.folder / f"{side}.notes") for side in SIDES]
     if problem:
@@ -148,44 +147,37 @@ def plan_of(scenario: MiddlewareScenario, folder: Path, window: Window) -> Plan:
     )
 
 
-def _started(link: LinkProcess, side: Side, plan: Plan) -> subprocess.Popen[bytes]:
+def _started(link: LinkProcess, side: Side, plan: Plan) -> Child:
     words = [sys.executable, "-P", "-m", programs.__name__, side, plan.model_dump_json()]
-    with _complaints(side, plan).open("wb") as complaints:
-        return link.start(side, words, stdin=subprocess.DEVNULL, stderr=complaints)
+    return link.start(side, words, keeps_errors=True)
 
 
-def _complaints(side: Side, plan: Plan) -> Path:
-    return plan.folder / f"{side}.err"
-
-
-def _await_end(near: subprocess.Popen[bytes], limit: float) -> None:
+def _await_end(near: Child, limit: float) -> None:
     """Wait for the operator's program, and end it if it does not end by itself."""
     try:
         near.wait(limit - time.monotonic())
     except subprocess.TimeoutExpired:
-        near.send_signal(KILL_ALL)
-        near.wait()
+        near.kill()
 
 
-def _problem(side: Side, program: subprocess.Popen[bytes], plan: Plan) -> str:
+def _problem(program: Child) -> str:
     """Return why a program failed; empty if it runs, was done or found no connection."""
-    if program.poll() in (None, 0, NOT_CONNECTED):
-        return ""
-    text = _complaints(side, plan).read_text(errors="replace").strip()
-    return f"the {side} program failed: {text.splitlines()[-1] if text else program.returncode}"
+    return "" if program.poll() in (None, 0, NOT_CONNECTED) else program.why()
 
 
 # --- tables ------------------------------------------------------------------------------
 def tables(run: MiddlewareRun) -> dict[str, list[Row]]:
     """A row of the run, and one of each command and picture."""
-    scenario, window = run.scenario, run.window
+    scenario = run.scenario
+    window = run.window
     sent = _times(run.near, ProgramNoteKind.SENT)
     refused = {note.number for note in run.near if note.kind is ProgramNoteKind.REFUSED}
     applied = [note for note in run.far if note.kind is ProgramNoteKind.APPLIED]
     outdated = [note for note in run.far if note.kind is ProgramNoteKind.OUTDATED]
     arrived = _floats(note.time for note in applied)
     made = _floats(sent[note.number] for note in applied)
-    taken, shown = _times(run.far, ProgramNoteKind.PICTURE_TAKEN), run.near
+    taken = _times(run.far, ProgramNoteKind.PICTURE_TAKEN)
+    shown = run.near
     pictures = [note for note in shown if note.kind is ProgramNoteKind.PICTURE_SHOWN]
     row = {
         **_connection(run),
@@ -193,7 +185,9 @@ def tables(run: MiddlewareRun) -> dict[str, list[Row]]:
         "not_taken": len(refused),
         "outdated_share": _share(len(outdated), len(outdated) + len(applied)),
         **command_row(
-            *(made, arrived, window),
+            made,
+            applied=arrived,
+            window=window,
             max_age_s=scenario.robot.max_age_s,
             watchdog_s=scenario.robot.watchdog_s,
         ),

@@ -75,7 +75,8 @@ def _of_link(scenario: Scenario) -> Iterator[str]:
         )
     if not _drives(scenario):
         return
-    answer, waits = command_needs_s(scenario), command_timeout_s(scenario)
+    answer = command_needs_s(scenario)
+    waits = command_timeout_s(scenario)
     if pattern_of(scenario).answered and waits <= answer:
         yield (
             f"command.timeout_s {waits:g} is not above {answer:g} s, which "
@@ -113,7 +114,8 @@ def _of_link(scenario: Scenario) -> Iterator[str]:
 
 def _of_computer(scenario: Scenario) -> Iterator[str]:
     """A robot that needs longer for a command than the next one takes to come."""
-    takes, rate = mean_processing_s(scenario), scenario.command.rate_hz
+    takes = mean_processing_s(scenario)
+    rate = scenario.command.rate_hz
     pattern = pattern_of(scenario)
     if pattern.published and not pattern.newest_wins and takes * rate > 1:
         yield (
@@ -124,7 +126,8 @@ def _of_computer(scenario: Scenario) -> Iterator[str]:
 
 
 def _of_pictures(scenario: Scenario) -> Iterator[str]:
-    camera, down = scenario.camera, scenario.link.toward("down")
+    camera = scenario.camera
+    down = scenario.link.toward("down")
     wanted = camera.rate_hz * camera.frame_bytes * _BITS
     if scenario.link.trace_down is None and wanted > down.rate_bps:
         yield (
@@ -143,7 +146,8 @@ def _of_watchdog(scenario: Scenario, live: bool) -> Iterator[str]:
     """A robot that stops between any two commands."""
     if not _drives(scenario):
         return
-    limit, phone = scenario.robot.watchdog_s, phone_profile(scenario)
+    limit = scenario.robot.watchdog_s
+    phone = phone_profile(scenario)
     period = 1 / scenario.command.rate_hz
     if limit <= period:
         yield (

@@ -38,7 +38,8 @@ COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """Columns of a table, each with other names that it may have."""
 _PLACES: Final = "x and y, lat and lon, or room"
-_YES, _NO = ("true", "yes", "1"), ("false", "no", "0", "")
+_YES = ("true", "yes", "1")
+_NO = ("false", "no", "0", "")
 
 
 def _as_text(value: Any) -> Any:
@@ -186,7 +187,9 @@ class _Reader:
     """Reads the rows of one table."""
 
     def __init__(self, table: EventTableConfig, rows: CsvTable, ground: Ground) -> None:
-        self._table, self._rows, self._ground = table, rows, ground
+        self._table = table
+        self._rows = rows
+        self._ground = ground
         self._columns = self._find_columns()
         self._moments = MomentReader(table.time_zone)
         self._kinds = {_plain(kind): kind for kind in EVENT_KINDS}
@@ -194,8 +197,12 @@ class _Reader:
         self._rooms = {room.casefold(): room for room in ground.rooms}
 
     def events(self, horizon_s: float, error: Fail) -> TableEvents:
-        found, skipped, order = list[tuple[float, TableAlarm]](), 0, 0
-        seen, repeats, last = set[tuple[float, TableAlarm]](), list[int](), -math.inf
+        found = list[tuple[float, TableAlarm]]()
+        skipped = 0
+        order = 0
+        seen = set[tuple[float, TableAlarm]]()
+        repeats = list[int]()
+        last = -math.inf
         for cells in self._rows.cells():
             time = self._moments.read(self._cell(cells, "time"))
             kind = self._kind(self._cell(cells, "kind"))
@@ -227,7 +234,8 @@ class _Reader:
     # --- columns -------------------------------------------------------------------------
 
     def _find_columns(self) -> dict[str, int]:
-        names, rows = [_plain(name) for name in self._rows.names], self._rows
+        names = [_plain(name) for name in self._rows.names]
+        rows = self._rows
         columns: dict[str, int] = {}
         for column, others in COLUMNS.items():
             places = [n for n, name in enumerate(names) if name in (column, *others)]
@@ -259,7 +267,8 @@ class _Reader:
 
     def _alarm(self, cells: Cell, kind: str) -> TableAlarm:
         room, position = self._place(cells) if self._ground.is_placed else (None, None)
-        severity, confidence = self._share(cells, "severity"), self._share(cells, "confidence")
+        severity = self._share(cells, "severity")
+        confidence = self._share(cells, "confidence")
         return TableAlarm(
             at_s=0.0,
             kind=kind,

@@ -81,7 +81,8 @@ def check_names(scenario: Scenario, error: Fail) -> None:
     for path, (given, folder) in choices.items():
         for name in (given,) if isinstance(given, str) else given:
             if not resources.is_there(name, folder) and not resources.is_file(Path(name)):
-                key, known = ".".join(str(p) for p in path), resources.available(folder)
+                key = ".".join(str(p) for p in path)
+                known = resources.available(folder)
                 raise error(unknown(key, name, sorted(known)), path)
     if scenario.operator.traits:
         with _located(error, lambda _: ("operator", "traits")):

@@ -38,7 +38,8 @@ class MomentReader:
     """Reads the moments of one table, which are all dates or all seconds."""
 
     def __init__(self, time_zone: str | None) -> None:
-        self._name, self._zone = time_zone, zone_named(time_zone) if time_zone else None
+        self._name = time_zone
+        self._zone = zone_named(time_zone) if time_zone else None
         self._is_seconds: bool | None = None
 
     @property
@@ -95,7 +96,8 @@ class MomentReader:
             raise ConfigError(f"{text!r} has no offset: set events.time_zone, such as "
                               "Europe/Lisbon, or UTC")  # fmt: skip
         local = moment.replace(tzinfo=self._zone)
-        first, second = local.utcoffset(), local.replace(fold=1).utcoffset()
+        first = local.utcoffset()
+        second = local.replace(fold=1).utcoffset()
         assert first is not None
         assert second is not None
         if first > second:

@@ -78,7 +78,6 @@ class RobotConfig(Config):
         Key(
             "processing time at the robot",
             stated="processing time of a command at the robot",
-            zero="processing time",
         ),
     ] = None
     sensors: Annotated[tuple[SensorConfig, ...], Field(max_length=16)] | None = None

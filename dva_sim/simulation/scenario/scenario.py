@@ -115,10 +115,8 @@ class Scenario(WithTable):
         """Dump newer keys only where they differ from the default, so that hashes stay the same."""
         written: dict[str, Any] = usual(self)
         for part, *keys in NEWER:
-            ours, usually = (
-                getattr(self, part),
-                type(self).model_fields[part].get_default(call_default_factory=True),
-            )
+            ours = getattr(self, part)
+            usually = type(self).model_fields[part].get_default(call_default_factory=True)
             if not keys and ours == usually:
                 written.pop(part, None)
             for key in keys:
@@ -154,7 +152,8 @@ def site_of(scenario: Scenario, seed: int) -> Site:
     Raises:
         ConfigError: the site cannot be read, or has no room for so many.
     """
-    robot, guard = scenario.robot, scenario.guard
+    robot = scenario.robot
+    guard = scenario.guard
     radius = max((each.radius_m for each in robot_profiles(scenario)), default=FOOTPRINT)
     if scenario.site.map is not None:
         team = max(1, robot.count), max(1, guard.count)

@@ -35,7 +35,8 @@ class Channel(Generic[T]):
         config = way.link()
         self._link = Link(config, make_serialiser(config, "up", streams, name), streams, name)
         self._is_plain = not way.jitter_s and not way.loss
-        self._extra, self._delay = extra, way.delay_s + extra
+        self._extra = extra
+        self._delay = way.delay_s + extra
         self._queue: deque[tuple[float, T]] = deque()
 
     def put(self, now: float, item: T) -> None:
@@ -49,7 +50,8 @@ class Channel(Generic[T]):
 
     def take(self, now: float) -> list[T]:
         """Everything that has arrived by `now` [s], oldest first."""
-        queue, due = self._queue, now + EARLY
+        queue = self._queue
+        due = now + EARLY
         if not queue or queue[0][0] > due:
             return []
         out = []
@@ -66,7 +68,8 @@ def normals(rng: np.random.Generator, block: int = 512) -> Iterator[float]:
 
 def slow_noise(rng: np.random.Generator, keep: float) -> Iterator[float]:
     """Normal numbers of variance one, each keeping a share of the last one, without end."""
-    fresh, draws = (1.0 - keep * keep) ** 0.5, normals(rng)
+    fresh = (1.0 - keep * keep) ** 0.5
+    draws = normals(rng)
     value = next(draws)
     for draw in draws:
         value = keep * value + fresh * draw

@@ -47,7 +47,8 @@ class HandDevice(ABC):
     failures = 0
 
     def __init__(self, config: DeviceConfig, rate_hz: float) -> None:
-        self._gain, self.period = config.gain, 1.0 / rate_hz
+        self._gain = config.gain
+        self.period = 1.0 / rate_hz
         self._aim = self._last = (0.0, 0.0)
 
     def aim(self, vx: float, vy: float) -> None:
@@ -56,7 +57,8 @@ class HandDevice(ABC):
 
     def command(self, reading: Pair | None, dt: float) -> Pair:
         """At the machine: the velocity [m/s] for a step, given what has arrived, if anything."""
-        gain, (x, y) = self._gain, self._last
+        gain = self._gain
+        (x, y) = self._last
         if self.is_place:
             if reading is None:
                 return 0.0, 0.0
@@ -92,7 +94,10 @@ class Mouse(HandDevice):
 
     @override
     def move(self, dt: float) -> None:
-        (ax, ay), (vx, vy), (x, y), keep = self._aim, self._velocity, self._place, self._keep
+        (ax, ay) = self._aim
+        (vx, vy) = self._velocity
+        (x, y) = self._place
+        keep = self._keep
         self._velocity = vx, vy = ax + (vx - ax) * keep, ay + (vy - ay) * keep
         nx, ny = shaken(vx, vy, self._noise)
         self._place = x + nx * dt, y + ny * dt
@@ -119,7 +124,9 @@ class Joystick(HandDevice):
 
     @override
     def move(self, dt: float) -> None:
-        (ax, ay), (x, y), keep = self._aim, self._hand, self._keep
+        (ax, ay) = self._aim
+        (x, y) = self._hand
+        keep = self._keep
         self._hand = x, y = ax + (x - ax) * keep, ay + (y - ay) * keep
         x, y = shaken(x, y, self._noise)
         self._shown = x, y = clamped(x, 1.0), clamped(y, 1.0)
@@ -200,7 +207,9 @@ class TiltPosition(Tilt):
 
     @override
     def move(self, dt: float) -> None:
-        limit, (x, y), (vx, vy) = self._limit, self._aim, self._rate
+        limit = self._limit
+        (x, y) = self._aim
+        (vx, vy) = self._rate
         self._aim = clamped(x + vx * dt, limit), clamped(y + vy * dt, limit)
 
 

@@ -106,7 +106,8 @@ class DriveTrial(Trial[Observation]):
         device = Joystick(unit, seat.person, streams, self.STEP)
         super().__init__(scenario, seat, Reach(*self._top), device, streams, reaction)
         self.points = way_of(scenario.task, *condition)
-        self.length, self.width = length_of(self.points), condition[1]
+        self.length = length_of(self.points)
+        self.width = condition[1]
         self._kept = WayKept(0.5 * (self.width - plant.width_m))
         self._seen_way, self._way = (extended(self.points, RUN_OUT) for _ in range(2))
         self.plant = Unicycle(plant.lag_s, *self._top)
@@ -154,7 +155,8 @@ class DriveTrial(Trial[Observation]):
 
     def _judged(self, seen: Observation) -> Observation:
         """Return the observation as the person judges it: place and heading with an error."""
-        person, error = self.seat.person, self._errors
+        person = self.seat.person
+        error = self._errors
         return seen._replace(
             x=seen.x + person.position_error * next(error),
             y=seen.y + person.position_error * next(error),
@@ -226,7 +228,8 @@ class HeadingTrial(DriveTrial):
         super().__init__(scenario, seat, condition, streams, reaction)
         task = scenario.task
         assert isinstance(task, HeadingStep)
-        self._watched, self._side = task.watched_s, 1.0 if leftwards else -1.0
+        self._watched = task.watched_s
+        self._side = 1.0 if leftwards else -1.0
         self.plant.heading += self._side * math.radians(condition[0])
         self.plant.speed = self._top[0]
         self._steered: list[float] = []  # against the error, step by step
@@ -270,7 +273,8 @@ class HeadingTrial(DriveTrial):
 def beside(points: Points, aside: float) -> Points:
     """A line to the left of another one, mitred at its corners [m]."""
     steps = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(points)]
-    before, after = [steps[0], *steps], [*steps, steps[-1]]
+    before = [steps[0], *steps]
+    after = [*steps, steps[-1]]
     line = []
     for (x, y), first, second in zip(points, before, after, strict=True):
         half = 0.5 * math.remainder(second - first, 2.0 * math.pi)

@@ -76,7 +76,8 @@ def fit_line(x: Sequence[float] | Floats, y: Sequence[float] | Floats) -> Fitted
     Raises:
         ValueError: fewer than two different x.
     """
-    xs, ys = np.asarray(x, float), np.asarray(y, float)
+    xs = np.asarray(x, float)
+    ys = np.asarray(y, float)
     if len(np.unique(xs)) < 2:
         raise ValueError("a line needs two different x")
     slope, intercept = np.polyfit(xs, ys, 1)
@@ -126,7 +127,8 @@ def crossover(frequencies: Sequence[float], loop: NDArray[np.complex128]) -> Cro
     Returns:
         The margin is within (-pi, pi]: whole turns cannot be told.
     """
-    log_w, gain = np.log(np.asarray(frequencies)), np.log(np.abs(loop))
+    log_w = np.log(np.asarray(frequencies))
+    gain = np.log(np.abs(loop))
     falls = np.flatnonzero((gain[:-1] >= 0.0) & (gain[1:] < 0.0))
     if not len(falls):
         return Crossover(math.nan, math.nan)
@@ -144,11 +146,13 @@ def first_peak(values: Sequence[float], falls: float = 0.1) -> int:
         values: Smoothed values of the signal.
         falls: Share; a shorter fall is noise.
     """
-    best, height = 0, 0.0
+    best = 0
+    height = 0.0
     largest = max(values)
     for place, value in enumerate(values):
         if value > height:
-            best, height = place, value
+            best = place
+            height = value
         elif height > SMALL * largest and value < (1.0 - falls) * height:
             break
     return best

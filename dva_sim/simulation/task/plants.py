@@ -64,15 +64,18 @@ class Cursor:
 
     def __init__(self, lag: float = 0.0, top: float = math.inf) -> None:
         self.x = self.y = self.vx = self.vy = 0.0
-        self._lag, self._top = lag, top
-        self._dt, self._keep = 0.0, 0.0
+        self._lag = lag
+        self._top = top
+        self._dt = 0.0
+        self._keep = 0.0
 
     def step(self, vx: float, vy: float, dt: float) -> None:
         """Let `dt` [s] pass under a command [m/s]."""
         if dt != self._dt:
             self._dt = dt
             self._keep = math.exp(-dt / self._lag) if self._lag > 0.0 else 0.0
-        top, keep = self._top, self._keep
+        top = self._top
+        keep = self._keep
         vx = -top if vx < -top else top if vx > top else vx
         vy = -top if vy < -top else top if vy > top else vy
         self.vx = vx = vx + (self.vx - vx) * keep
@@ -99,7 +102,9 @@ class Unicycle:
 
     def __init__(self, lag: float, top_speed: float, top_turn: float) -> None:
         self.x = self.y = self.heading = self.speed = self.turn_rate = 0.0
-        self._lag, self._top_speed, self._top_turn = lag, top_speed, top_turn
+        self._lag = lag
+        self._top_speed = top_speed
+        self._top_turn = top_turn
 
     def step(self, speed: float, turn_rate: float, dt: float) -> None:
         """Let `dt` [s] pass under a command [m/s, rad/s]; the heading is taken in mid-step."""

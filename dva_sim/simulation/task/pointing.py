@@ -63,7 +63,8 @@ class Motion:
 
     def add(self, frame: Places) -> None:
         """One more frame is shown."""
-        frames, since = self._frames, frame.time - SUMMED - 1e-9
+        frames = self._frames
+        since = frame.time - SUMMED - 1e-9
         while len(frames) > 1 and frames[0].time < since:
             frames.popleft()
         frames.append(frame)
@@ -184,14 +185,16 @@ class CursorTrial(Trial[Sighting]):
         reach = Reach(min(top, device.top), 0.0)
         super().__init__(scenario, seat, reach, device, streams, reaction)
         self.goal = goal
-        self._motion, self._summed = Motion(), summed_over(scenario.frames.rate_hz)
+        self._motion = Motion()
+        self._summed = summed_over(scenario.frames.rate_hz)
         self.moved_at: float | None = None
         self._eye = Strategy(seat.person, reach)
         self._noise = normals(streams.fresh("aims"))
 
     def sight(self) -> Sighting:
         """Velocities are those of the last frames; see `Motion`."""
-        now, (x, y) = self.now, (self.plant.x, self.plant.y)
+        now = self.now
+        (x, y) = (self.plant.x, self.plant.y)
         tx, ty = self.goal.target(now)
         self._motion.add(Places(now, x, y, target_x=tx, target_y=ty))
         vx, vy, tvx, tvy = self._motion.velocities()
@@ -244,7 +247,10 @@ class CursorTrial(Trial[Sighting]):
 
     @override
     def advance(self, dt: float) -> None:
-        now, plant, goal, wanted = self.now, self.plant, self.goal, self.commanded(dt)
+        now = self.now
+        plant = self.plant
+        goal = self.goal
+        wanted = self.commanded(dt)
         if self.scenario.automation:
             wanted = goal.corrected(self.scenario.automation, now, plant, wanted)
         wanted = goal.pushed(now, wanted)

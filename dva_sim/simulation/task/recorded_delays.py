@@ -66,8 +66,11 @@ class RecordedChannel(Channel[T]):
     """
 
     def __init__(self, stream: FrameStream, begin: float, extra: float) -> None:
-        self._stream, self._begin, self._extra = stream, begin, extra
-        self._numbers, self._newest = count(), -1
+        self._stream = stream
+        self._begin = begin
+        self._extra = extra
+        self._numbers = count()
+        self._newest = -1
         self._coming: list[tuple[float, int, T]] = []
 
     @override
@@ -79,7 +82,8 @@ class RecordedChannel(Channel[T]):
 
     @override
     def take(self, now: float) -> list[T]:
-        out, due = [], now + EARLY
+        out = []
+        due = now + EARLY
         while self._coming and self._coming[0][0] <= due:
             _, number, item = heapq.heappop(self._coming)
             if number > self._newest:

@@ -53,12 +53,8 @@ class OneWayDelay(Config):
 class Ways(Config):
     """Both directions: commands go up, frames come down."""
 
-    up: Annotated[OneWayDelay, Key(inner={"delay_s": Key("delay of commands", zero=True)})] = (
-        OneWayDelay()
-    )
-    down: Annotated[OneWayDelay, Key(inner={"delay_s": Key("delay of frames", zero=True)})] = (
-        OneWayDelay()
-    )
+    up: Annotated[OneWayDelay, Key(inner={"delay_s": Key("delay of commands")})] = OneWayDelay()
+    down: Annotated[OneWayDelay, Key(inner={"delay_s": Key("delay of frames")})] = OneWayDelay()
 
 
 class FramesConfig(Config):
@@ -168,14 +164,16 @@ class TaskScenario(Config):
 
     @model_validator(mode="after")
     def _there_is_room(self) -> TaskScenario:
-        task, body = self.task, self.plant.width_m
+        task = self.task
+        body = self.plant.width_m
         if isinstance(task, VEHICLES) and body >= min(w for _, w in task.conditions()):
             raise ValueError(f"plant.width_m {body:g} should be below the smallest width_m")
         return self
 
     @model_validator(mode="after")
     def _there_is_time(self) -> TaskScenario:
-        task, needed = self.task, 0.0
+        task = self.task
+        needed = 0.0
         if isinstance(task, Pointing) and task.selection == "dwell":
             needed = task.dwell_s
         elif isinstance(task, Tracking):
@@ -207,13 +205,15 @@ def build(
 
 def _complete(scenario: TaskScenario, error: Fail) -> TaskScenario:
     """Refuse what is named and does not exist."""
-    operator, device = scenario.operator, scenario.device
+    operator = scenario.operator
+    device = scenario.device
     check_strategy(operator.strategy, operator.options, error)
     traits: KeyPath = ("operator", "traits" if operator.traits else "population")
     _try(lambda: population(operator), error, traits)
     if device.kind.startswith("tilt"):
         _try(lambda: load_part(device.accelerometer), error, ("device", "accelerometer"))
-        name, options = device.filter, device.filter_options
+        name = device.filter
+        options = device.filter_options
         make = _try(lambda: load_filter(name, options), error, ("device", "filter"))
         _try(lambda: make(0.01), error, ("device", "filter_options"))
     return scenario

@@ -46,11 +46,16 @@ class Wandering:
     def __init__(
         self, task: Pointing, amplitude: float, angle: float, rng: np.random.Generator
     ) -> None:
-        self.amplitude, self.axis = amplitude, (math.cos(angle), math.sin(angle))
-        self._task, self._rng, self._angle = task, rng, angle
+        self.amplitude = amplitude
+        self.axis = (math.cos(angle), math.sin(angle))
+        self._task = task
+        self._rng = rng
+        self._angle = angle
         self.edge = self.LIMIT * amplitude
-        self._time, self._place = 0.0, (amplitude * self.axis[0], amplitude * self.axis[1])
-        self._velocity, self._turns_at = (0.0, 0.0), math.inf
+        self._time = 0.0
+        self._place = (amplitude * self.axis[0], amplitude * self.axis[1])
+        self._velocity = (0.0, 0.0)
+        self._turns_at = math.inf
         if task.target_mps:
             self._turn()
 
@@ -66,15 +71,21 @@ class Wandering:
 
     def _go_on(self, now: float) -> None:
         """Go straight on until `now` [s], and back from the limit."""
-        passed, limit = now - self._time, self.edge
-        (x, y), (vx, vy) = self._place, self._velocity
-        x, y = x + vx * passed, y + vy * passed
+        passed = now - self._time
+        limit = self.edge
+        (x, y) = self._place
+        (vx, vy) = self._velocity
+        x = x + vx * passed
+        y = y + vy * passed
         vx = -abs(vx) if x > limit else abs(vx) if x < -limit else vx
         vy = -abs(vy) if y > limit else abs(vy) if y < -limit else vy
-        self._time, self._place, self._velocity = now, (x, y), (vx, vy)
+        self._time = now
+        self._place = (x, y)
+        self._velocity = (vx, vy)
 
     def _turn(self) -> None:
-        task, rng = self._task, self._rng
+        task = self._task
+        rng = self._rng
         angle = float(rng.uniform(0.0, 2.0 * math.pi))
         if task.axes == 1:
             angle = math.pi * (angle < math.pi)
@@ -94,14 +105,22 @@ class PointGoal(ToTarget):
     """
 
     def __init__(self, task: Pointing, way: Wandering, width: float, press: float) -> None:
-        self._task, self._way, self.width = task, way, width
+        self._task = task
+        self._way = way
+        self.width = width
         self.amplitude = way.amplitude
-        self.flat, self.is_stationary = task.axes == 1, not task.target_mps
-        self.tolerance, self.edge = 0.5 * (width - task.cursor_m), way.edge
-        self._press, self._pressed_at, self._presses = press, math.inf, 0
+        self.flat = task.axes == 1
+        self.is_stationary = not task.target_mps
+        self.tolerance = 0.5 * (width - task.cursor_m)
+        self.edge = way.edge
+        self._press = press
+        self._pressed_at = math.inf
+        self._presses = 0
         self._inside_since: float | None = None
         self._selected = False
-        self._end, self._off, self._left = 0.0, 0.0, 0
+        self._end = 0.0
+        self._off = 0.0
+        self._left = 0
         self._touched: list[Pair] = []
 
     @override
@@ -120,8 +139,10 @@ class PointGoal(ToTarget):
 
     @override
     def check(self, now: float, x: float, y: float, dt: float) -> bool:
-        (tx, ty), axis = self.target(now), self._way.axis
-        dx, dy = x - tx, y - ty
+        (tx, ty) = self.target(now)
+        axis = self._way.axis
+        dx = x - tx
+        dy = y - ty
         inside = dx * dx + dy * dy <= self.tolerance * self.tolerance
         if inside and self._inside_since is None:
             self._inside_since = now
@@ -141,7 +162,8 @@ class PointGoal(ToTarget):
     def _is_selected(self, now: float, inside: bool) -> bool:
         if self._task.selection == "click":
             return now >= self._pressed_at
-        since, wait = self._inside_since, self._task.dwell_s
+        since = self._inside_since
+        wait = self._task.dwell_s
         return inside and (self._task.selection == "first_entry" or now - (since or 0.0) >= wait)
 
     @override
@@ -178,11 +200,14 @@ class TrackGoal(ToTarget):
 
     def __init__(self, task: Tracking, phases: list[float]) -> None:
         self.is_stationary = self.is_pushed = task.moves == "cursor"
-        self._task, self.tolerance = task, 0.0
+        self._task = task
+        self.tolerance = 0.0
         self._waves = list(zip(task.amplitudes_m, task.frequencies, phases, strict=True))
         self._targets: list[float] = []
         self._cursors: list[float] = []
-        self._steps, self._dt, self._last_command = 0, 0.0, 0.0
+        self._steps = 0
+        self._dt = 0.0
+        self._last_command = 0.0
 
     @override
     def target(self, now: float) -> Pair:
@@ -202,7 +227,8 @@ class TrackGoal(ToTarget):
         task = self._task
         if now < task.warm_up_s + 0.5 * dt:
             return False
-        self._steps, self._dt = self._steps + 1, SAMPLE_STEPS * dt
+        self._steps += 1
+        self._dt = SAMPLE_STEPS * dt
         if self._steps % SAMPLE_STEPS == 1:
             self._targets.append(self._sum(now - dt if self.is_stationary else now))
             self._cursors.append(-self._last_command if self.is_stationary else x)
@@ -211,7 +237,8 @@ class TrackGoal(ToTarget):
     @override
     def row(self, trial: CursorTrial) -> dict[str, Any]:
         # Without a whole record the crossover is nan.
-        targets, cursors = np.array(self._targets), np.array(self._cursors)
+        targets = np.array(self._targets)
+        cursors = np.array(self._cursors)
         found = movement_laws.Crossover(math.nan, math.nan)
         if trial.over:
             frequencies = self._task.frequencies
@@ -240,8 +267,11 @@ class ReachGoal(ToTarget):
     """
 
     def __init__(self, task: ReachTask, tolerance: float) -> None:
-        self._task, self.tolerance = task, tolerance
-        self._at, self._inside_since, self._works_until = 0, math.inf, -math.inf
+        self._task = task
+        self.tolerance = tolerance
+        self._at = 0
+        self._inside_since = math.inf
+        self._works_until = -math.inf
         self._left = 0
         self._touched: list[Pair] = []
 
@@ -259,7 +289,8 @@ class ReachGoal(ToTarget):
         if self.holds(now):
             return False
         if self._works_until > 0.0:
-            self._at, self._works_until = self._at + 1, -math.inf
+            self._at += 1
+            self._works_until = -math.inf
             self._inside_since = math.inf
             if self._at >= len(self._task.stops):
                 return True

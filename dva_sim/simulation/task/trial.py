@@ -88,7 +88,8 @@ class Waits:
     """
 
     def __init__(self) -> None:
-        self.count, self.seconds = 0, 0.0
+        self.count = 0
+        self.seconds = 0.0
         self._since: float | None = None
 
     def note(self, now: float, moves: bool) -> None:
@@ -114,7 +115,9 @@ class WayKept:
     """
 
     def __init__(self, limit: float) -> None:
-        self._limit, self._squares, self._inside = limit, 0.0, True
+        self._limit = limit
+        self._squares = 0.0
+        self._inside = True
         self.crossings = 0
         self.touched: list[Pair] = []
 
@@ -169,9 +172,15 @@ class Trial(ABC, Generic[S]):
         streams: Streams,
         reaction: float = 0.0,
     ) -> None:
-        self.scenario, self.seat, self.trace = scenario, seat, Trace()
-        self.waits, self.now, self.over = Waits(), 0.0, False
-        self.device, self.path, self._next_reading = device, 0.0, 0.0
+        self.scenario = scenario
+        self.seat = seat
+        self.trace = Trace()
+        self.waits = Waits()
+        self.now = 0.0
+        self.over = False
+        self.device = device
+        self.path = 0.0
+        self._next_reading = 0.0
         self.first_move: float | None = None
         self._driver = seat.strategy(seat.person, reach)
         perception = seat.person.perceptual_delay
@@ -197,8 +206,12 @@ class Trial(ABC, Generic[S]):
 
     def run(self, keep: bool = False) -> None:
         """Play the trial to its end; `keep` its trace to be drawn."""
-        step, half, look = self.STEP, 0.5 * self.STEP, self._look_of()
-        steps, next_frame, next_trace = 0, 0.0, 0.0
+        step = self.STEP
+        half = 0.5 * self.STEP
+        look = self._look_of()
+        steps = 0
+        next_frame = 0.0
+        next_trace = 0.0
         horizon = self.scenario.horizon_s
         while not self.over and self.now < horizon:
             now = self.now
@@ -227,7 +240,8 @@ class Trial(ABC, Generic[S]):
 
     def commanded(self, dt: float) -> Pair:
         """Return the machine's command in a step [s], after the hand, its reading and the delay."""
-        now, device = self.now, self.device
+        now = self.now
+        device = self.device
         device.move(dt)
         if now >= self._next_reading - 0.5 * dt:
             self._up.put(now, device.reading())
@@ -273,13 +287,15 @@ class Trial(ABC, Generic[S]):
             self._newest = seen[-1]
             if self._acts_from is None:
                 self._acts_from = now + self._surprise
-        newest, acts_from = self._newest, self._acts_from
+        newest = self._newest
+        acts_from = self._acts_from
         if newest is not None and acts_from is not None and now >= acts_from - half:
             self._newest = None
             self.decide(self._driver, newest, self.seat.begun + now)
 
     def _draw(self) -> None:
-        place, trace = (self.plant.x, self.plant.y), self.trace
+        place = (self.plant.x, self.plant.y)
+        trace = self.trace
         if trace.times:
             since = self.now - trace.times[-1]
             trace.speeds.append(math.dist(place, trace.places[-1]) / since)

@@ -146,7 +146,8 @@ _OF_DEVICES = {
 
 def measures_of(scenario: TaskScenario) -> tuple[str, ...]:
     """The measures that a run of a scenario holds, by its task and device."""
-    task, device = scenario.task.kind, scenario.device.kind
+    task = scenario.task.kind
+    device = scenario.device.kind
     return tuple(
         name
         for name in names_of(RUN_COLUMNS)
@@ -192,7 +193,8 @@ def _throughputs(done: Sequence[Mapping[str, Any]]) -> Row:
     cells: dict[tuple[float, float], list[Mapping[str, Any]]] = defaultdict(list)
     for trial in done:
         cells[trial["amplitude_m"], trial["width_m"]].append(trial)
-    nominal, effective = [], []
+    nominal = []
+    effective = []
     for (amplitude, width), trials in cells.items():
         times = [trial["movement_time_s"] for trial in trials]
         ends = [trial["end_m"] for trial in trials]
@@ -202,5 +204,6 @@ def _throughputs(done: Sequence[Mapping[str, Any]]) -> Row:
 
 
 def _slope(done: Sequence[Mapping[str, Any]], key: str) -> float:
-    x, y = [t[key] for t in done], [t["movement_time_s"] for t in done]
+    x = [t[key] for t in done]
+    y = [t["movement_time_s"] for t in done]
     return fit_line(x, y).slope if len(set(x)) > 1 else math.nan

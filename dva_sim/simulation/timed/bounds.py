@@ -45,7 +45,8 @@ def response_bounds(recording: TimedRecording) -> Floats:
     scenario = recording.scenario
     shift = Shift(scenario, recording.seed, load_policy("min_eta"))
     stations = list(shift.stations.values())
-    streams, indices = recording.columns["stream"], recording.columns["index"]
+    streams = recording.columns["stream"]
+    indices = recording.columns["index"]
     incidents = [
         _incident(shift, int(stream), int(index))
         for stream, index in zip(streams, indices, strict=True)
@@ -55,7 +56,8 @@ def response_bounds(recording: TimedRecording) -> Floats:
 
 def _incident(shift: Shift, stream: int, index: int) -> Incident:
     """An incident again, as far as its way matters."""
-    draws, kind = shift.demand.draws[stream], shift.scenario.demand[stream].kind
+    draws = shift.demand.draws[stream]
+    kind = shift.scenario.demand[stream].kind
     place = draws.place(index)
     return Incident(
         stream=stream,

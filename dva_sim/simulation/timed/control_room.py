@@ -53,7 +53,8 @@ def travel(
     Where each way's time is drawn for itself it is known beforehand: choosing by it is the
     point of such a world.
     """
-    terrain, units = shift.terrain, [shift.by_device[s.device] for s in starts]
+    terrain = shift.terrain
+    units = [shift.by_device[s.device] for s in starts]
     places = [
         unit.place if unit.leg is None else terrain.known_at(s.position)
         for s, unit in zip(starts, units, strict=True)
@@ -66,7 +67,8 @@ def travel(
         length = np.zeros((len(goals), len(starts)))
         return length, length + ready
     drawn = not isinstance(shift.scenario.way, str)
-    lengths, etas = [], []
+    lengths = []
+    etas = []
     for position in goals:
         goal = terrain.known_at(position)
         ways = [terrain.length(place, goal) for place in places]
@@ -138,7 +140,8 @@ class Operator:
     """
 
     def __init__(self, device: str, robots: dict[str, Unit]) -> None:
-        self.device, self._robots = device, robots
+        self.device = device
+        self._robots = robots
         self._robot: Unit | None = None
 
     def take(self, body: m.Body) -> bool:
@@ -149,7 +152,8 @@ class Operator:
         if not isinstance(body, m.Order) or body.device is None:
             return False
         robot = self._robots[body.device]
-        former, self._robot = self._robot, robot
+        former = self._robot
+        self._robot = robot
         job = None if former is None or former is robot else former.job
         if former is not None and job is not None and job.voice == self.device:
             former.take(m.OrderProgress(job.order.event_id, DONE))
@@ -176,7 +180,8 @@ def hire(shift: Team, streams: Streams, stations: dict[str, Place]) -> list[Unit
             of_kind[group.kind] += 1
             number = of_kind[group.kind]
             base = _base(shift, group, name, number, stations)
-            device, speed = id_of(group.kind, number), _speed(streams, group, name)
+            device = id_of(group.kind, number)
+            speed = _speed(streams, group, name)
             units.append(
                 Unit(
                     world=shift,
@@ -240,7 +245,8 @@ def make_core(shift: Team, policy: Policy) -> Dva:
 
 def register(shift: Team) -> None:
     """Everybody makes itself known; who is on duty later shows no place until then."""
-    mail, scenario = shift.mail, shift.scenario
+    mail = shift.mail
+    scenario = shift.scenario
 
     def enter(device: str, label: str, device_type: str) -> None:
         mail.say(device, m.Registration(label, device_type, ADDRESS))

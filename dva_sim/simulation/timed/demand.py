@@ -33,7 +33,8 @@ class EventDraws:
             return shares(streams, f"demand/{name}/{purpose}")
 
         still: Draws[float] = Always(0.0)
-        self._stream, self._terrain = stream, terrain
+        self._stream = stream
+        self._terrain = terrain
         self._zones = [terrain.zones.index(zone) for zone in stream.zones]
         weights = list(accumulate(stream.zones.values()))
         self._bounds = [w / weights[-1] for w in weights[:-1]] if weights else []
@@ -42,7 +43,8 @@ class EventDraws:
         self._truth = one("truth") if stream.false_share else Always(1.0)
         self._severity = one("severity") if isinstance(stream.severity, Severity) else still
         self._repeated = one("repeated") if stream.repeats else Always(1.0)
-        base, repeats = f"demand/{name}", stream.repeats
+        base = f"demand/{name}"
+        repeats = stream.repeats
         self._repeat = times(streams, f"{base}/repeat", repeats.after if repeats else ZERO)
         self.patience = times(streams, f"{base}/patience", stream.patience or ZERO)
         notice = ZERO if stream.notice == "detectors" else stream.notice
@@ -50,7 +52,8 @@ class EventDraws:
 
     def place(self, index: int) -> Place:
         """Return where event number `index` happens."""
-        zone, listed = -1, self._listed(index)
+        zone = -1
+        listed = self._listed(index)
         if listed is not None and listed.position is not None:
             return self._terrain.exact_place(*listed.position, listed.zone)
         if listed is not None and listed.zone is not None:
@@ -123,9 +126,12 @@ class Demand:
         happens: Callable[[Incident], None],
         noticed: Callable[[Incident], None],
     ) -> None:
-        self._scenario, self._terrain, self._clock = scenario, terrain, clock
+        self._scenario = scenario
+        self._terrain = terrain
+        self._clock = clock
         self._streams = streams
-        self._happens, self._noticed = happens, noticed
+        self._happens = happens
+        self._noticed = noticed
         self._names = scenario.stream_names
         self.draws = [
             EventDraws(stream, name, streams, terrain)
@@ -224,7 +230,9 @@ class Demand:
         if self._left <= 0:
             return
         self._left -= 1
-        now, draws, config = self._clock.now, self.draws[stream], self._scenario.demand[stream]
+        now = self._clock.now
+        draws = self.draws[stream]
+        config = self._scenario.demand[stream]
         place = draws.place(index)
         incident = Incident(
             stream=stream,

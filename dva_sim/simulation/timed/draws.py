@@ -36,7 +36,9 @@ class Draws(Generic[T]):
         name: str,
         draw: Callable[[np.random.Generator, int], list[T]],
     ) -> None:
-        self._streams, self._name, self._draw = streams, name, draw
+        self._streams = streams
+        self._name = name
+        self._draw = draw
         self._blocks: dict[int, list[T]] = {}
 
     def __getitem__(self, index: int) -> T:

@@ -32,7 +32,8 @@ def approach(incident: Incident, start: float, left: float, speed: float, until:
         return 0.0
     if inside(start):
         return until - start
-    outside, within = start, until
+    outside = start
+    within = until
     for _ in range(HALVINGS):
         middle = 0.5 * (outside + within)
         outside, within = (outside, middle) if inside(middle) else (middle, within)

@@ -53,8 +53,10 @@ class Mail:
         moved: Callable[[], None],
         attentive: bool,
     ) -> None:
-        self.core, self._clock = core, clock
-        self._changed, self._moved = changed, moved
+        self.core = core
+        self._clock = clock
+        self._changed = changed
+        self._moved = moved
         self.takers: dict[str, Taker] = {}
         self.sent = 0
         self.refused: Counter[str] = Counter()
@@ -73,7 +75,9 @@ class Mail:
 
     def carry(self) -> None:
         """Bring everything that was said, and what was said in answer, until all is quiet."""
-        waiting, core, now = self._waiting, self.core, self._clock.now
+        waiting = self._waiting
+        core = self.core
+        now = self._clock.now
         while waiting:
             source, body, about = waiting.popleft()
             self._moved()

@@ -74,7 +74,10 @@ CODES = {name: code for code, name in enumerate(OUTCOMES)}
 MEASURES = ("wait", "response", "confirmation", "sojourn")
 """From the first report to the (last) assignment, arrival, confirmation and end [s]."""
 
-WAITED, COUNT, SUM, SQUARES = 0, 1, 1 + len(MEASURES), 1 + 2 * len(MEASURES)
+WAITED = 0
+COUNT = 1
+SUM = 1 + len(MEASURES)
+SQUARES = 1 + 2 * len(MEASURES)
 CELL = 1 + 3 * len(MEASURES)
 AT_ONCE = 1e-9  # shorter waits are none [s]
 _NAN = math.nan
@@ -97,7 +100,9 @@ class Slices:
     """
 
     def __init__(self, start: float, end: float, count: int) -> None:
-        self.start, self.end, self.count = start, end, count
+        self.start = start
+        self.end = end
+        self.count = count
         self.width = (end - start) / count
 
     def of(self, time: float) -> int | None:
@@ -120,7 +125,8 @@ class Level:
     def __init__(self, slices: Slices) -> None:
         self.now = 0
         self.areas = [0.0] * slices.count
-        self._slices, self._last = slices, 0.0
+        self._slices = slices
+        self._last = 0.0
 
     def change(self, by: int, time: float) -> None:
         """There are more, or fewer, from `time` [s] on."""
@@ -131,9 +137,11 @@ class Level:
 
     def advance(self, time: float) -> None:
         """Sum up to `time` [s]."""
-        slices, since = self._slices, self._last
+        slices = self._slices
+        since = self._last
         self._last = time
-        since, until = max(since, slices.start), min(time, slices.end)
+        since = max(since, slices.start)
+        until = min(time, slices.end)
         while since < until:
             part = min(int((since - slices.start) / slices.width), slices.count - 1)
             end = until
@@ -155,7 +163,8 @@ class Ledger:
     """
 
     def __init__(self, streams: int, slices: Slices, rows: bool) -> None:
-        self._slices, self._rows = slices, array("d") if rows else None
+        self._slices = slices
+        self._rows = array("d") if rows else None
         self._cells = [[[0.0] * CELL for _ in range(slices.count)] for _ in range(streams)]
         self._outcomes = [
             [[0] * len(OUTCOMES) for _ in range(slices.count)] for _ in range(streams)
@@ -306,7 +315,8 @@ class TimedRecording:
     @property
     def measured(self) -> NDArray[np.bool_]:
         """Rows of events first reported within the measured time, shape `(n,)`."""
-        since, until = self.scenario.warm_up_s, self.scenario.horizon_s
+        since = self.scenario.warm_up_s
+        until = self.scenario.horizon_s
         detected = self.columns["detected"]
         return np.asarray((detected >= since) & (detected <= until))
 

@@ -134,8 +134,14 @@ class Unit:
         base: Place,
         speed: float,
     ) -> None:
-        self.world, self.number, self.name, self.device = world, number, name, device
-        self.group, self.base, self.place, self.speed = group, base, base, speed
+        self.world = world
+        self.number = number
+        self.name = name
+        self.device = device
+        self.group = group
+        self.base = base
+        self.place = base
+        self.speed = speed
         self.kind = group.kind
         self.job: Job | None = None
         self.leg: Leg | None = None
@@ -166,7 +172,9 @@ class Unit:
 
     def order(self, order: m.Order, voice: str) -> bool:
         """Begin something, or go on with it; what was begun before is dropped."""
-        world, job, now = self.world, self.job, self.world.clock.now
+        world = self.world
+        job = self.job
+        now = self.world.clock.now
         if job is not None and job.order.event_id == order.event_id:
             job.voice = voice
             if job.order.task != "stand_by" or order.task != "contain":
@@ -241,9 +249,11 @@ class Unit:
     def _depart(self, job: Job) -> None:
         self._turn_to(job, "travel")
         self.equipped = True
-        start, goal = self.here(), job.incident.place
+        start = self.here()
+        goal = job.incident.place
         self._stop()
-        length, seconds = self.world.terrain.length(start, goal), self.world.trip(self, start, goal)
+        length = self.world.terrain.length(start, goal)
+        seconds = self.world.trip(self, start, goal)
         if math.isinf(length):
             self._finish(job, "failed")
             return
@@ -258,7 +268,8 @@ class Unit:
         self._then(seconds, self._arrive, job)
 
     def _arrive(self, job: Job) -> None:
-        leg, incident = self.leg, job.incident
+        leg = self.leg
+        incident = job.incident
         assert leg is not None
         self._stop()
         if not job.inside and leg.length > 0.0:
@@ -277,7 +288,8 @@ class Unit:
     def _enter(self, job: Job) -> None:
         """From outside, wherever the growing danger has driven one, into it."""
         self._turn_to(job, "travel")
-        goal, now = job.incident.place, self.world.clock.now
+        goal = job.incident.place
+        now = self.world.clock.now
         apart = self.world.terrain.length(self.place, goal) > 0.0  # else ways play no part
         length = job.incident.danger_radius(now) if apart else 0.0
         job.inside = True
@@ -304,7 +316,8 @@ class Unit:
         self._report(job, "contained", 0.99)
 
     def _report(self, job: Job, finding: str, confidence: float) -> None:
-        order, severity = job.order, job.incident.severity
+        order = job.order
+        severity = job.incident.severity
         place = job.incident.place.position
         body = m.EventReport(order.event_id, order.kind, place, severity, confidence, finding)
         self._turn_to(job, "return")
@@ -316,7 +329,8 @@ class Unit:
 
     def _leave(self) -> None:
         """Step out of the danger, unless one has been called back to it."""
-        near, self._near = self._near, None
+        near = self._near
+        self._near = None
         if near is not None and self.kind == "guard":
             self.world.exposed(self, "leave", leaving(near, self.world.clock.now, self.speed))
 
@@ -328,7 +342,8 @@ class Unit:
             self._finish(job, DONE)
             return
         self._leave()
-        now, seconds = self.world.clock.now, length / self.speed
+        now = self.world.clock.now
+        seconds = length / self.speed
         self.leg = Leg(self.place, self.base, now, length, now + seconds)
         self._then(seconds, self._back, job)
 
@@ -408,7 +423,9 @@ class Unit:
         leg = self.leg
         if leg is None:
             return
-        now, gone, job = self.world.clock.now, self._gone(leg), self.job
+        now = self.world.clock.now
+        gone = self._gone(leg)
+        job = self.job
         if now < leg.until - ROUNDING:
             self.place = self.world.terrain.along(leg.start, leg.goal, gone)
         self.distance += gone
@@ -440,13 +457,15 @@ class Unit:
 
     def _turn_to(self, job: Job, phase: str) -> None:
         """Another phase of the same job begins."""
-        world, now = self.world, self.world.clock.now
+        world = self.world
+        now = self.world.clock.now
         if now > self.since:
             world.spent(self, job.phase, self.since)
             if self.kind == "guard" and job.phase in ("look", "act"):
                 seconds = on_scene(job.incident, self.since, now)
                 world.exposed(self, job.phase, seconds)
-        job.phase, self.since = phase, now
+        job.phase = phase
+        self.since = now
 
     def _then(self, delay: float, action: Any, job: Job | None) -> None:
         """Do something after a while, unless something else comes first."""

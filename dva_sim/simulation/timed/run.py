@@ -2,11 +2,91 @@
 
 from __future__ import annotations
 
+import numpy as np
+from typing_extensions import override
+
 from dva_sim.core.dispatch import Policy, load_policy
-from dva_sim.simulation.timed.foresight import oracle_for
+from dva_sim.core.dispatch.oracle import Instance, OraclePolicy, solve
+from dva_sim.core.dispatch.situation import Advice, Situation
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.simulation.timed.incidents import Incident
 from dva_sim.simulation.timed.recording import TimedRecording
 from dva_sim.simulation.timed.scenario import TimedScenario
 from dva_sim.simulation.timed.simulation import Shift
+
+MOST_EVENTS, MOST_UNITS = 12, 4  # an exact plan for more takes too long
+
+
+class _Nobody(Policy):
+    """Lets everything happen, and sends nobody."""
+
+    @override
+    def advise(self, situation: Situation, rng: np.random.Generator) -> list[Advice]:
+        return []
+
+
+def oracle_for(scenario: TimedScenario, seed: int) -> OraclePolicy:
+    """The best plan for a run, followed.
+
+    Raises:
+        ConfigError: the run is not of the small kind that can be solved exactly.
+    """
+    shift, incidents = _foresee(scenario, seed)
+    plan = solve(instance_of(shift, incidents))
+    return OraclePolicy(plan, [unit.device for unit in shift.units])
+
+
+def instance_of(shift: Shift, incidents: list[Incident]) -> Instance:
+    """Convert a run's random draws to an instance for the solver."""
+    arrival = np.array(
+        [
+            [shift.mobilisation(u, i) + shift.trip(u, u.base, i.place) for u in shift.units]
+            for i in incidents
+        ]
+    )
+    there = np.array(
+        [
+            [
+                shift.look(u, i) + shift.terrain.length(i.place, u.base) / u.speed
+                for u in shift.units
+            ]
+            for i in incidents
+        ]
+    )
+    return Instance(np.array([i.noticed for i in incidents]), arrival, arrival + there)
+
+
+def _foresee(scenario: TimedScenario, seed: int) -> tuple[Shift, list[Incident]]:
+    """Return a run and its events, in the order in which they are reported."""
+    _check_small(scenario)
+    patient = scenario.dispatch.model_copy(
+        update={"escalate_after_s": None, "most_waiting": None, "policy": "min_eta", "options": {}}
+    )
+    watched = scenario.model_copy(update={"dispatch": patient, "drain": False})
+    shift = Shift(watched, seed, _Nobody())
+    shift.run()
+    incidents = [each for known in shift.events.values() for each in known]
+    if not 0 < len(incidents) <= MOST_EVENTS:
+        raise ConfigError(
+            f"the oracle plans for 1 to {MOST_EVENTS} events; this run has {len(incidents)}: "
+            "give max_events, or a shorter horizon_s"
+        )
+    return shift, incidents
+
+
+def _check_small(scenario: TimedScenario) -> None:
+    """Refuse what a plan of tours from the base does not describe."""
+    alike = all(g.kind == "guard" and g.after == "return" for g in scenario.responders)
+    plain = all(s.sources is None and s.patience is None for s in scenario.demand)
+    together = all(g.from_s == 0.0 for g in scenario.responders)
+    few = len(scenario.names) <= MOST_UNITS and not scenario.dispatch.containment
+    if not (alike and plain and together and few):
+        raise ConfigError(
+            f"the oracle plans for up to {MOST_UNITS} guards that look and return (after: "
+            "return), without containment, patience, finite sources or later shifts"
+        )
+    if scenario.merge_distance:
+        raise ConfigError("the oracle needs dispatch.merge_distance_m 0: each report an event")
 
 
 def simulate_timed(

@@ -157,7 +157,8 @@ def _ground_of(scenario: TimedScenario, error: Fail) -> Ground:
     area = scenario.area
     if area is None:
         return Ground(zones, False, None, lambda x, y: "", lambda x, y: None)
-    width, height = area.width_m, area.height_m
+    width = area.width_m
+    height = area.height_m
 
     def outside(x: float, y: float) -> str:
         inside = 0 <= x <= width and 0 <= y <= height
@@ -179,7 +180,8 @@ Limit = Annotated[float, Field(ge=0, allow_inf_nan=True)] | None
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
 
-LOOK_S, ACT_S = Constant(mean_s=0.0), Constant(mean_s=0.0)
+LOOK_S = Constant(mean_s=0.0)
+ACT_S = Constant(mean_s=0.0)
 MOST_UNITS = 2000
 
 

@@ -192,8 +192,10 @@ def cohort(recording: TimedRecording, follow: float = FOLLOW_S) -> Columns:
     Raises:
         ConfigError: see `tables`.
     """
-    scenario, raw = recording.scenario, recording.columns
-    since, until = scenario.warm_up_s, scenario.horizon_s - (0.0 if scenario.drain else follow)
+    scenario = recording.scenario
+    raw = recording.columns
+    since = scenario.warm_up_s
+    until = scenario.horizon_s - (0.0 if scenario.drain else follow)
     if scenario.keep != "events":
         raise ConfigError(f"keep is {scenario.keep!r}; a study of dispatch needs 'events'")
     if until <= since:
@@ -257,7 +259,8 @@ def fates(events: Columns) -> Incidence:
     Works on the rows of either model: it needs the columns `outcome`, `confirmation_s`,
     `closing_s` and `watched_s`.
     """
-    closed, outcome = events["closing_s"], events["outcome"]
+    closed = events["closing_s"]
+    outcome = events["outcome"]
     ends = [np.where(outcome == fate, closed, np.nan) for fate in FATES[1:]]
     time, cause = first_of([events["confirmation_s"], *ends], events["watched_s"])
     return incidence(time, cause, len(FATES))
@@ -339,7 +342,8 @@ def _containment(true: Columns, follow: float) -> Row:
 
 def _bound(events: Columns, follow: float) -> Row:
     """The bound, as a restricted mean as well, and how often it was none."""
-    bounds, response = events["bound_s"], events["response_s"]
+    bounds = events["bound_s"]
+    response = events["response_s"]
     return {
         "bound_mean_s": _mean(np.minimum(bounds, follow)),
         "beats_bound_share": _mean(response < bounds - SLACK),

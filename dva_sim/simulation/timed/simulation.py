@@ -65,7 +65,9 @@ def _conservation(shift: Shift) -> Iterator[str]:
 
 def _limits(shift: Shift) -> Iterator[str]:
     """Nothing waits beyond its deadline, and no more than may wait."""
-    rules, now, events = shift.core.orders.rules, shift.clock.now, shift.core.events
+    rules = shift.core.orders.rules
+    now = shift.clock.now
+    events = shift.core.events
     for event in events.waiting.values():
         if now - event.waiting_since > rules.escalate_after + SLACK:
             yield "an event waits beyond its deadline"
@@ -77,7 +79,8 @@ def _team(shift: Shift) -> Iterator[str]:
     """One event per responder and one responder per event, as the DVA believes it to be."""
     engaged = shift.core.orders.engaged
     for unit in shift.units:
-        job, at = unit.job, [event.number for event in engaged.all(unit.device)]
+        job = unit.job
+        at = [event.number for event in engaged.all(unit.device)]
         if ([] if job is None else [job.order.event_id]) != at:
             yield "a responder is at something else than the DVA believes"
     for event in shift.core.events.in_state(State.ASSIGNED, State.ON_SCENE):
@@ -99,8 +102,10 @@ class Shift:
     """
 
     def __init__(self, scenario: TimedScenario, seed: int, policy: Policy) -> None:
-        self.scenario, self.seed = scenario, seed
-        self.clock, self.streams = Clock(), Streams(seed)
+        self.scenario = scenario
+        self.seed = seed
+        self.clock = Clock()
+        self.streams = Streams(seed)
         self.terrain: Terrain = terrain_of(scenario)
         slices = Slices(scenario.warm_up_s, scenario.horizon_s, scenario.batches)
         self.slices = slices
@@ -120,7 +125,8 @@ class Shift:
         self.events: dict[int, list[Incident]] = {}
         self.reports: dict[int, int] = {}
         self.unnoticed: dict[int, Incident] = {}
-        self.total, self.settled = 0, Counter[str]()
+        self.total = 0
+        self.settled = Counter[str]()
         self.violations: Counter[str] = Counter()
         self.driven = {
             control_room.id_of("operator", n): 0.0 for n in range(scenario.operators.count)
@@ -170,7 +176,8 @@ class Shift:
         check(self)
 
     def _close(self) -> TimedRecording:
-        now, scenario = self.clock.now, self.scenario
+        now = self.clock.now
+        scenario = self.scenario
         for level in (*self.waiting, *self.served):
             level.advance(now)
         for unit in self.units:
@@ -186,7 +193,8 @@ class Shift:
         counters = Counter(self.core.counters)
         counters.update({f"refused {text}": n for text, n in self.mail.refused.items()})
         for unit, record in zip(self.units, self.records, strict=True):
-            record.distance, record.jobs = unit.distance, unit.jobs
+            record.distance = unit.distance
+            record.jobs = unit.jobs
         return TimedRecording(
             scenario=scenario,
             seed=self.seed,
@@ -283,7 +291,9 @@ class Shift:
 
     def _follow(self, event: Event, now: float) -> None:
         """Count an event where it stands now: waiting, served or over."""
-        number, events, stream = event.number, self.core.events, self.events[event.number][0].stream
+        number = event.number
+        events = self.core.events
+        stream = self.events[event.number][0].stream
         waited = number not in self._served
         if number not in events.open:
             (self.waiting if waited else self.served)[stream].change(-1, now)

@@ -51,8 +51,11 @@ class SteppedShift:
         relocates: bool = False,
     ) -> None:
         policy = _Outside(self._halt)
-        policy.preempts, policy.auctions, policy.relocates = preempts, auctions, relocates
-        self._shift, self._known = Shift(scenario, seed, policy), 0
+        policy.preempts = preempts
+        policy.auctions = auctions
+        policy.relocates = relocates
+        self._shift = Shift(scenario, seed, policy)
+        self._known = 0
         self._questions: SimpleQueue[Situation | BaseException | None] = SimpleQueue()
         self._answers: SimpleQueue[Sequence[Advice] | None] = SimpleQueue()
         self._thread = threading.Thread(target=self._run, name="shift", daemon=True)
@@ -72,7 +75,8 @@ class SteppedShift:
     def new_events(self) -> list[Event]:
         """Events that were reported since this was asked last, as the DVA knows them."""
         events = self._shift.core.events
-        first, self._known = self._known + 1, events.total
+        first = self._known + 1
+        self._known = events.total
         return [e for number in range(first, events.total + 1) if (e := events.get(number))]
 
     def advise(self, advice: Sequence[Advice]) -> Situation | None:

@@ -52,7 +52,10 @@ class Place:
     def __init__(
         self, x: float, y: float, position: m.Position, zone: int = -1, fixed: Place | None = None
     ) -> None:
-        self.x, self.y, self.position, self.zone = x, y, position, zone
+        self.x = x
+        self.y = y
+        self.position = position
+        self.zone = zone
         self.fixed = fixed
         self.about: Occurrence | None = None
 
@@ -76,7 +79,8 @@ class Terrain:
     def __init__(
         self, zones: Sequence[str], frame: GeoFrame = DEFAULT_FRAME, apart: float = FAR_APART
     ) -> None:
-        self.zones, self.frame = list(zones), frame
+        self.zones = list(zones)
+        self.frame = frame
         self._apart = apart
         self._known: dict[m.Position, Place] = {}
         self._points: dict[Point, Place] = {}
@@ -222,7 +226,8 @@ class Plane(Terrain):
     @override
     def event_place(self, zone: int, u: float, v: float) -> Place:
         left, low, right, high = self._boxes[zone] if zone >= 0 else self._whole
-        x, y = left + u * (right - left), low + v * (high - low)
+        x = left + u * (right - left)
+        y = low + v * (high - low)
         place = self.place(x, y, zone if zone >= 0 else self._zone_at(x, y))
         return self.apart(place) if left == right and low == high else place
 
@@ -374,7 +379,8 @@ class Rooms(Terrain):
         if not self.site.rooms:
             raise ConfigError(f"site {name!r} has no rooms: events need them")
         super().__init__([room.name for room in self.site.rooms], self.site.frame, APART)
-        self._ways, self._way = _ways_of(self.site), way
+        self._ways = _ways_of(self.site)
+        self._way = way
         self._spots = [
             [self.fix(x, y, zone) for x, y in points]
             for zone, points in enumerate(_spots_of(self.site, spots))
@@ -386,7 +392,8 @@ class Rooms(Terrain):
     @override
     def event_place(self, zone: int, u: float, v: float) -> Place:
         if zone < 0:
-            zone, u = int(u * len(self._spots)), u * len(self._spots) % 1.0
+            zone = int(u * len(self._spots))
+            u = u * len(self._spots) % 1.0
         spots = self._spots[zone]
         return self.apart(spots[int(u * len(spots))])
 
@@ -437,7 +444,8 @@ class Rooms(Terrain):
         return self._from_half_way(a.point, b)
 
     def _from_half_way(self, start: Point, goal: Place) -> float:
-        planner, sees = self._ways.planner, self._ways.planner.line_of_sight
+        planner = self._ways.planner
+        sees = self._ways.planner.line_of_sight
         if sees(start, goal.point):
             return math.dist(start, goal.point)
         end = goal.fixed.point if goal.fixed is not None else goal.point
@@ -463,7 +471,8 @@ class Rooms(Terrain):
             return b
         reached = np.r_[0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))]
         at = gone * reached[-1] / max(self.length(a, b), 1e-9)
-        x, y = np.interp(at, reached, points[:, 0]), np.interp(at, reached, points[:, 1])
+        x = np.interp(at, reached, points[:, 0])
+        y = np.interp(at, reached, points[:, 1])
         return self.place(float(x), float(y))
 
     # --- detectors ---------------------------------------------------------------------

@@ -158,6 +158,7 @@ def recording_of(scenario: TransportScenario, contest: Contest) -> RecordedDelay
 
 
 def _stream(contest: Contest, fates: Fates, rate: float) -> FrameStream:
-    made, arrived = np.array(fates.made), np.array(fates.arrived)
+    made = np.array(fates.made)
+    arrived = np.array(fates.arrived)
     counts = (made >= contest.since) & (made < contest.until)
     return FrameStream(1.0 / rate, (arrived - made)[counts])

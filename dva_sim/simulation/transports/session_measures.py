@@ -104,7 +104,8 @@ FLOW_COLUMNS = (
 
 def contest_row(config: ContestConfig, contest: Contest) -> Row:
     """Everything that is measured of the network."""
-    commands, pictures = _counted(contest, contest.commands), _counted(contest, contest.pictures)
+    commands = _counted(contest, contest.commands)
+    pictures = _counted(contest, contest.pictures)
     row = _command_row(contest, *commands) | _picture_row(contest, *pictures)
     trips = round_trips(commands[0], commands[1], pictures[0], pictures[1])
     row |= {"round_trip_mean_s": mean(trips), "round_trip_p95_s": percentile(trips, 95)}
@@ -147,11 +148,13 @@ def age_in_force(made: Floats, arrived: Floats, since: float, until: float) -> f
         nan if none had arrived at the beginning.
     """
     used = applied(arrived)
-    at, made = arrived[used], made[used]
+    at = arrived[used]
+    made = made[used]
     edges = np.clip(np.append(at, math.inf), since, until)
     if not len(at) or at[0] > since:
         return math.nan
-    middle, length = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    length = np.diff(edges)
     return float(((middle - made) * length).sum() / (until - since))
 
 
@@ -182,7 +185,8 @@ def mean(values: Sequence[float] | NDArray[Any]) -> float:
 
 def _counted(contest: Contest, fates: Fates) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Return when messages were made and arrived, and which are counted; shape `(n,)` each."""
-    made, arrived = np.array(fates.made), np.array(fates.arrived)
+    made = np.array(fates.made)
+    arrived = np.array(fates.arrived)
     return made, arrived, (made >= contest.since) & (made < contest.until)
 
 
@@ -223,7 +227,8 @@ def jain(rates: Sequence[float]) -> float:
 
 def _way_row(config: ContestConfig, contest: Contest, way: Any) -> Row:
     """Rates and fairness in one direction; nan without competitors."""
-    per_byte, line = 8.0 / (contest.until - contest.since), config.bottleneck.rate_bps
+    per_byte = 8.0 / (contest.until - contest.since)
+    line = config.bottleneck.rate_bps
     session = contest.session_bytes[way] * per_byte
     bulk = [took * per_byte for took in contest.bulk_bytes[way]]
     fair = line / (1 + len(bulk))

@@ -125,7 +125,8 @@ def _since(moments: Floats, times: Floats) -> Floats:
 
 def sample_of(recording: TimedRecording) -> Sample:
     """Extract the sample from a recorded run."""
-    scenario, columns = recording.scenario, recording.columns
+    scenario = recording.scenario
+    columns = recording.columns
     order = np.argsort(columns["detected"], kind="stable")
     order = order[np.isfinite(columns["detected"][order])]
     row = {name: np.asarray(columns[name][order], dtype=float) for name in _MOMENTS}
@@ -169,7 +170,8 @@ def _busy_times(
 ) -> tuple[Ints, Floats, Floats]:
     """Return the units' busy times: looking, with the way back, and acting."""
     returns = np.array([g.after == "return" for g in scenario.responders for _ in range(g.count)])
-    looked, acted = who["responder"] != NOBODY, who["actor"] != NOBODY
+    looked = who["responder"] != NOBODY
+    acted = who["actor"] != NOBODY
     ended = np.where(np.isfinite(row["confirmed"]), row["confirmed"], row["closed"])
     back = np.where(returns[who["responder"]], row["arrived"] - row["departed"], 0.0)
     unit = np.concatenate([who["responder"][looked], who["actor"][acted]])
@@ -206,10 +208,13 @@ def one_server(times: Floats, services: Floats, ranks: Ints) -> Floats:
         services: `(n,)`
         ranks: The lowest is served first; nobody is interrupted `(n,)`.
     """
-    came, takes, rank = times.tolist(), services.tolist(), ranks.tolist()
+    came = times.tolist()
+    takes = services.tolist()
+    rank = ranks.tolist()
     waits = np.zeros(len(came))
     queue: list[tuple[int, int]] = []
-    free, following = -np.inf, 0
+    free = -np.inf
+    following = 0
     while following < len(came) or queue:
         if not queue:
             free = max(free, came[following])

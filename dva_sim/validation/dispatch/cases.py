@@ -84,7 +84,8 @@ def _walk(node: Any, path: list[str], whole: str) -> Any:
     """Value at a path: keys, names or numbers of items, `*` for all items."""
     if not path:
         return node
-    step, rest = path[0], path[1:]
+    step = path[0]
+    rest = path[1:]
     if step == "*" and isinstance(node, tuple):
         return [_walk(item, rest, whole) for item in node]
     found = _item(node, step) if isinstance(node, tuple) else _inside(node, step)

@@ -129,14 +129,17 @@ def play(job: StudyJob) -> Tables:
     columns["worked"] = sum(sample.worked) * share
     columns["had work"] = occupied(sample.busy_from, sample.busy_until, batches.edges)
     for name, (area, by_event) in _little(sample, batches).items():
-        columns[f"area {name}"], columns[f"times {name}"] = area, by_event
+        columns[f"area {name}"] = area
+        columns[f"times {name}"] = by_event
     for number, name in enumerate(json.loads(str(asked["measures"]))):
         columns[f"top {number}"], columns[f"bottom {number}"] = sums(name, batches)
     for name, (top, bottom) in inputs(batches, scenario).items():
-        columns[f"in {name}"], columns[f"expected {name}"] = top, bottom
+        columns[f"in {name}"] = top
+        columns[f"expected {name}"] = bottom
     for name, values in controls(batches, scenario).items():
         columns[f"control {name}"] = values
-    names, rows = list(columns), np.column_stack(list(columns.values()))
+    names = list(columns)
+    rows = np.column_stack(list(columns.values()))
     return {"rows": [dict(zip(names, row.tolist(), strict=True)) for row in rows]}
 
 
@@ -150,7 +153,8 @@ def check_identities(seed: int, progress: Progress = lambda done: None) -> list[
     checks = []
     for done, name in enumerate(IDENTITIES, start=1):
         for what, off in check_identity(name, seed):
-            found, title = certain(off), name[0].upper() + name[1:]
+            found = certain(off)
+            title = name[0].upper() + name[1:]
             judged = verdict(found, 0.0)
             checks.append(
                 Check(
@@ -224,10 +228,12 @@ def _compare(case: Case, columns: Columns) -> list[Check]:
         share = estimate(columns[f"in {name}"], columns[f"expected {name}"])
         found.append(("input", f"{name}, share of the expected", 1.0, share))
     for name in ("waiting", "served"):
-        area, times = columns[f"area {name}"].sum(), columns[f"times {name}"].sum()
+        area = columns[f"area {name}"].sum()
+        times = columns[f"times {name}"].sum()
         law = "identity", f"Little's law, {name}", 1.0, certain(area / times if times else 1.0)
         found.append(law)
-    worked, had = columns["worked"].sum(), columns["had work"].sum()
+    worked = columns["worked"].sum()
+    had = columns["had work"].sum()
     same = certain(worked / had if had else 1.0)
     found.append(("identity", "work by the units over work by the events", 1.0, same))
     lost = columns["open"].sum() + columns["broken"].max()

@@ -179,7 +179,8 @@ FASTER = 0.95  # what the one server beside one responder takes of its time
 
 def controls(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
     """Each control's value in each batch, the most telling first; all have mean zero."""
-    sample, counts = batches.sample, _counts(batches, scenario)
+    sample = batches.sample
+    counts = _counts(batches, scenario)
     look, square = _looks(sample, scenario)
     beside = _beside(batches, scenario)
     found = beside | {"look": batches.total(look, sample.served)}
@@ -239,7 +240,8 @@ def _transform(law: Law) -> float:
 
 def _gaps(sample: Sample, number: int) -> tuple[Floats, NDArray[np.bool_]]:
     """From the event before of the same stream to each event, and where that is known."""
-    gaps, known = np.zeros(len(sample.stream)), np.zeros(len(sample.stream), dtype=bool)
+    gaps = np.zeros(len(sample.stream))
+    known = np.zeros(len(sample.stream), dtype=bool)
     places = np.flatnonzero(sample.stream == number)[1:]
     gaps[places] = np.diff(sample.detected[sample.stream == number])
     known[places] = True
@@ -271,7 +273,8 @@ def _look_law_of(
 
 def _looks(sample: Sample, scenario: TimedScenario) -> tuple[Floats, Floats]:
     """Excess of each look over its mean, and of its square; 0 where nobody looked."""
-    surplus, square = np.zeros(len(sample.stream)), np.zeros(len(sample.stream))
+    surplus = np.zeros(len(sample.stream))
+    square = np.zeros(len(sample.stream))
     took = sample.confirmed - sample.arrived
     for law, which in _look_law_of(sample, scenario):
         surplus[which] = took[which] - law.mean
@@ -284,7 +287,8 @@ def _beside(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
 
     None where not all events are served, or where no formula knows that server's waits.
     """
-    sample, dispatch = batches.sample, scenario.dispatch
+    sample = batches.sample
+    dispatch = scenario.dispatch
     limited = dispatch.escalate_after_s is not None or dispatch.most_waiting is not None
     limited |= any(stream.patience is not None for stream in scenario.demand)
     lookers = len(sample.units) if len(set(sample.kinds)) == 1 else sample.kinds.count("robot")
@@ -312,7 +316,8 @@ def _ranks(scenario: TimedScenario) -> list[int]:
 
 def _means(scenario: TimedScenario, pace: float, ranks: list[int]) -> list[float] | None:
     """Mean wait of each stream at one server that takes `pace` of its time for everything."""
-    laws, between = _look_laws(scenario), [s.between for s in scenario.demand]
+    laws = _look_laws(scenario)
+    between = [s.between for s in scenario.demand]
     if laws is None:
         return None
     if len(laws) == 1 and isinstance(laws[0], Exponential) and between[0] is not None:

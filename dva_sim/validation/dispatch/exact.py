@@ -131,7 +131,8 @@ def _measures(
     waiting: float,
     queue: str,
 ) -> Measures:
-    units, sets = len(rates), np.arange(len(chance))
+    units = len(rates)
+    sets = np.arange(len(chance))
     saturated = float(chance[-1]) + waiting
     served = 1.0 if queue == "infinite" else 1 - saturated
     workloads = [float(chance[(sets >> n & 1) == 1].sum()) + waiting for n in range(units)]
@@ -230,7 +231,8 @@ def _by_class(ahead: float, rates: Sequence[float], loads: Sequence[float]) -> M
     """Waits from the mean work that is in service when somebody comes [s]."""
     if not sum(loads) < 1:
         raise ValueError(f"the servers are offered {sum(loads):g} of what they can do")
-    waits, above = [], 0.0
+    waits = []
+    above = 0.0
     for load in loads:
         waits.append(ahead / ((1 - above) * (1 - above - load)))
         above += load
@@ -267,11 +269,13 @@ def square_nearest(places: int, side_m: float = 1.0) -> Measures:
     """
     # By symmetry the event lies in the lower left quarter, and not above its diagonal.
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    nodes, weights = (nodes + 1) / 2, weights / 2
+    nodes = (nodes + 1) / 2
+    weights = weights / 2
     total = 0.0
     for u, wu in zip(nodes, weights, strict=True):
         for v, wv in zip(nodes, weights, strict=True):
-            x, y = u / 2, u * v / 2
+            x = u / 2
+            y = u * v / 2
             total += wu * wv * u * _mean_nearest(x, y, places, nodes, weights)
     # The triangle has the area 1/8; its density in (u, v) is u/4, so that of 8 of them is 2u.
     return {"distance_m": float(2 * total * side_m)}
@@ -289,7 +293,8 @@ def sqm(
         O. Berman, R. C. Larson & S. S. Chiu, Optimal server location on a network operating
         as an M/G/1 queue, Oper. Res. 33 (1985) 746-771 (the stochastic queue median).
     """
-    way, square = CENTRE * side_m / speed_mps, side_m**2 / 6 / speed_mps**2
+    way = CENTRE * side_m / speed_mps
+    square = side_m**2 / 6 / speed_mps**2
     second = 4 * square + 4 * way * service.mean + service.second
     measures = mg1(arrival_rate, LawMoments(2 * way + service.mean, second))
     return measures | {"travel_s": way, "response_s": measures["wait_s"] + way}
@@ -311,7 +316,8 @@ def _mean_nearest(x: float, y: float, places: int, nodes: Floats, weights: Float
 
 def _quarter(r: Floats, a: float, b: float) -> Floats:
     """Area of a quarter disc of radius r around a corner of an `a` by `b` rectangle, inside it."""
-    across, up = np.minimum(r, a), np.minimum(r, b)
+    across = np.minimum(r, a)
+    up = np.minimum(r, b)
     inside = r**2 >= a**2 + b**2
     # From where the circle leaves the top edge to where it ends: the area under the circle.
     start = np.sqrt(np.maximum(r**2 - up**2, 0.0))

@@ -40,10 +40,14 @@ def changed_choices(seed: int) -> Iterator[tuple[str, float]]:
     changed = dict.fromkeys(POLICIES, 0)
     rng = np.random.Generator(np.random.PCG64(seed))
     for _ in range(INSTANCES):
-        events, units = 1 + int(rng.integers(6)), 1 + int(rng.integers(6))
-        goals, starts = rng.uniform(0, 300, (events, 2)), rng.uniform(0, 300, (units, 2))
-        severities, robots = rng.random(events), rng.random(units) < 0.4
-        order, angle = rng.permutation(units), float(rng.uniform(0, 2 * math.pi))
+        events = 1 + int(rng.integers(6))
+        units = 1 + int(rng.integers(6))
+        goals = rng.uniform(0, 300, (events, 2))
+        starts = rng.uniform(0, 300, (units, 2))
+        severities = rng.random(events)
+        robots = rng.random(units) < 0.4
+        order = rng.permutation(units)
+        angle = float(rng.uniform(0, 2 * math.pi))
         same = np.arange(units)
         for policy in POLICIES:
             before = _choice(policy, goals, starts, severities, robots=robots, order=same)
@@ -56,7 +60,8 @@ def changed_choices(seed: int) -> Iterator[tuple[str, float]]:
 
 def _turned(points: Floats, angle: float) -> Floats:
     """The points rotated about somewhere far away, shape `(n, 2)`."""
-    cosine, sine = math.cos(angle), math.sin(angle)
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
     turn = np.array([[cosine, -sine], [sine, cosine]])
     return np.asarray((points - [1000.0, -500.0]) @ turn.T)
 

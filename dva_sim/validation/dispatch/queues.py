@@ -179,7 +179,8 @@ def erlang_a(
         Palm/Erlang-A queue (2007). A customer with `j` places to go until it is served
         leaves each with rate `c mu + i theta` and is served with `c mu / (c mu + j theta)`.
     """
-    rate, impatience = 1 / mean_service_s, 1 / mean_patience_s
+    rate = 1 / mean_service_s
+    impatience = 1 / mean_patience_s
     most = _longest_queue(arrival_rate, rate * servers, impatience)
     inside = np.arange(servers + most + 1)
     busy = np.minimum(inside, servers)

@@ -246,7 +246,8 @@ def _row(check: Check) -> dict[str, Any]:
 
 def words(check: Check) -> list[str]:
     """A check in words: measure, exact, simulated, standard error, deviation, verdict."""
-    found, exact = check.found, check.exact
+    found = check.found
+    exact = check.exact
     off = f"{check.deviation:+.2f} SE" if found.error > 0 else "-"
     return [
         check.measure,

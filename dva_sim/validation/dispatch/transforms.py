@@ -30,7 +30,9 @@ def laplace(law: distributions.Law, s: float) -> float:
     if isinstance(law, distributions.Gamma):
         return float((1 + s * law.mean_s / law.shape) ** -law.shape)
     if isinstance(law, distributions.Hyperexponential):
-        fast, slow = 0.5 / law.share, 0.5 / (1 - law.share)  # times the mean
+        # times the mean
+        fast = 0.5 / law.share
+        slow = 0.5 / (1 - law.share)
         rest = 1 - law.share
         return law.share / (1 + s * law.mean_s * fast) + rest / (1 + s * law.mean_s * slow)
     if isinstance(law, distributions.Lognormal):
@@ -50,7 +52,8 @@ def _over_exponential(law: distributions.Weibull, s: float) -> float:
     scale = law.mean_s / math.gamma(1 + 1 / law.shape)
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     ends = np.array([0.0, 1e-6, 1e-4, 1e-2, 0.1, 0.5, 1, 2, 4, 8, 16, 32, 64])
-    starts, widths = ends[:-1, None], np.diff(ends)[:, None]
+    starts = ends[:-1, None]
+    widths = np.diff(ends)[:, None]
     e = starts + widths * (nodes + 1) / 2
     inner = np.exp(-s * scale * e ** (1 / law.shape) - e)
     return float((widths[:, 0] / 2) @ (inner @ weights))

@@ -111,7 +111,8 @@ def _effort(job: StudyJob) -> float:
 
 
 RUNS, QUICK_RUNS = 200, 40  # of a condition under loss
-CONTROL_RUNS, QUICK_CONTROL_RUNS = 50, 20
+CONTROL_RUNS = 50
+QUICK_CONTROL_RUNS = 20
 JITTER_RUNS = 20  # where nothing is lost, but delays are left to chance
 MODEL = "the model"
 CONTROLS: dict[str, Depth] = {
@@ -266,7 +267,8 @@ def orders_of(
     groups: Sequence[ConditionGroup], setting: NetworkSetting
 ) -> dict[str, list[ModelRuns]]:
     """Model runs to make: full model, oversimplified controls, and ablations."""
-    pooled, runs = pooled_of(groups), setting.control_runs
+    pooled = pooled_of(groups)
+    runs = setting.control_runs
     orders = {MODEL: [ModelRuns(g.condition, setting.runs(g)) for g in groups]}
     for name, depth in CONTROLS.items() if pooled else ():
         orders[name] = [ModelRuns(g.condition, runs, depth) for g in pooled]

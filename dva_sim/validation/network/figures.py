@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_GOOD, _BAD, _PALE = "#0072B2", "#D55E00", "#9a9a9a"
+_GOOD = "#0072B2"
+_BAD = "#D55E00"
+_PALE = "#9a9a9a"
 _PAIRS = (
     ("applied_hz", None, "commands applied [1/s]"),
     ("age_p50", "age_p95", "age when applied [ms]"),

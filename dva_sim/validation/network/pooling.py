@@ -186,7 +186,8 @@ def chance(cell: ComparedCell) -> float:
 
 def resolution(cell: ComparedCell) -> float:
     """Change of the measure if each command took half a millisecond longer."""
-    measure, condition = cell.measure, cell.group.condition
+    measure = cell.measure
+    condition = cell.group.condition
     if measure.is_time:
         return 1000.0 * EXACT_S
     if measure.name == "applied_hz":
@@ -208,7 +209,8 @@ def null_scores(cells: Sequence[ComparedCell], rng: np.random.Generator) -> Floa
     draws: dict[Condition, tuple[NDArray[np.int64], NDArray[np.int64], Floats]] = {}
     columns = []
     for cell in cells:
-        runs, taken = len(cell.predicted), len(cell.group.runs)
+        runs = len(cell.predicted)
+        taken = len(cell.group.runs)
         own = draws.get(cell.group.condition)
         if own is None:
             picks = rng.integers(0, 1 << 30, size=(2, DRAWS, max(runs, taken)))

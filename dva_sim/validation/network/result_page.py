@@ -42,7 +42,8 @@ def table(comparison: NetworkComparison, kind: ConditionKind) -> list[list[str]]
     misses: dict[Condition, list[str]] = {}
     outside = comparison.outside
     for cell in comparison.cells:
-        condition, name = cell.group.condition, cell.measure.name
+        condition = cell.group.condition
+        name = cell.measure.name
         cells.setdefault(condition, {})[name] = cell
         if id(cell) in outside:
             misses.setdefault(condition, []).append(name)
@@ -278,8 +279,10 @@ def summary(comparison: NetworkComparison) -> list[tuple[str, str, str, str]]:
 
 def _pooled_rows(pooled: Pooled) -> list[tuple[str, str, str, str]]:
     what = "pooled under loss, {}".format
-    found, none = _significant(pooled), _passes(not pooled.significant)
-    rms, spread = f"{pooled.rms:.2f}", _passes(pooled.spread_is_right)
+    found = _significant(pooled)
+    none = _passes(not pooled.significant)
+    rms = f"{pooled.rms:.2f}"
+    spread = _passes(pooled.spread_is_right)
     rows = [
         (what("significant after Holm"), found, "none", none),
         (what("root mean square of z"), rms, _expected(pooled), spread),

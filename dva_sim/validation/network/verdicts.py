@@ -172,7 +172,9 @@ def values_of(row: Row) -> dict[str, float]:
     - `queue`: commands sent and not yet applied, on average, by Little's law from the rate of
       applications and their mean age.
     """
-    sent, rate, age = row["n_sent"], row["applied_hz"], row["age_mean"]
+    sent = row["n_sent"]
+    rate = row["applied_hz"]
+    age = row["age_mean"]
     found = {m.name: row[m.name] for m in MEASURES if m.name in row}
     found["delivered"] = row["n_distinct"] / sent if sent else math.nan
     found["queue"] = rate * age / 1000.0 if rate else 0.0
@@ -279,7 +281,8 @@ def judge(cell: ComparedCell) -> CellVerdict:
 
 def reason_against(cell: ComparedCell) -> str:
     """Reason why a measure of a condition is not judged; empty if it is."""
-    group, measure = cell.group, cell.measure
+    group = cell.group
+    measure = cell.measure
     if group.left_out:
         return group.left_out
     if not len(cell.measured):
@@ -304,7 +307,9 @@ def _against_single(cell: ComparedCell) -> str:
 
 def _band(cell: ComparedCell) -> tuple[float, float]:
     """Around what was measured."""
-    group, measure, real = cell.group, cell.measure, cell.real
+    group = cell.group
+    measure = cell.measure
+    real = cell.real
     share = SHARES.get(group.kind, math.nan)
     if group.kind == "overload" and is_bounded(group.condition):
         share = BOUNDED_SHARE

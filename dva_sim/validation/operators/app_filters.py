@@ -13,7 +13,8 @@ from dva_sim.kernel.streams import Streams
 
 Values = dict[str, float]
 RATE = 34.0  # samples per second: 17 in 500 ms, as its tablet managed
-COPY, IN_PLACE = "median20-copy", "median20-inplace"
+COPY = "median20-copy"
+IN_PLACE = "median20-inplace"
 STEP_LOOK = 0.2  # [s]
 STEP_LEVELS = [2.0] * 102 + [8.0] * 102 + [2.0] * 204  # 3 s, 3 s, 6 s
 BATCHES = 20_000  # of noise
@@ -33,7 +34,8 @@ def ages() -> Values:
 
 def steps() -> Values:
     """Outputs of both variants for a level of 2, then 8, then 2, with a maximum delay of 0.2 s."""
-    copy, in_place = step_outputs(COPY), step_outputs(IN_PLACE)
+    copy = step_outputs(COPY)
+    in_place = step_outputs(IN_PLACE)
     return {"copy": max(copy), "rises": max(in_place), "never-returns": in_place[-1]}
 
 
@@ -52,7 +54,8 @@ def smoothing(seed: int) -> Values:
 def _mean_age(filter_: Filter, longest: float) -> float:
     """On a ramp of one per second, over whole periods between two looks [s]."""
     samples = [n / RATE for n in range(1, round(40 * RATE) + 1)]
-    values, period = _outputs(filter_, samples, longest), _period(longest)
+    values = _outputs(filter_, samples, longest)
+    period = _period(longest)
     taken = [period * (look + 1) for look in range(len(values))]
     old = [then + 0.5 * period - value for then, value in zip(taken, values, strict=True)]
     return float(np.mean(old[5:]))
@@ -60,13 +63,16 @@ def _mean_age(filter_: Filter, longest: float) -> float:
 
 def _outputs(filter_: Filter, samples: list[float], longest: float) -> list[float]:
     """The value at each look at the filter."""
-    values, due, looks = [], 0, 1
+    values = []
+    due = 0
+    looks = 1
     while due < len(samples):
         end = int(looks * _period(longest) * RATE + 1e-9)
         for sample in samples[due:end]:
             filter_.add((sample, 0.0))
         values.append(filter_.value()[0])
-        due, looks = end, looks + 1
+        due = end
+        looks += 1
     return values
 
 

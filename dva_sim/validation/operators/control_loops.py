@@ -64,9 +64,11 @@ def integrator(gain_delay: float) -> list[float]:
     What is seen holds for a step, so half a step more would pass on average; the mean of two
     neighbouring frames takes that off.
     """
-    dt, strategy = 1.0 / STEPS, Strategy(_person(gain_delay), LIMITLESS)
+    dt = 1.0 / STEPS
+    strategy = Strategy(_person(gain_delay), LIMITLESS)
     frames = deque([1.0] * (STEPS + 1), maxlen=STEPS + 1)
-    place, places = 1.0, []
+    place = 1.0
+    places = []
     for step in range(DELAYS * STEPS):
         x = 0.5 * (frames[0] + frames[1])
         place += strategy.point(PointView(step * dt, _cursor(x, 0.0), 1.0))[0] * dt
@@ -87,16 +89,21 @@ def pure_pursuit(speed_delay: float) -> list[float]:
         Distance from the line, signed, step by step [m].
     """
     person = replace(_person(), caution=_FAR)
-    dt, speed = 1.0 / STEPS, speed_delay * person.habits.steering.nearest_look_m
+    dt = 1.0 / STEPS
+    speed = speed_delay * person.habits.steering.nearest_look_m
     pursuit = Pursuit(person, Reach(speed, _FAR))
     route = Route(np.array([[0.0, 0.0], [2.0 * DELAYS, 0.0]]))
-    x, y, heading = 1.0, 1e-3, 0.0
-    frames, errors = deque([(x, y, heading)] * STEPS, maxlen=STEPS), []
+    x = 1.0
+    y = 1e-3
+    heading = 0.0
+    frames = deque([(x, y, heading)] * STEPS, maxlen=STEPS)
+    errors = []
     for step in range(DELAYS * STEPS):
         seen = Observation(0, *frames[0], speed=0.0, turn_rate=0.0, hazards=())
         wanted = pursuit.drive(route, View(step * dt, seen, 1.0), 0.0)
         middle = heading + 0.5 * wanted.turn_rate * dt
-        x, y = x + wanted.speed * math.cos(middle) * dt, y + wanted.speed * math.sin(middle) * dt
+        x = x + wanted.speed * math.cos(middle) * dt
+        y = y + wanted.speed * math.sin(middle) * dt
         heading += wanted.turn_rate * dt
         frames.append((x, y, heading))
         errors.append(y)
@@ -117,7 +124,8 @@ def smith_response(gain: float, delay: float, end: float) -> list[float]:
     dt = delay / SMITH_STEPS
     predictor = Predictor(_person(gain), LIMITLESS)
     on_the_way = deque([0.0] * SMITH_STEPS, maxlen=SMITH_STEPS)
-    place, places = 0.0, []
+    place = 0.0
+    places = []
     for step in range(round(end / dt)):
         velocity, _ = predictor.point(PointView(step * dt, _cursor(place, 1.0), delay))
         place += on_the_way[0] * dt

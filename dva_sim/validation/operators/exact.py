@@ -63,14 +63,17 @@ def helpers(seed: int) -> Values:
     """
     document = load_yaml(resources.find(HELP, "experiments/scenarios"))
     recording = simulate_timed(timed.build(document, {"horizon_s": HELP_S}), seed)
-    row, names = recording.columns, recording.streams
+    row = recording.columns
+    names = recording.streams
     came = np.isfinite(row["arrived"])
     assigned, departed, arrived = (
         np.asarray(row[name][came], dtype=float) for name in ("assigned", "departed", "arrived")
     )
-    turnout, travel = departed - assigned, arrived - departed
+    turnout = departed - assigned
+    travel = arrived - departed
     stream = np.asarray(names)[row["stream"][came].astype(int)]
-    rng, guard = Streams(seed).fresh("guards"), guard_profile()
+    rng = Streams(seed).fresh("guards")
+    guard = guard_profile()
     guards = np.array([Walker.draw(guard, rng).mobilisation for _ in range(PERSONS)])
     return {
         "turnout-fire": _nine_in_ten(guards),
@@ -86,7 +89,8 @@ def alarms() -> Values:
 
 def walkers(seed: int) -> Values:
     """Mean and standard deviation of the free walking speed of guards [m/s]."""
-    rng, guard = Streams(seed).fresh("walkers"), guard_profile()
+    rng = Streams(seed).fresh("walkers")
+    guard = guard_profile()
     speeds = [Walker.draw(guard, rng).speed for _ in range(PERSONS)]
     return {"mean": float(np.mean(speeds)), "sd": float(np.std(speeds, ddof=1))}
 
@@ -107,7 +111,8 @@ def _nine_in_ten(times: Floats) -> float:
 
 
 def _alarm_time(ppm: float) -> float:
-    alarm, dt = CoAlarm(), 1.0
+    alarm = CoAlarm()
+    dt = 1.0
     steps = round(LATEST / dt)
     return next(((n + 1) * dt for n in range(steps) if alarm.add(ppm, dt)), np.inf)
 

@@ -184,7 +184,8 @@ def excavator_values(cells: Cells) -> Values:
 def tracking_values(cells: Cells) -> Values:
     """Means over persons of what is read off their open loops."""
     trials = cells["tracking"]
-    crossover, margin = mean(trials, "crossover_rad_s"), mean(trials, "phase_margin_deg")
+    crossover = mean(trials, "crossover_rad_s")
+    margin = mean(trials, "phase_margin_deg")
     return {"S14/crossover": crossover, "S14/margin": margin}
 
 
@@ -266,7 +267,10 @@ def moving_values(cells: Cells) -> Values:
 
 def _individuals(cells: Cells) -> Values:
     """Variances within and between persons of log times, slopes on lag, and practice."""
-    rest, slopes, errors, practice = [], [], [], []
+    rest = []
+    slopes = []
+    errors = []
+    practice = []
     every = {cell: log_times(trials) for cell, trials in cells.items()}
     persons = np.unique(next(iter(cells.values())).person)
     within = []
@@ -491,7 +495,8 @@ EXPERIMENTS: tuple[Experiment, ...] = (
 """Every experiment; which of them may be fitted to, the split file says."""
 
 
-PERSONS, QUICK_PERSONS = 24, 6
+PERSONS = 24
+QUICK_PERSONS = 6
 FAILED = "{!r} could not be simulated"
 
 Traits = Mapping[str, float]

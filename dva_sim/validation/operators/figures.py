@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 
 
 TIME = "movement_time_s"
-BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
+BLUE = "#0072B2"
+ORANGE = "#D55E00"
+GREEN = "#009E73"
 _RING: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": ORANGE, "ms": 9, "mew": 1.5, "ls": ""}
 
 
@@ -79,13 +81,15 @@ def straight(axes: Axes, x: Floats, y: Floats, verdict: LineVerdict) -> None:
 
 def bar(axes: Axes, x: float, line: TargetLine, width: float) -> None:
     """A band as a grey bar."""
-    low, high = line.low or 0.0, line.high or 0.0
+    low = line.low or 0.0
+    high = line.high or 0.0
     axes.bar([x], [high - low], width, bottom=low, color=FAINT, alpha=0.8, lw=0, zorder=0)
 
 
 def compared(axes: Axes, x: float, verdict: LineVerdict) -> None:
     """A band, the published number if there is one, and what is simulated, also in words."""
-    line, found = verdict.line, verdict.found
+    line = verdict.line
+    found = verdict.found
     bar(axes, x, line, 0.5)
     if line.target is not None:
         axes.plot([x], [line.target], **_RING)
@@ -160,7 +164,8 @@ def _tilt(lines: ByLine, cells: Cells) -> Drawn:
         compared(rates, place, lines[f"S9/{name}"])
     rates.set_xticks([0, 1], ["first entry", "dwell 0.5 s"])
     rates.set(xlim=(-0.6, 1.6), ylabel="throughput [bit/s]", title="Throughput at a gain of 50")
-    best, most = lines["S10/best"].line, lines["S10/most-tilt"].line
+    best = lines["S10/best"].line
+    most = lines["S10/most-tilt"].line
     times.axvspan(best.low or 0.0, best.high or 0.0, color=FAINT, alpha=0.55, lw=0)
     tilts.axhspan(most.low or 0.0, most.high or 0.0, color=FAINT, alpha=0.55, lw=0)
     _by_gain(times, cells, TIME, 1.0)
@@ -263,9 +268,12 @@ def _fixed(value: float, digits: int) -> str:
 def _tracking(lines: ByLine, cells: Cells) -> Drawn:
     figure, [[axes]] = panels(1, 1, 3.0)
     trials = cells["tracking"]
-    crossover, margin = lines["S14/crossover"].line, lines["S14/margin"].line
-    low, high = crossover.low or 0.0, crossover.high or 0.0
-    below, above = margin.low or 0.0, margin.high or 0.0
+    crossover = lines["S14/crossover"].line
+    margin = lines["S14/margin"].line
+    low = crossover.low or 0.0
+    high = crossover.high or 0.0
+    below = margin.low or 0.0
+    above = margin.high or 0.0
     axes.fill_between([low, high], below, above, color=FAINT, alpha=0.55, lw=0, label="band")
     axes.plot(trials["crossover_rad_s"], trials["phase_margin_deg"], "o", color=BLUE, ms=5)
     axes.set_xlim(0, max(5.4, 1.1 * np.nanmax(trials["crossover_rad_s"], initial=0.0)))
@@ -299,7 +307,9 @@ def _overview(verdicts: Sequence[LineVerdict]) -> Drawn:
     figure, [[axes]] = panels(1, 1, 0.9 + _ROW * (len(shown) + 2 * len(_PEOPLE)))
     axes.axvspan(-1, 1, color=FAINT, alpha=0.55, lw=0)
     axes.axvline(0, color="white", lw=1.0)
-    row, ticks, labels = 0.0, [], []
+    row = 0.0
+    ticks = []
+    labels = []
     for kind in _PEOPLE:
         own = [v for v in shown if v.line.kind == kind]
         row += 1.0
@@ -323,10 +333,12 @@ def _overview(verdicts: Sequence[LineVerdict]) -> Drawn:
 
 
 def _mark(axes: Axes, row: float, verdict: LineVerdict) -> None:
-    low, high = verdict.line.low, verdict.line.high
+    low = verdict.line.low
+    high = verdict.line.high
     if low is None or high is None:
         return
-    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    middle = 0.5 * (low + high)
+    half = 0.5 * (high - low)
     colour = _COLOURS[verdict.word]
     value, left, right = (
         (x - middle) / half for x in (verdict.found.value, verdict.found.low, verdict.found.high)

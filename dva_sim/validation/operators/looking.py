@@ -74,7 +74,8 @@ def looks(person: Person, cell: str, seed: int) -> list[Row]:
 
 def vehicles(person: Person, cell: str, seed: int) -> list[Row]:
     """Finishing times of vehicles that ask at the same time, opening the picture included."""
-    clock, every = Clock(), [_Vehicle() for _ in range(int(cell))]
+    clock = Clock()
+    every = [_Vehicle() for _ in range(int(cell))]
     attention = _attention(clock, person, seed)
     for vehicle in every:
         attention.begin(vehicle)
@@ -111,7 +112,8 @@ def choices(person: Person, cell: str, seed: int) -> list[Row]:
 
 def items(person: Person, cell: str, seed: int) -> list[Row]:
     """Items beside the way of a searcher: found or not."""
-    noise, rows = _normals(seed), []
+    noise = _normals(seed)
+    rows = []
     clear = clearness(ANGLE, person.habits.looking.half_seen_rad)
     for _ in range(ITEMS):
         evidence = _evidence(person, "accuracy", noise)
@@ -129,7 +131,8 @@ def alarms(person: Person, cell: str, seed: int) -> list[Row]:
 
 def walkers(person: Person, cell: str, seed: int) -> list[Row]:
     """People on foot who are in no hurry; who is at the screen does not matter."""
-    rng, guard = Streams(seed).fresh("walkers"), guard_profile()
+    rng = Streams(seed).fresh("walkers")
+    guard = guard_profile()
     return [{"speed_mps": Walker.draw(guard, rng).speed} for _ in range(WALKERS)]
 
 

@@ -16,7 +16,8 @@ from dva_sim.validation.operators.trials import Cells, Floats, person_means, per
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-BLUE, ORANGE = "#0072B2", "#D55E00"
+BLUE = "#0072B2"
+ORANGE = "#D55E00"
 
 
 def draw_curves(played: Mapping[str, Cells]) -> list[Drawn]:
@@ -52,16 +53,20 @@ def _ours(axes: Axes, x: Sequence[float], persons: Sequence[Floats], *, log: boo
     values = [np.log(each) if log else each for each in persons]
     means = np.array([each.mean() for each in values])
     halves = np.array([1.96 * each.std(ddof=1) / np.sqrt(len(each)) for each in values])
-    low, high = means - halves, means + halves
+    low = means - halves
+    high = means + halves
     if log:
-        means, low, high = np.exp(means), np.exp(low), np.exp(high)
+        means = np.exp(means)
+        low = np.exp(low)
+        high = np.exp(high)
     ends = [means - low, high - means]
     axes.errorbar(x, means, yerr=ends, fmt="o-", color=BLUE, ms=5, lw=1.2, label="simulated")
 
 
 def _moving(curves: Mapping[str, CurveConfig], cells: Cells) -> Drawn:
     figure, [[every, slow, presses]] = panels(1, 3, 3.0)
-    added, speeds = of.ADDED_S, of.SPEEDS_MPS
+    added = of.ADDED_S
+    speeds = of.SPEEDS_MPS
     ratios = [of.moving_ratios(cells, lag, speeds) for lag in added]
     slowest = [of.moving_ratios(cells, lag, speeds[:1]) for lag in added]
     clicks = [

@@ -125,7 +125,8 @@ def by_strategy(played: Mapping[str, Cells]) -> dict[str, Cells]:
 
 def headline(outcome: Tally) -> str:
     """Headline of the result, in three sentences."""
-    (exact, exact_of), (held, held_of) = outcome.exact, outcome.held_out
+    (exact, exact_of) = outcome.exact
+    (held, held_of) = outcome.held_out
     whole, whole_of = outcome.publications
     share = f"{100 * held / held_of:.0f} %" if held_of else "none"
     found = (
@@ -183,7 +184,8 @@ def published(line: TargetLine) -> str:
 
 def simulated(verdict: LineVerdict) -> str:
     """The value, with its interval where something is left to chance."""
-    found, unit = verdict.found, f" {verdict.line.unit}" if verdict.line.unit else ""
+    found = verdict.found
+    unit = f" {verdict.line.unit}" if verdict.line.unit else ""
     if math.isnan(found.value):
         return "nothing"
     if math.isinf(found.value):
@@ -216,7 +218,8 @@ def _shares(played: Mapping[str, Cells]) -> list[Row]:
 
 
 def _row(verdict: LineVerdict) -> Row:
-    line, found = verdict.line, verdict.found
+    line = verdict.line
+    found = verdict.found
     row: dict[str, Any] = {"line": line.id, "metric": line.metric, "what": line.what}
     row |= {"source": line.source, "publication": line.publication, "tag": line.tag}
     row |= {"kind": line.kind, "unit": line.unit, "target": line.target}

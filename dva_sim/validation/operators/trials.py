@@ -134,7 +134,8 @@ def _middle(draws: Sequence[float]) -> tuple[float, float]:
 
 def person_means(trials: Trials, name: str) -> Floats:
     """The mean of each person `(persons,)`, without what is missing."""
-    values, known = trials[name], np.isfinite(trials[name])
+    values = trials[name]
+    known = np.isfinite(trials[name])
     total = np.bincount(trials.person[known], values[known])
     count = np.bincount(trials.person[known])
     return np.asarray(total[count > 0] / count[count > 0])

@@ -74,7 +74,8 @@ def judge(lines: Sequence[TargetLine], found: Mapping[str, Found]) -> list[LineV
 
 def outcome_of(verdicts: Sequence[LineVerdict], rule: RuleConfig) -> Tally:
     """Tally the verdicts by the rule of the split."""
-    exact, held_out = _share(verdicts, "exact"), _share(verdicts, "held-out")
+    exact = _share(verdicts, "exact")
+    held_out = _share(verdicts, "held-out")
     return Tally(exact, held_out, _whole(verdicts), rule)
 
 

@@ -25,13 +25,14 @@ TILE, JOINT = 1.0, 0.035  # of a floor [m]
 HAZE = 250.0  # daylight falls off to a half over this distance [m], assumed
 LAMPS = 3.0  # about so far apart [m]
 
-GRASS, PAVING, BARE_FLOOR, LINOLEUM = (
-    (142, 160, 120),
-    (206, 202, 192),
-    (214, 211, 204),
-    (235, 232, 226),
-)
-DAYLIGHT, BARE_CEILING, CEILING, LAMP = (205, 222, 238), (208,) * 3, (206,) * 3, (255, 255, 248)
+GRASS = (142, 160, 120)
+PAVING = (206, 202, 192)
+BARE_FLOOR = (214, 211, 204)
+LINOLEUM = (235, 232, 226)
+DAYLIGHT = (205, 222, 238)
+BARE_CEILING = (208,) * 3
+CEILING = (206,) * 3
+LAMP = (255, 255, 248)
 
 
 class Floors:
@@ -72,7 +73,8 @@ class Floors:
         self.daylight: Floats = daylight.astype(np.float32)[:, None]
         self._per_metre: Floats = (1 / cell).astype(np.float32)
         self._scale: Floats = (depth[:, None] / cell).astype(np.float32)
-        self._start, self._columns = starts[part].astype(np.int32), sizes[part, 1].astype(np.int32)
+        self._start = starts[part].astype(np.int32)
+        self._columns = sizes[part, 1].astype(np.int32)
         self._last = (sizes[part] - 1).astype(np.float32)
 
     def seen(self, pose: Pose, slopes: Floats) -> Colours:
@@ -82,7 +84,8 @@ class Floors:
             pose: Pose of the lens [m, rad].
             slopes: Slope of each column to the right, per metre ahead `(w,)`.
         """
-        cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+        cos = math.cos(pose.heading)
+        sin = math.sin(pose.heading)
         x0, y0 = self._rooms.origin
         x = self._scale * (cos + slopes * sin)
         x += (pose.x - x0) * self._per_metre
@@ -128,10 +131,8 @@ class Floors:
 
     def _ring(self, draw: Any, x: float, y: float, radius: float, colour: Any) -> None:
         """A painted circle on the floor."""
-        column, row = (
-            (x - self._rooms.origin[0]) / self._rooms.cell,
-            (y - self._rooms.origin[1]) / self._rooms.cell,
-        )
+        column = (x - self._rooms.origin[0]) / self._rooms.cell
+        row = (y - self._rooms.origin[1]) / self._rooms.cell
         r = radius / self._rooms.cell
         width = max(1, round(0.08 / self._rooms.cell))
         draw.ellipse((column - r, row - r, column + r, row + r), outline=colour, width=width)
@@ -164,7 +165,8 @@ class Floors:
 
 def _coarser(colours: Bytes, times: int) -> Bytes:
     """Blocks of cells in one."""
-    rows, columns = colours.shape[0] // times, colours.shape[1] // times
+    rows = colours.shape[0] // times
+    columns = colours.shape[1] // times
     blocks = colours.reshape(rows, times, columns, times, 3).mean(axis=(1, 3))
     return np.asarray(blocks, dtype=np.uint8)
 

@@ -55,10 +55,12 @@ class Camera:
         height: int = 240,
         field_of_view: float = FIELD_OF_VIEW,
     ) -> None:
-        self.width, self.height = width, height
+        self.width = width
+        self.height = height
         self.focal_length = width / 2 / math.tan(field_of_view / 2)  # [pixels]
         self._ceiling = site.ceiling
-        self._surfaces, self._rooms = Surfaces(site), RoomGrid(site)
+        self._surfaces = Surfaces(site)
+        self._rooms = RoomGrid(site)
         self._uprights = Uprights(site, self._surfaces, self._rooms)
         column = np.arange(width, dtype=np.float32) + 0.5 - width / 2
         self._slopes: Floats = (column / self.focal_length).astype(np.float32)
@@ -96,7 +98,8 @@ class Camera:
         walls, before = self._surfaces.hits(pose, self._slopes)
         self._draw_walls(walls, pose, colours, depth, light)
         self._draw_others(before, pose, colours, depth, light)
-        scene, rays = _develop(colours, light), self._rays(pose)
+        scene = _develop(colours, light)
+        rays = self._rays(pose)
         for hazard in hazards:
             if firelight := hazard.light(time):
                 self._light_up(scene, depth, rays, hazard.position, firelight)
@@ -114,7 +117,8 @@ class Camera:
 
     def _rays(self, pose: Pose) -> Rays:
         """Return the directions of the columns."""
-        cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+        cos = math.cos(pose.heading)
+        sin = math.sin(pose.heading)
         slopes = self._slopes
         length = np.sqrt(1 + slopes * slopes)
         return Rays(cos + slopes * sin, sin - slopes * cos, length, (pose.x, pose.y))
@@ -124,7 +128,8 @@ class Camera:
     def _draw_walls(self, walls: Hits, pose: Pose, *canvases: Any) -> None:
         """One wall for each column, over what is there."""
         top, bottom = self._edges(walls)
-        first, last = max(0, math.floor(top.min())), min(self.height, math.ceil(bottom.max()))
+        first = max(0, math.floor(top.min()))
+        last = min(self.height, math.ceil(bottom.max()))
         if first >= last:
             return
         row = np.arange(first, last, dtype=np.float32)[:, None] + 0.5
@@ -179,7 +184,8 @@ class Camera:
         self, scene: Floats, depth: Floats, rays: Rays, fire: tuple[float, float], light: float
     ) -> None:
         """Firelight in the room of the fire."""
-        x, y = depth[::2] * rays.x, depth[::2] * rays.y
+        x = depth[::2] * rays.x
+        y = depth[::2] * rays.y
         x += np.float32(rays.origin[0] - fire[0])
         y += np.float32(rays.origin[1] - fire[1])
         gap2 = x * x
@@ -216,13 +222,15 @@ class Camera:
         time: float,
     ) -> None:
         """Everything that stands about, the farthest first."""
-        cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+        cos = math.cos(pose.heading)
+        sin = math.sin(pose.heading)
         gaps = [(x - pose.x, y - pose.y) for x, y in map(_place_of, things)]
         ahead = [dx * cos + dy * sin for dx, dy in gaps]
         for number in sorted(range(len(things)), key=lambda n: -ahead[n]):
             if not CLOSEST < ahead[number] < HORIZON:
                 continue
-            thing, (dx, dy) = things[number], gaps[number]
+            thing = things[number]
+            (dx, dy) = gaps[number]
             if isinstance(thing, Figure):
                 sprite: Sprite | None = sprite_of(thing, math.atan2(dy, dx))
             else:
@@ -245,7 +253,8 @@ class Camera:
         cover *= depth[rows, columns] > ahead
         light = np.float32(GLOWING if sprite.glows else 1.0 / (1.0 + ahead / DUSK))
         for plane, colours in zip(scene, sprite.colours, strict=True):
-            block, paint = plane[rows, columns], colours.take(source)
+            block = plane[rows, columns]
+            paint = colours.take(source)
             paint *= light
             paint -= block
             paint *= cover
@@ -268,7 +277,8 @@ def _develop(colours: Any, light: Floats) -> Floats:
 
 def _pixels(start: float, size: float, count: int, texels: int) -> tuple[slice, Any]:
     """Return which of `count` pixels a length covers, and the texel that each of them shows."""
-    first, last = min(count, max(0, round(start))), max(0, min(count, round(start + size)))
+    first = min(count, max(0, round(start)))
+    last = max(0, min(count, round(start + size)))
     last = max(first, last)
     source = (np.arange(first, last) + 0.5 - start) * (texels / size)
     return slice(first, last), np.clip(source.astype(np.intp), 0, texels - 1)

@@ -94,7 +94,8 @@ def _room_numbers(
         # Cells whose middles lie inside.
         low = np.ceil((room.polygon.min(axis=0) - origin) / cell - 0.5).astype(int)
         high = np.ceil((room.polygon.max(axis=0) - origin) / cell - 0.5).astype(int)
-        columns, rows = np.arange(low[0], high[0]), np.arange(low[1], high[1])
+        columns = np.arange(low[0], high[0])
+        rows = np.arange(low[1], high[1])
         x, y = np.meshgrid(origin[0] + (columns + 0.5) * cell, origin[1] + (rows + 0.5) * cell)
         inside = shapely.contains_xy(room.area, x, y)
         numbers[low[1] : high[1], low[0] : high[0]][inside] = number

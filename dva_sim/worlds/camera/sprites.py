@@ -26,8 +26,11 @@ CLOTHES = (
 )
 SKINS = ((236, 196, 166), (198, 146, 110), (128, 86, 62))
 HAIRS = ((62, 44, 32), (30, 26, 26), (150, 110, 60), (120, 118, 116))
-NAVY, VEST = (36, 48, 82), (236, 206, 40)
-SHELL, TRIM, DARK = (228, 232, 236), (38, 110, 190), (44, 48, 56)
+NAVY = (36, 48, 82)
+VEST = (236, 206, 40)
+SHELL = (228, 232, 236)
+TRIM = (38, 110, 190)
+DARK = (44, 48, 56)
 FLAME_FRAMES = 6
 VIEWS = ("front", "left", "back", "right")
 
@@ -69,7 +72,8 @@ def person(view: str, number: int, guard: bool) -> Sprite:
         guard: In uniform.
     """
     pen = _Pen(0.8, 1.8)
-    skin, hair = SKINS[number * 7 % len(SKINS)], HAIRS[number * 5 % len(HAIRS)]
+    skin = SKINS[number * 7 % len(SKINS)]
+    hair = HAIRS[number * 5 % len(HAIRS)]
     top, legs = (NAVY, DARK) if guard else CLOTHES[number % len(CLOTHES)]
     side = view in ("left", "right")
     (_legs_apart if side else _legs)(pen, legs)
@@ -123,7 +127,8 @@ def bottle() -> Sprite:
     """A leaking gas bottle, and what comes out of it."""
     pen = _Pen(1.0, 1.6)
     for number in range(9):
-        x, y = 0.05 + 0.042 * number, 1.14 + 0.035 * number
+        x = 0.05 + 0.042 * number
+        y = 1.14 + 0.035 * number
         pen.ellipse(x - 0.05 - 0.012 * number, y - 0.05, x + 0.05 + 0.012 * number, y + 0.06,
                     (236, 240, 236, 150 - 13 * number))  # fmt: skip
     pen.box(-0.16, 0.0, 0.16, 0.95, (222, 172, 26))
@@ -139,7 +144,8 @@ def bottle() -> Sprite:
 @cache
 def flames(frame: int) -> Sprite:
     """Tongues of fire in a box of one metre by one; scaled to the fire they belong to."""
-    rows, columns = 120, 96
+    rows = 120
+    columns = 96
     y = 1.0 - (np.arange(rows)[:, None] + 0.5) / rows
     x = (np.arange(columns)[None, :] + 0.5) / columns * 2 - 1
     turn = 2 * math.pi * frame / FLAME_FRAMES
@@ -228,7 +234,8 @@ class _Pen:
     """
 
     def __init__(self, width: float, height: float) -> None:
-        self._size, self._scale = (width, height), SCALE * FINER
+        self._size = (width, height)
+        self._scale = SCALE * FINER
         pixels = round(width * self._scale), round(height * self._scale)
         self._image = Image.new("RGBA", pixels)
         self._draw = ImageDraw.Draw(self._image, "RGBA")
@@ -252,7 +259,8 @@ class _Pen:
         """Return the drawing with smooth edges."""
         image = self._image.transpose(Image.Transpose.FLIP_LEFT_RIGHT) if mirrored else self._image
         values = np.asarray(image, dtype=np.float32)
-        rows, columns = values.shape[0] // FINER, values.shape[1] // FINER
+        rows = values.shape[0] // FINER
+        columns = values.shape[1] // FINER
         blocks = values.reshape(rows, FINER, columns, FINER, 4)
         cover = blocks[..., 3].mean(axis=(1, 3)) / 255
         weighted = (blocks[..., :3] * blocks[..., 3:]).mean(axis=(1, 3)) / 255

@@ -88,7 +88,8 @@ class Surfaces:
         self.high[self.kind == LINTEL] = site.ceiling
         self.door = np.full(len(self.kind), -1)
         self.door[self.kind == LINTEL] = np.arange(len(doors))
-        dx, dy = self.ends[:, 2] - self.ends[:, 0], self.ends[:, 3] - self.ends[:, 1]
+        dx = self.ends[:, 2] - self.ends[:, 0]
+        dy = self.ends[:, 3] - self.ends[:, 1]
         self.length: Floats = np.hypot(dx, dy)
         # Light as from high windows in the south-west: walls of the two directions differ.
         across = np.abs(np.cos(np.arctan2(dy, dx) - 0.35))
@@ -138,7 +139,8 @@ class Surfaces:
 
     def _all_hits(self, pose: Pose, slopes: Floats) -> Hits:
         """Every pair of a surface and a column that meets it."""
-        cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+        cos = math.cos(pose.heading)
+        sin = math.sin(pose.heading)
         turn = np.array([[cos, sin], [sin, -cos]], dtype=np.float32)  # ahead, to the right
         ends = (self.ends - np.array([pose.x, pose.y] * 2, dtype=np.float32)).reshape(-1, 2)
         local = (ends @ turn.T).reshape(-1, 4)
@@ -153,8 +155,10 @@ class Surfaces:
         count = last - first
         which = np.repeat(np.arange(len(index)), count)
         column = np.arange(len(which)) - np.repeat(np.cumsum(count) - count - first, count)
-        z1, t1 = local[index, 0][which], local[index, 1][which]
-        slope, (dz, dt) = slopes[column], (step[which, 0], step[which, 1])
+        z1 = local[index, 0][which]
+        t1 = local[index, 1][which]
+        slope = slopes[column]
+        (dz, dt) = (step[which, 0], step[which, 1])
         # The ray t = slope z meets the line (z1, t1) + s (dz, dt).
         closing = dt - slope * dz
         depth = det[which] / closing
@@ -166,7 +170,8 @@ class Surfaces:
 def _spans(local: Floats, slopes: Floats) -> tuple[Any, ...]:
     """First and last column of each surface, cut off at the lens."""
     z1, t1, z2, t2 = local.T
-    dz, dt = z2 - z1, t2 - t1
+    dz = z2 - z1
+    dt = t2 - t1
     det = z1 * dt - t1 * dz
     with np.errstate(divide="ignore", invalid="ignore"):
         cut1 = np.where(z1 < NEAR, t1 + (NEAR - z1) / dz * dt, t1) / np.maximum(z1, NEAR)
@@ -210,7 +215,8 @@ def _inset(doors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _frame(door: NDArray[np.float64]) -> NDArray[np.float64]:
     """Posts of a door: across its line and along it, at both ends `(4, 4)` [m]."""
-    a, b = door[:2], door[2:]
+    a = door[:2]
+    b = door[2:]
     along = (b - a) / max(float(np.hypot(*(b - a))), 1e-6)
     across = np.array([-along[1], along[0]]) * REVEAL
     posts = []

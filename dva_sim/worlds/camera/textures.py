@@ -24,7 +24,8 @@ from dva_sim.worlds.site import Site
 from dva_sim.worlds.site_parts import DOOR_HEIGHT
 
 Bytes = NDArray[np.uint8]
-BASE, POST = (42, 104, 176), (54, 128, 62)
+BASE = (42, 104, 176)
+POST = (54, 128, 62)
 
 
 TEXELS = 128  # of a wall, from the floor to the ceiling
@@ -34,9 +35,14 @@ SIGN_COLUMNS = 96  # of a lintel, from post to post
 THROUGH = 0.15  # so far on both sides of a wall its rooms are looked for [m]
 BEYOND = 0.4  # so far behind a door its room is looked for [m]
 
-WOOD, PLASTER, SKIRTING = (138, 98, 60), (226, 225, 220), (96, 98, 104)
-STEEL, GLASS, LEAF_PAINT = (150, 154, 160), (176, 208, 232), (62, 122, 96)
-SIGN, EXIT = (40, 62, 96), (26, 122, 66)
+WOOD = (138, 98, 60)
+PLASTER = (226, 225, 220)
+SKIRTING = (96, 98, 104)
+STEEL = (150, 154, 160)
+GLASS = (176, 208, 232)
+LEAF_PAINT = (62, 122, 96)
+SIGN = (40, 62, 96)
+EXIT = (26, 122, 66)
 
 
 class Uprights:
@@ -51,7 +57,9 @@ class Uprights:
     """
 
     def __init__(self, site: Site, surfaces: Surfaces, rooms: RoomGrid) -> None:
-        self._surfaces, self._rooms, self._ceiling = surfaces, rooms, site.ceiling
+        self._surfaces = surfaces
+        self._rooms = rooms
+        self._ceiling = site.ceiling
         self.colours: Colours = self._columns(site)
 
     def texels(self, hits: Hits, pose_xy: tuple[float, float], far: tuple[Floats, Floats]) -> Ints:
@@ -67,8 +75,10 @@ class Uprights:
         x1, y1, x2, y2 = self._surfaces.ends[hits.surface].T
         left = (x2 - x1) * (pose_xy[1] - y1) - (y2 - y1) * (pose_xy[0] - x1) > 0
         gap = np.where(left, THROUGH, -THROUGH) / self._surfaces.length[hits.surface]
-        dx, dy = gap * (y1 - y2), gap * (x2 - x1)
-        here, beyond = self._rooms.at(x + dx, y + dy), self._rooms.at(x - dx, y - dy)
+        dx = gap * (y1 - y2)
+        dy = gap * (x2 - x1)
+        here = self._rooms.at(x + dx, y + dy)
+        beyond = self._rooms.at(x - dx, y - dy)
         column = self._wall_columns(hits, here, beyond)
         column = np.where(kind == FRAME, self._plain + 0, column)
         column = np.where(kind == SOLID, self._plain + 1, column)
@@ -145,7 +155,9 @@ def _windows(height: Any, accent: Any) -> NDArray[np.float64]:
     colours = np.repeat(wall[1:2], WINDOW_COLUMNS, axis=0)
     tall = (height > 1.0) & (height < 2.2)
     pane = (height > 1.06) & (height < 2.14)
-    low, high, middle = 10, WINDOW_COLUMNS - 10, WINDOW_COLUMNS // 2
+    low = 10
+    high = WINDOW_COLUMNS - 10
+    middle = WINDOW_COLUMNS // 2
     colours[low:high, tall] = (240, 240, 238)
     sky = np.array(GLASS) * (0.86 + 0.16 * (height[pane] - 1.06))[:, None]
     for first, last in ((low + 2, middle - 1), (middle + 1, high - 2)):

@@ -78,7 +78,9 @@ def add_smoke(
         fall: Slope of each row below the axis, per metre ahead `(h,)`.
         heights: Heights of the lens and of the ceiling [m].
     """
-    whole, depth, fall = depth, depth[::2], fall[::2]
+    whole = depth
+    depth = depth[::2]
+    fall = fall[::2]
     step = REACH / SAMPLES
     ahead = (np.arange(SAMPLES, dtype=np.float32)[:, None] + 0.5) * step
     x, y = (values[::2] for values in (rays.x, rays.y))
@@ -114,7 +116,8 @@ def _in_the_layer(depth: Floats, fall: Floats, heights: Any, share: Floats) -> F
     """Return the share of each pixel's ray above the lower face of the layer `(h, w)`."""
     eye, ceiling = heights
     bottom = ceiling * (1 - np.minimum(share, 1))
-    here, there = np.float32(eye) - bottom, depth * -fall[:, None]
+    here = np.float32(eye) - bottom
+    there = depth * -fall[:, None]
     there += here
     whole = np.abs(there)
     whole += np.abs(here) + np.float32(1e-4)

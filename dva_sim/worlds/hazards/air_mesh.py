@@ -50,7 +50,8 @@ class Mesh:
     @cached_property
     def node_at(self) -> Callable[[float, float], int]:
         """The node around a point [m]; -1 in walls and outdoors."""
-        look_up, nodes = self.grid.look_up, self.nodes
+        look_up = self.grid.look_up
+        nodes = self.nodes
         return lru_cache(KEPT_PLACES)(lambda x, y: int(look_up(nodes, x, y, -1)))
 
     def nearest(self, x: float, y: float) -> int:
@@ -131,6 +132,7 @@ def _borders(pairs: Integers, middles: Floats, count: int, block: int) -> Floats
         Rows a, b, length over distance.
     """
     code, edges = np.unique(pairs[0] * count + pairs[1], return_counts=True)
-    a, b = code // count, code % count
+    a = code // count
+    b = code % count
     across = np.clip(middles[b] - middles[a], 1.0, block)
     return np.stack([a, b, edges / across])

@@ -65,7 +65,8 @@ class Building:
     @cached_property
     def space_at(self) -> Callable[[float, float], int]:
         """Index of the space around a point [m], or `NOWHERE`; all hazards ask of one in turn."""
-        look_up, labels = self.grid.look_up, self.labels
+        look_up = self.grid.look_up
+        labels = self.labels
         return lru_cache(KEPT_PLACES)(lambda x, y: int(look_up(labels, x, y, NOWHERE)))
 
 
@@ -82,9 +83,12 @@ class SitePoints:
 
     def __init__(self, building: Building, points: Floats) -> None:
         self.points = points
-        origin, resolution = building.grid.origin, building.grid.resolution
-        cos, sin = math.cos(origin.heading), math.sin(origin.heading)
-        dx, dy = points[..., 0] - origin.x, points[..., 1] - origin.y
+        origin = building.grid.origin
+        resolution = building.grid.resolution
+        cos = math.cos(origin.heading)
+        sin = math.sin(origin.heading)
+        dx = points[..., 0] - origin.x
+        dy = points[..., 1] - origin.y
         columns = np.floor((cos * dx + sin * dy) / resolution).astype(np.int64)
         rows = np.floor((cos * dy - sin * dx) / resolution).astype(np.int64)
         height, width = building.labels.shape
@@ -171,7 +175,8 @@ class _Parting:
 
     def _cut(self, rows: Integers, columns: Integers, area: float, ceiling: float) -> _Cut:
         """One compartment cut across its longer side."""
-        first, resolution = len(self.area), self._site.grid.resolution
+        first = len(self.area)
+        resolution = self._site.grid.resolution
         axis = 0 if _span(rows) > _span(columns) else 1
         along = columns if axis else rows
         count = max(1, math.ceil(_span(along) * resolution / LONGEST - 0.1))

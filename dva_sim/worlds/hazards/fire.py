@@ -299,7 +299,8 @@ class FireField(SolvedField):
 
     def __init__(self, fire: Fire, site: Site) -> None:
         super().__init__(fire, site)
-        self._sight, self._fire = Sight(site.walls), fire
+        self._sight = Sight(site.walls)
+        self._fire = fire
         self._seen: tuple[SitePoints, NDArray[np.bool_]] | None = None
         self._flames = lru_cache(1)(
             lambda time: (RADIATIVE_FRACTION * fire.heat_release(time), fire.radius(time))
@@ -334,7 +335,8 @@ class FireField(SolvedField):
     def layer(self, space: int, time: float) -> Layer | None:
         """The smoke in a space; None if there is none. Who is there meets the same."""
         if (time, self.until) != self._layers_at:
-            self._layers_at, self._layers = (time, self.until), {}
+            self._layers_at = (time, self.until)
+            self._layers = {}
         if space not in self._layers:
             self._layers[space] = self._layer(space, time)
         return self._layers[space]
@@ -424,7 +426,8 @@ class FireField(SolvedField):
 
     def _jet_at(self, detector: str, x: float, y: float) -> tuple[float, float]:
         """Ages at which the ceiling jet reaches a detector, and sets it off [s]."""
-        fire, site = self._fire, self.site
+        fire = self._fire
+        site = self.site
         room = site.compartment_at(*fire.position)
         if room is None or site.compartment_at(x, y) != room:
             return NO_JET

@@ -97,10 +97,13 @@ class Filling:
     """
 
     def __init__(self, spaces: Spaces, room: int, inflow: float, sill: float = SILL) -> None:
-        self._spaces, self._room, self._inflow = spaces, room, inflow
+        self._spaces = spaces
+        self._room = room
+        self._inflow = inflow
         self._sill = np.where(spaces.top < spaces.ceiling[spaces.a], sill, 0.0)
         areas = np.r_[spaces.area, np.inf]
-        a, b = areas[spaces.a], areas[spaces.b]
+        a = areas[spaces.a]
+        b = areas[spaces.b]
         self._levels = 1.0 / (1.0 / a + 1.0 / b)  # volume per difference of levels [m^2]
 
     def dry(self) -> Floats:
@@ -117,7 +120,8 @@ class Filling:
         """Advance a step after the water has been shut off."""
         spaces = self._spaces
         depth = np.append(state[:-1] / spaces.area, 0.0)
-        a, b = depth[spaces.a], depth[spaces.b]
+        a = depth[spaces.a]
+        b = depth[spaces.b]
         flow = np.sign(a - b) * over_weir(
             np.maximum(a, b) - self._sill, np.minimum(a, b) - self._sill, spaces.width
         )

@@ -85,11 +85,13 @@ class Air:
         from scipy.sparse import coo_array
 
         mesh = self.mesh
-        forth, back = _carried(self._spread, self.flow), _carried(self._spread, -self.flow)
+        forth = _carried(self._spread, self.flow)
+        back = _carried(self._spread, -self.flow)
         own = mesh.area / dt + self._out
         own = own + np.bincount(mesh.a, forth, len(own)) + np.bincount(mesh.b, back, len(own))
         here = np.arange(len(own))
-        rows, columns = np.r_[here, mesh.b, mesh.a], np.r_[here, mesh.a, mesh.b]
+        rows = np.r_[here, mesh.b, mesh.a]
+        columns = np.r_[here, mesh.a, mesh.b]
         return coo_array((np.r_[own, -forth, -back], (rows, columns))).tocsc()
 
 
@@ -122,7 +124,8 @@ def _potential_flow(mesh: Mesh, draught: Draught | None) -> Floats:
     here = np.setdiff1d(inside, [draught.exhaust])  # its potential is zero
     own = np.bincount(mesh.a, mesh.shape, count) + np.bincount(mesh.b, mesh.shape, count)
     matrix = (link + coo_array((own, (np.arange(count),) * 2)).tocsr())[here][:, here]
-    potential, source = np.zeros(count), np.zeros(count)
+    potential = np.zeros(count)
+    source = np.zeros(count)
     source[draught.supply] = draught.rate / MIXED_HEIGHT
     potential[here] = spsolve(matrix.tocsc(), source[here])
     return np.asarray(mesh.shape * (potential[mesh.a] - potential[mesh.b]))

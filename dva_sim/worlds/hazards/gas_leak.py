@@ -195,7 +195,8 @@ class LeakField(SolvedField):
 
     def __init__(self, leak: GasLeak, site: Site) -> None:
         super().__init__(leak, site)
-        self._leak, self._indoors = leak, self.room != NOWHERE
+        self._leak = leak
+        self._indoors = self.room != NOWHERE
         self._nodes: tuple[SitePoints, NDArray[np.int64]] | None = None
 
     @override
@@ -229,11 +230,17 @@ class LeakField(SolvedField):
         """
         if not self._indoors or self._leak.draught > 0.0:
             return lambda age: self.share(x, y, self._leak.start + age)
-        mesh, leak = mesh_in(self.building), self._leak
-        here, there = mesh.nearest(x, y), mesh.nearest(*leak.position)
-        source, seen, rate = here, there, 1.0
+        mesh = mesh_in(self.building)
+        leak = self._leak
+        here = mesh.nearest(x, y)
+        there = mesh.nearest(*leak.position)
+        source = here
+        seen = there
+        rate = 1.0
         if len(mesh.area) > LARGE_MESH:
-            source, seen, rate = there, here, leak.release
+            source = there
+            seen = here
+            rate = leak.release
         march = _gas(self._air, source, rate)
 
         def share(age: float) -> float:
@@ -253,18 +260,24 @@ class LeakField(SolvedField):
         leak = self._leak
         if self._indoors or self.building.space_at(x, y) != NOWHERE:
             return 0.0
-        dx, dy = x - leak.position[0], y - leak.position[1]
-        cos, sin = math.cos(leak.wind_heading), math.sin(leak.wind_heading)
-        downwind, across = dx * cos + dy * sin, dy * cos - dx * sin
+        dx = x - leak.position[0]
+        dy = y - leak.position[1]
+        cos = math.cos(leak.wind_heading)
+        sin = math.sin(leak.wind_heading)
+        downwind = dx * cos + dy * sin
+        across = dy * cos - dx * sin
         if not leak.start <= time - downwind / leak.wind < self.until:
             return 0.0
-        rate, wind, height = leak.release, leak.wind, BREATHING_HEIGHT
+        rate = leak.release
+        wind = leak.wind
+        height = BREATHING_HEIGHT
         return plume(rate, wind, leak.stability, downwind, y=across, z=height)
 
     @cached_property
     def _air(self) -> Air:
         """The air that it leaks into."""
-        leak, mesh = self._leak, mesh_in(self.building)
+        leak = self._leak
+        mesh = mesh_in(self.building)
         draught = None
         if leak.draught > 0.0:
             supply = mesh.nearest(leak.supply_x, leak.supply_y)
@@ -292,6 +305,7 @@ class LeakField(SolvedField):
 
     @override
     def solve(self) -> tuple[March, Step]:
-        air, node = self._air, mesh_in(self.building).nearest(*self._leak.position)
+        air = self._air
+        node = mesh_in(self.building).nearest(*self._leak.position)
         march = _gas(air, node, self._leak.release)
         return march, lambda state, _, dt: air.step(state, node, 0.0, dt)

@@ -43,7 +43,8 @@ def sigma_y(stability: str, distance: float) -> float:
 
 def sigma_z(stability: str, distance: float) -> float:
     """Standard deviation upwards [m] at a distance downwind [m]."""
-    spread, x = CLASSES[stability], max(FITTED, distance / 1000.0)
+    spread = CLASSES[stability]
+    x = max(FITTED, distance / 1000.0)
     c, d, f = spread.near if x <= 1.0 else spread.far
     return float(c * x**d + f) * distance / 1000.0 / x
 
@@ -61,6 +62,7 @@ def plume(rate: float, wind: float, stability: str, x: float, y: float, z: float
     """
     if x <= 0.0:
         return 0.0
-    across, up = sigma_y(stability, x), sigma_z(stability, x)
+    across = sigma_y(stability, x)
+    up = sigma_z(stability, x)
     shape = math.exp(-0.5 * (y / across) ** 2 - 0.5 * (z / up) ** 2)
     return min(1.0, rate / (math.pi * wind * across * up) * shape)

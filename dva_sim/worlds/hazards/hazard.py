@@ -145,7 +145,8 @@ class HazardField:
     """
 
     def __init__(self, hazard: Hazard, site: Site) -> None:
-        self.hazard, self.site = hazard, site
+        self.hazard = hazard
+        self.site = site
         self.until = math.inf
 
     def at(self, x: float, y: float, time: float) -> Conditions:
@@ -199,13 +200,16 @@ class March:
     """
 
     def __init__(self, state: Floats, step: Step, paces: Paces = PACES) -> None:
-        self._step, self.paces = step, paces
-        self.ages, self.states = [0.0], [state]
+        self._step = step
+        self.paces = paces
+        self.ages = [0.0]
+        self.states = [state]
         self.hazy: dict[int, bool] = {}
 
     def around(self, age: float) -> tuple[Floats, Floats, float]:
         """The states before and after an age [s], and the weight of the later one."""
-        ages, after = self.ages, self.after(age)
+        ages = self.ages
+        after = self.after(age)
         weight = (age - ages[after - 1]) / (ages[after] - ages[after - 1])
         return self.states[after - 1], self.states[after], max(0.0, weight)
 
@@ -254,8 +258,10 @@ class SolvedField(HazardField):
 
     def march(self, time: float) -> tuple[March, float]:
         """Return the march that holds the state at `time` [s], and the age in it [s]."""
-        (shared, step), start = self._solved, self._start
-        age, stopped = time - start, self.until - start
+        (shared, step) = self._solved
+        start = self._start
+        age = time - start
+        stopped = self.until - start
         stopped = stopped if stopped > 0.0 else 0.0
         if age <= stopped:
             return shared, age

@@ -74,7 +74,9 @@ class SmokeLayers:
     """
 
     def __init__(self, spaces: Spaces, heat: Callable[[float], float], room: int) -> None:
-        self._heat, self._room, self._spaces = heat, room, spaces
+        self._heat = heat
+        self._room = room
+        self._spaces = spaces
         self._area = np.r_[spaces.area, np.inf]
         self._ceiling = np.r_[spaces.ceiling, 1e3]
         self._around = 4.0 * np.sqrt(spaces.area)  # of a square room [m]
@@ -109,13 +111,15 @@ class SmokeLayers:
 
     def _risen(self, heat: float, bottom: float) -> Floats:
         """Return what the plume adds to the fire room's layer each second."""
-        convective, fuel = (1.0 - RADIATIVE_FRACTION) * heat, heat / HEAT_OF_COMBUSTION
+        convective = (1.0 - RADIATIVE_FRACTION) * heat
+        fuel = heat / HEAT_OF_COMBUSTION
         air = plume(convective, max(LOWEST, bottom))
         return np.array([air + fuel, convective, SOOT_YIELD * fuel, CO_YIELD * fuel])
 
     def _spilt(self, state: Floats, bottom: Floats, kelvin: Floats, dt: float) -> Floats:
         """Return what flows through doors in a step."""
-        spaces, change = self._spaces, np.zeros_like(state)
+        spaces = self._spaces
+        change = np.zeros_like(state)
         low = np.minimum(bottom[spaces.a], bottom[spaces.b])
         open_ = np.flatnonzero(low < spaces.top)
         if len(open_) == 0:
@@ -142,20 +146,24 @@ class SmokeLayers:
         As much air flows in as smoke flows out (Rockett): the pressure at the floor differs
         by what makes it so.
         """
-        heights, share = self._heights[open_], self._slice[open_]
+        heights = self._heights[open_]
+        share = self._slice[open_]
         inside = heights > bottom[..., None]
         density = np.where(inside, (DENSITY * KELVIN / kelvin)[..., None], DENSITY)
         lift = (DENSITY * (1.0 - KELVIN / kelvin))[..., None] * GRAVITY
         lift = lift * np.maximum(0.0, heights - bottom[..., None])
         push = lift[0] - lift[1]
-        low, high = push.min(axis=1), push.max(axis=1)
-        from_a, from_b = np.sqrt(2.0 * density[0]), np.sqrt(2.0 * density[1])
+        low = push.min(axis=1)
+        high = push.max(axis=1)
+        from_a = np.sqrt(2.0 * density[0])
+        from_b = np.sqrt(2.0 * density[1])
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             over = push - middle[:, None]
             root = np.sqrt(np.abs(over))
             net = (np.where(over > 0.0, from_a, -from_b) * root).sum(axis=1)
-            low, high = np.where(net > 0.0, middle, low), np.where(net > 0.0, high, middle)
+            low = np.where(net > 0.0, middle, low)
+            high = np.where(net > 0.0, high, middle)
         over = push - 0.5 * (low + high)[:, None]
         flow = np.stack([from_a * (over > 0.0), from_b * (over < 0.0)])
         flow *= share * np.sqrt(np.abs(over)) * inside
@@ -177,7 +185,8 @@ class SmokeLayers:
         for space in np.flatnonzero(full):
             excess = state[space] * (1.0 - room[space] / volume[space])
             state[space] -= excess
-            a, b = self._spaces.a, self._spaces.b
+            a = self._spaces.a
+            b = self._spaces.b
             there = np.where(a == space, b, a)
             ways = np.flatnonzero(((a == space) | (b == space)) & ~full[there])
             if len(ways) == 0:

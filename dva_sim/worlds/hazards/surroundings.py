@@ -42,7 +42,8 @@ class Surroundings:
     """
 
     def __init__(self, site: Site, hazards: Sequence[Hazard]) -> None:
-        self._site, self._hazards = site, tuple(hazards)
+        self._site = site
+        self._hazards = tuple(hazards)
         self._places: dict[float, SitePoints] = {}
 
     @cached_property

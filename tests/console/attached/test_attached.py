@@ -13,10 +13,11 @@ from helpers.processes.patience import becomes
 from helpers.processes.programs import Program, Programs
 
 from dva_sim.console.attached import lines
-from dva_sim.console.attached.options import AttachOptions
+from dva_sim.console.attached.options import check, own_id
 from dva_sim.console.attached.system_state import DeviceState
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.keys import KeyRing, create_keys
+from dva_sim.options.runs import ConsoleOptions
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.stage import id_of, team_of
 from dva_sim.simulation.scenario import build, load
@@ -80,30 +81,27 @@ def test_an_event_is_shown_as_the_dva_tells_it():
 @pytest.mark.parametrize("dva", ["here", "127.0.0.1", "127.0.0.1:0", "127.0.0.1:70000", ":5600"])
 def test_what_is_no_address_is_refused(dva):
     with pytest.raises(ConfigError, match=r"127\.0\.0\.1:5600|65534"):
-        AttachOptions(dva=dva).check()
+        check(ConsoleOptions(dva=dva))
 
 
 def test_an_audit_log_that_cannot_be_kept_is_told_before_anything_starts():
     with pytest.raises(ConfigError, match=r"\.sqlite"):
-        AttachOptions(dva="127.0.0.1:5600", audit=Path("log.txt")).check()
+        check(ConsoleOptions(dva="127.0.0.1:5600", audit=Path("log.txt")))
 
 
 def test_without_a_key_each_console_has_an_id_of_its_own():
-    options = AttachOptions(dva="127.0.0.1:5600")
-    assert options.own_id(None) != options.own_id(None)
+    assert own_id(None) != own_id(None)
 
 
 def test_with_keys_it_is_the_control_room_whose_secret_is_here(tmp_path):
     create_keys(tmp_path, [id_of("dva", 1), ROOM])
-    options = AttachOptions(dva="127.0.0.1:5600", keys=tmp_path)
-    assert options.own_id(KeyRing(tmp_path)) == ROOM
+    assert own_id(KeyRing(tmp_path)) == ROOM
 
 
 def test_keys_without_one_of_a_control_room_are_not_enough(tmp_path):
     create_keys(tmp_path, [id_of("dva", 1)])
-    options = AttachOptions(dva="127.0.0.1:5600", keys=tmp_path)
     with pytest.raises(ConfigError, match="control-room-1"):
-        options.own_id(KeyRing(tmp_path))
+        own_id(KeyRing(tmp_path))
 
 
 # --- the programs ------------------------------------------------------------------------------

@@ -10,9 +10,8 @@ from helpers.console.declared_lines import at_page, checked
 from recordings.runs import drill, evacuation
 
 from dva_sim.cameras.lines import PaintersLine
-from dva_sim.console.replay.exchanges import ExchangeLog
 from dva_sim.console.replay.moments import decided_on, event_at
-from dva_sim.console.replay.player import NOBODY, Player
+from dva_sim.console.replay.player import NOBODY, ExchangeLog, Player
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
 from dva_sim.console.web.audit import rows_of

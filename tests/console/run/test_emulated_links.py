@@ -7,7 +7,6 @@ from functools import partial
 import pytest
 from helpers.console.simulated_console import Page
 from helpers.network.emulated_link import need_link
-from helpers.network.transports import WITH_MQTT
 from helpers.processes.patience import PATIENCE_S
 from helpers.processes.programs import all_gone_after
 from helpers.wording import unnamed
@@ -15,19 +14,17 @@ from helpers.wording import unnamed
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.cli.program import call
 from dva_sim.console.run.real_links import ConsoleSockets
-from dva_sim.network.carriers import carrier_of
 from dva_sim.network.emulator.needs import EmulatorError
 from dva_sim.network.emulator.process import LinkProcess
 
 QUIET = {"guard__count": 0, "bystander__count": 0}
-CARRIERS = [["zeromq"], *([kind, f"broker={end}"] for kind in WITH_MQTT for end in ("near", "far"))]
 EACH_WAY = 0.3  # [s]
 PARTITIONS = "link.partitions=[{from_s: 0, for_s: 1}]"
 
 
-def page_over(monkeypatch, transport=(), **link):
+def page_over(monkeypatch, **link):
     need_link()
-    sockets = partial(ConsoleSockets, emulated=1, carrier=carrier_of(transport))
+    sockets = partial(ConsoleSockets, emulated=1)
     changes = {f"link__{key}": value for key, value in link.items()}
     page = Page(monkeypatch, sockets=sockets, **QUIET, **changes)
     page.world.clock.go()
@@ -54,9 +51,8 @@ def programs(tmp_path):
 
 
 @pytest.mark.system
-@pytest.mark.parametrize("transport", CARRIERS)
-def test_a_person_drives_over_the_link_and_sees_how_late_everything_is(monkeypatch, transport):
-    page = page_over(monkeypatch, transport, delay_s=EACH_WAY)
+def test_a_person_drives_over_the_link_and_sees_how_late_everything_is(monkeypatch):
+    page = page_over(monkeypatch, delay_s=EACH_WAY)
     try:
         page.actions.take({"client": "c1", "do": "watch", "robots": [0]})
         assert page.do("pattern", robot=0, name="req-rep", within=PATIENCE_S)[0]
@@ -140,7 +136,6 @@ def test_a_link_that_is_killed_ends_the_console_in_one_line(programs):
             ["--links", "real", "--link", "scenario", "--set", PARTITIONS],
             ("link.partitions", "link.outages"),
         ),
-        (["--transport", "mqtt"], ("--transport", "--links real")),
     ],
 )
 def test_what_cannot_be_emulated_is_refused_in_one_line(words, names, capsys):

@@ -1,6 +1,6 @@
 import pytest
 
-from dva_sim.console.run.link import changed
+from dva_sim.console.run.sliders import changed
 from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.kernel.errors import ConfigError

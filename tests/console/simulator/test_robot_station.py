@@ -6,18 +6,18 @@ from dataclasses import replace
 import pytest
 from helpers.console.declared_lines import checked
 from helpers.dva.permissions import confirmation
-from helpers.processes.patience import PATIENCE_S
+from helpers.processes.patience import PATIENCE_S, becomes
 from helpers.wording import unnamed
 
 from dva_sim.console.robots.robot_station import two_free_ports
-from dva_sim.console.simulator.lone_robot_actions import LoneRobotActions
-from dva_sim.console.simulator.robot_simulator import RobotOptions
+from dva_sim.console.simulator.robot_simulator import LoneRobotActions, scenario_of
 from dva_sim.console.simulator.robot_world import RobotWorld
 from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.kinds import hints_of
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.realtime import PacedClock
 from dva_sim.network.sockets import SocketNetwork
+from dva_sim.options.runs import RobotOptions
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.simulation.full.stage import DVA
@@ -31,8 +31,8 @@ class Bench:
     """The robot, what it tells pages, and a DVA that says what a test wants it to say."""
 
     def __init__(self):
-        options = RobotOptions(changes=("request.timeout_s=0.3",))
-        self.world = RobotWorld(options.read(), clock=PacedClock())
+        options = RobotOptions(set=("request.timeout_s=0.3",))
+        self.world = RobotWorld(scenario_of(options), clock=PacedClock())
         self.lines = []
         self.world.tell = lambda line, key="": self.lines.append(checked(line))
         self.core = LoneRobotActions(self.world)
@@ -100,7 +100,8 @@ def bench():
 
 
 def listening(bench):
-    assert bench.do("robot_register", dva=bench.address)[0]
+    # On a busy machine the DVA's answer may be later than the robot waits.
+    assert becomes(lambda: bench.do("robot_register", dva=bench.address)[0])
     assert bench.do("robot_listen")[0]
     return bench
 
@@ -176,9 +177,9 @@ def test_what_no_robot_knows_is_refused(bench):
     [
         (RobotOptions(dva="x"), "--dva 'x' .* HOST:PORT"),
         (RobotOptions(profile="pibott"), "did you mean 'pibot'"),
-        (RobotOptions(changes=("robot.nose=1",)), "nose"),
+        (RobotOptions(set=("robot.nose=1",)), "nose"),
     ],
 )
 def test_what_is_asked_for_wrongly_is_told_in_a_line(options, why):
     with pytest.raises(ConfigError, match=why):
-        options.read()
+        scenario_of(options)

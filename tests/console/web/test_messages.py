@@ -7,7 +7,7 @@ from helpers.console.simulated_phone import CALIBRATION as CALIBRATE
 
 from dva_sim.console.web.access import Role
 from dva_sim.console.web.actions import Bucket, asked_of, check_role, id_of, read
-from dva_sim.console.web.outbox import OutgoingLines
+from dva_sim.console.web.simulation import OutgoingLines
 from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.console.wire.limits import MOST_ACTIONS, MOST_BATCHES

@@ -167,6 +167,21 @@ def test_every_answer_has_its_headers(console):
         assert "server" not in answer.headers
 
 
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("js/store.js", "text/javascript; charset=utf-8"),
+        ("palette.css", "text/css; charset=utf-8"),
+        ("icon.svg", "image/svg+xml"),
+    ],
+)
+def test_files_of_the_pages_are_asked_for_again_and_sent_once(console, name, kind):
+    first = console.ask(f"/static/{name}", token=console.drive)
+    assert (first.headers["content-type"], first.headers["cache-control"]) == (kind, "no-cache")
+    again = console.ask(f"/static/{name}", token=console.drive, If_None_Match=first.headers["etag"])
+    assert (again.status, again.body, again.headers["cache-control"]) == (304, b"", "no-cache")
+
+
 # --- names and bodies ------------------------------------------------------------------------
 
 

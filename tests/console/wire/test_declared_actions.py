@@ -12,8 +12,8 @@ from helpers.paths import ROOT
 from dva_sim.console.asking.dispatcher import _KNOWN, ActionDispatcher
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited
-from dva_sim.console.simulator.lone_robot_actions import LoneRobotActions
-from dva_sim.console.web.outbox import OutgoingLines
+from dva_sim.console.simulator.robot_simulator import LoneRobotActions
+from dva_sim.console.web.simulation import OutgoingLines
 from dva_sim.console.wire import generated
 from dva_sim.console.wire.actions import ACTIONS, Action, ActionPlace, Asked, Audit
 from dva_sim.console.wire.arguments import FASTEST, LINK_LIMITS
@@ -112,10 +112,11 @@ def test_each_action_of_people_has_a_row_done_or_refused(audited, action):
 
 
 def test_a_robot_alone_keeps_who_switched_it_off(tmp_path):
-    from dva_sim.console.simulator.robot_simulator import RobotOptions
+    from dva_sim.console.simulator.robot_simulator import scenario_of
     from dva_sim.console.simulator.robot_world import RobotWorld
+    from dva_sim.options.runs import RobotOptions
 
-    world = RobotWorld(RobotOptions().read())
+    world = RobotWorld(scenario_of(RobotOptions()))
     keeper = AuditKeeper(tmp_path / "audit.sqlite", lambda: 1.0, {})
     world.keep_audit(keeper)
     for what in ("robot_listen", "robot_off", "fault"):

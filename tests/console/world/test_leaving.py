@@ -129,8 +129,10 @@ class ForeignRobot(RosClient):
         self.device.leave()
 
 
-@pytest.mark.parametrize("rest", [SHORT, LONG])
-@pytest.mark.parametrize("moment", ["before", "while", "after"])
+@pytest.mark.parametrize(
+    ("moment", "rest"),
+    [("before", SHORT), ("while", SHORT), ("after", SHORT), ("while", LONG)],
+)
 @pytest.mark.parametrize("kind", [Phone, Seat, GuardPhone, ForeignRobot, RosClient])
 def test_all_tables_are_written(monkeypatch, tmp_path, kind, moment, rest):
     changes = ["guard.kind=person"]

@@ -1,5 +1,6 @@
 """Choice maps: the best choice by situation, over models of persons with known losses."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,14 @@ from helpers.studies.synthetic_results import columns
 
 from dva_sim.experiments.analysis.choice_map import choice_map
 from dva_sim.experiments.analysis.study_view import view_of
-from dva_sim.experiments.report.choice_table import beside_table, choice_table, lead_of
+from dva_sim.experiments.report.choice_table import (
+    beside_table,
+    choice_table,
+    facts_of,
+    lead_of,
+    regret_text,
+)
+from dva_sim.experiments.report.prose import caption, note
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.errors import ConfigError
 
@@ -39,6 +47,9 @@ STUDY = {
     },
     "map": {"models": "steering", "notes": {"far": "nobody was watched"}},
 }
+
+
+ENDED = LOSSES | {("narrow", "tell"): (90.0, 90.0)}
 
 
 def read(study=STUDY, losses=LOSSES, persons=6, measure="drive_time_s", noise=None):
@@ -94,7 +105,7 @@ def test_the_choice_that_costs_least_where_it_costs_most_is_advised():
     found = read()
     assert found.advised == "pace"
     lead = lead_of(found)
-    assert lead.index("pace: 8") < lead.index("ask 70") < lead.index("tell never done")
+    assert lead.index("pace, 8") < lead.index("ask 70") < lead.index("tell never finishes")
     assert "2 models" in lead
 
 
@@ -120,10 +131,10 @@ def test_a_link_on_which_nothing_ever_arrives_settles_nothing():
     found = read(losses=dead)
     table = choice_table(found, "drive")
     narrow = next(row for row in table.rows if row[0].startswith("narrow"))
-    assert narrow[1:5] == ["never done"] * 4
+    assert narrow[1:5] == ["never"] * 4
     assert "Nothing is better than tell" in lead_of(found)  # where anything was
     everywhere = read(losses=dict.fromkeys(LOSSES, (HORIZON_S, HORIZON_S)))
-    assert "Nothing was ever done" in lead_of(everywhere)
+    assert "No run was finished" in lead_of(everywhere)
 
 
 def test_what_is_done_under_one_model_alone_is_behind_without_end():
@@ -131,7 +142,7 @@ def test_what_is_done_under_one_model_alone_is_behind_without_end():
     found = read(losses=some)
     far = choice_table(found, "drive").rows[1]
     assert far[2].endswith(" to never")
-    assert "ask never done, far" in lead_of(found)
+    assert "ask never finishes, far" in lead_of(found)
 
 
 def test_more_is_better_where_the_measure_says_so():
@@ -157,7 +168,7 @@ def test_of_many_equal_choices_none_is_called_worse_for_being_unlucky(seed):
 def test_the_table_says_what_never_arrives_and_what_rests_on_an_assumption():
     table = choice_table(read(), "drive")
     narrow = next(row for row in table.rows if row[0].startswith("narrow"))
-    assert narrow[table.heads.index("tell")] == "never done"
+    assert narrow[table.heads.index("tell")] == "never"
     far = next(row for row in table.rows if row[0].startswith("far"))
     assert far[-1] == "nobody was watched"
 
@@ -174,7 +185,7 @@ def test_where_choices_are_more_than_links_each_is_a_row():
     table = choice_table(found, "drive")
     assert table.heads == ["messaging", "far", "narrow", "worst of these"]
     rows = {row[0]: row[1:] for row in table.rows}
-    assert rows["tell"] == ["=", "never done", "never done"]
+    assert rows["tell"] == ["=", "never", "never"]
     assert rows["ask"][1] == "="
     assert rows["ask"][0].partition(" to ")[2] == rows["ask"][2]
     assert rows["by assumption"] == ["nobody was watched", "", ""]
@@ -259,8 +270,36 @@ def test_beside_the_regret_stand_the_loss_itself_and_what_drives_are_like():
     ask = found.choice.levels.index("ask")
     assert (found.high[far, ask] >= found.regret[far, ask]).all()
     assert float(rows["far", "ask"][1]) == pytest.approx(found.high[far, ask].max(), abs=1.0)
-    assert (rows["far", "tell"][1], rows["narrow", "tell"][1]) == ("0.0", "never done")
+    assert (rows["far", "tell"][1], rows["narrow", "tell"][1]) == ("0.0", "never")
     assert len(rows) == len(LINKS) * len(CHOICES)
+
+
+@pytest.mark.parametrize(("noise_s", "best"), [(0.2, "="), (40.0, "0.0 ?")])
+def test_the_least_mean_is_called_equal_to_the_best_only_if_that_is_shown(noise_s, best):
+    rng = np.random.default_rng(3)
+    losses = with_losses(far=[(190.0, 190.0), (50.0, 50.0), (90.0, 90.0)])
+    found = read(losses=losses, persons=4, noise=lambda: rng.normal(0.0, noise_s))
+    far, tell = found.given.levels.index("far"), found.choice.levels.index("tell")
+    assert found.regret[far, tell].tolist() == [0.0, 0.0]
+    assert regret_text(found, far, tell) == best
+
+
+@pytest.mark.parametrize(("under_wait", "is_shaded"), [(80.0, False), (83.0, True)])
+def test_no_choice_is_shaded_that_is_the_best_under_some_model(under_wait, is_shaded):
+    losses = with_losses(far=[(70.0, under_wait), (50.0, 80.2), (55.0, 90.0)])
+    found = read(losses=losses, noise=lambda: 0.0)
+    far, ask = found.given.levels.index("far"), found.choice.levels.index("ask")
+    assert found.is_worse[far, ask]
+    assert bool(found.is_shaded[far, ask]) is is_shaded
+    assert regret_text(found, far, ask).startswith("0.0") is not is_shaded
+
+
+def test_never_means_the_same_in_all_words_of_a_map():
+    for found, is_said in ((read(), True), (read(losses=ENDED), False)):
+        for words in (caption("map", **facts_of(found)), note("map", **facts_of(found))):
+            assert bool(re.search(r"never\W+no run finished within 600", words)) is is_said
+        every = [choice_table(found, "").rows, beside_table(found, "").rows, lead_of(found)]
+        assert ("never" in str(every)) is is_said
 
 
 def test_what_too_few_persons_leave_open_is_neither_equal_nor_free():

@@ -5,8 +5,9 @@ from typing import Any
 
 from helpers.wording import unnamed
 
-from dva_sim.experiments.analysis.conditions import conditions, timeout_remark
+from dva_sim.experiments.analysis.conditions import conditions
 from dva_sim.experiments.analysis.study_view import keys_of
+from dva_sim.experiments.report.method import timeout_remark
 from dva_sim.simulation import scenario as scenarios
 
 SCENARIO = {

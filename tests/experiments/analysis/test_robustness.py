@@ -1,13 +1,10 @@
-from types import SimpleNamespace
-
 import pytest
 from helpers.studies import synthetic_results
 from helpers.wording import unnamed
 
-from dva_sim.experiments.analysis.robustness import robustness_of, sentences
+from dva_sim.experiments.analysis.robustness import robustness_of
 from dva_sim.experiments.analysis.study_view import finding_of, view_of
-from dva_sim.experiments.report.figures.repeats import RepeatsFigure
-from dva_sim.experiments.report.figures.style import styled
+from dva_sim.experiments.report.answer_conditions import repeated
 
 EFFECTS = {
     ("pursuit", 0): 20.0,
@@ -81,32 +78,25 @@ def test_the_studys_own_model_is_no_evidence_for_itself():
         assert [r.strategy for r in stop.repeats if r.is_own] == [own] * (own != "two_point")
 
 
-def drawn(view, found):
-    return RepeatsFigure().draw(view, SimpleNamespace(robustness=found))
-
-
-def test_repeats_at_delays_at_which_nobody_was_watched_are_told_and_drawn_hollow():
+def test_repeats_at_delays_at_which_nobody_was_watched_are_told():
     rows = [
         row
         | {"loop_delay_mean_s": 1.4, "delay_human_s": 0.2}
         | {"move_and_wait_share": float(row["operator.strategy"] == "adaptive")}
         for row in synthetic_results.repeat_rows(EFFECTS)
     ]
-    view, found = read(EFFECTS, rows=rows)
+    _, found = read(EFFECTS, rows=rows)
     assert {(r.strategy, r.is_beyond) for r in found.stops[0].repeats} == {
         ("pursuit", True),
         ("adaptive", False),
     }
-    text = sentences(found)[-1].replace("\N{NO-BREAK SPACE}", " ")
+    text = repeated(found)[-1].replace("\N{NO-BREAK SPACE}", " ")
     assert unnamed(text, "1 of 3", "(33 %) are extrapolated") == []
-    with styled():
-        assert "Hollow: extrapolated" in drawn(view, found).caption
-        assert "Hollow" not in drawn(*read(EFFECTS)).caption
 
 
 def test_the_sentences_give_shares_and_reach():
     _, found = read(EFFECTS)
-    what, text = (s.replace("\N{NO-BREAK SPACE}", " ") for s in sentences(found))
+    what, text = (s.replace("\N{NO-BREAK SPACE}", " ") for s in repeated(found))
     assert unnamed(what, "4 persons", "2 trials") == []
     signs = ("delay 1 s the sign holds in 2 of 3 (67 %)", "in 1 of them", "−4.4 to 4.6 s")
     sizes = ("in 1 of 3 (33 %) the effect exceeds", "in 1 it is below", "adaptive (1 of 2)")

@@ -9,8 +9,8 @@ from scipy import stats
 from dva_sim.experiments.analysis.hypothesis_tests import judged
 from dva_sim.experiments.analysis.sample_size import _of_answer, plans
 from dva_sim.experiments.analysis.study_view import finding_of, view_of
-from dva_sim.experiments.report.heavy_runs import few_that_weigh
-from dva_sim.experiments.report.size_plan_table import plan_lines, plan_table
+from dva_sim.experiments.report.study_size import plan_lines, plan_table
+from dva_sim.experiments.report.summary import few_that_weigh
 from dva_sim.statistics import mean_interval
 
 PATTERNS = ["req-rep", "latest-wins"]

@@ -12,6 +12,7 @@ from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.tuning import choose, file_of, load_tuned, save_tuned, tuning_study
 from dva_sim.kernel import resources
 from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.options.studies import TuneOptions
 
 STUDY = """\
 question: Which is quicker?
@@ -186,7 +187,7 @@ def test_the_command_tries_chooses_tells_and_keeps(tmp_path, capsys):
         text = text.replace(old, new)
     path = kit.write_study(tmp_path, text)
     (tmp_path / "one.yaml").write_text("description: no time to arrive\nhorizon_s: 1\n")
-    assert study_runs.tune(str(path), tmp_path / "trials", 1) == 0
+    assert study_runs.tune(TuneOptions(path, tmp_path / "trials", jobs=1)) == 0
     output = capsys.readouterr().out
     assert unnamed(output, "command.rate_hz", "pattern", tmp_path / "tuned" / "study.yaml") == []
     assert [c.value for c in load_tuned(load_study(path)).chosen] == [5.0, 5.0]

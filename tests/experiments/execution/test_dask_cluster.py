@@ -5,12 +5,10 @@ import socket
 import sqlite3
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from helpers.processes import patience
 from helpers.studies import small_study as kit
 from helpers.studies.dask_cluster import DaskCluster
 from helpers.wording import unnamed
@@ -18,8 +16,8 @@ from helpers.wording import unnamed
 from dva_sim.experiments.execution import dask_cluster, scheduling
 from dva_sim.experiments.execution.executors import WorkersLost
 from dva_sim.experiments.execution.runner import run_study
-from dva_sim.experiments.execution.scheduling import limited
-from dva_sim.kernel.errors import ConfigError, DvaSimError, RunTooLong
+from dva_sim.experiments.results.results import Results
+from dva_sim.kernel.errors import ConfigError, DvaSimError
 
 pytestmark = pytest.mark.system
 
@@ -159,79 +157,25 @@ def test_processes_and_a_scheduler_exclude_each_other(tmp_path):
         run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=2, scheduler="tcp://127.0.0.1:9")
 
 
-def test_a_run_in_a_thread_of_a_worker_has_its_limit_too():
-    from concurrent.futures import ThreadPoolExecutor
-
-    def stalls() -> None:
-        with limited(0.05, may_exit=False):
-            while True:
-                time.monotonic()
-
-    def is_quick() -> str:
-        with limited(60.0, may_exit=False):
-            return "done"
-
-    with ThreadPoolExecutor(1) as executor:
-        assert executor.submit(is_quick).result() == "done"
-        with pytest.raises(RunTooLong, match=r" 0\.05 s"):
-            executor.submit(stalls).result()
-        assert executor.submit(is_quick).result() == "done"
-
-
-LOOKED_AT = """
-import sys, threading, time
-from dva_sim.experiments.execution.scheduling import limited
-from dva_sim.kernel.errors import RunTooLong
-
-def stalls():
-    try:
-        with limited(0.05, may_exit=False):
-            while True:
-                time.monotonic()
-    except RunTooLong:
-        pass
-
-def is_quick():
-    with limited(60.0, may_exit=False):
-        len("done")
-
-def looked_at():
-    return 1
-
-seen = []
-for run in (is_quick, stalls):
-    thread = threading.Thread(target=run)
-    thread.start()
-    thread.join()
-    sys.setprofile(lambda *what: seen.append(what[1]))
-    looked_at()
-    sys.setprofile(None)
-print(seen.count("call"))
-"""
-
-
-def test_after_a_limit_in_a_thread_a_profiler_still_gets_on():
-    """In a process of its own: it would not come back, and nothing after it either."""
-    done = patience.run([sys.executable, "-c", LOOKED_AT], capture_output=True, text=True)
-    assert done.stdout.strip() == "2", done.stderr
-
-
-def test_a_run_that_takes_the_limit_for_its_own_is_told_again(tmp_path):
-    from concurrent.futures import ThreadPoolExecutor
-
-    def stubborn(job: object) -> kit.Tables:
-        for _ in range(2):
-            try:
-                while True:
-                    time.monotonic()
-            except BaseException:
-                continue
-        return {}
-
-    from dva_sim.experiments.study import cell_grid
-
-    job = cell_grid.jobs(kit.study_in(tmp_path))[0]
-    with ThreadPoolExecutor(1) as executor:
-        ended = executor.submit(scheduling.perform, job, stubborn, 0.05).result()
-    assert ended.error is None  # it has come back by itself, told twice
-    assert ended.tables == "{}"
+@pytest.mark.parametrize(
+    ("episode", "names"),
+    [
+        (kit.deadly, ["killed the process"]),
+        (kit.stalls, ["RunTooLong", "1 s"]),
+        (kit.never_comes_back, ["beyond its limit"]),
+    ],
+)
+def test_a_run_that_does_not_end_well_is_a_failure_and_its_worker_goes_on(
+    tmp_path, dask, monkeypatch, episode, names
+):
+    monkeypatch.setattr(scheduling, "_LOOK_S", 0.2)
+    monkeypatch.chdir(tmp_path)
+    dask.add_worker()
+    study = kit.study_in(tmp_path)
+    out = run_study(study, tmp_path / "out", scheduler=dask.address, episode=episode, limit_s=1.0)
+    results = Results.load(out)
+    (failure,) = results.failures
+    assert unnamed(failure["error"], *names) == []
+    assert (failure["part"], failure["cell"], failure["person"]) == ("story", 2, 1)
+    assert len(results.table("runs")["seed"]) == kit.RUNS - 1
+    assert dask.workers[0].poll() is None

@@ -7,6 +7,7 @@ from helpers.studies import synthetic_results
 from helpers.wording import unnamed
 
 from dva_sim.experiments.study.screening import KEPT, MAIN
+from dva_sim.kernel.wording import signed
 from dva_sim.simulation.scenario.assumptions import all_assumptions
 
 STRATEGY = {"operator": {"strategy": "adaptive"}, "phone": {"profile": "default"}}
@@ -45,7 +46,30 @@ def test_other_models_of_persons_say_how_far_the_effect_reaches(tmp_path):
     repeats = synthetic_results.repeat_rows(effects)
     found = reading(tmp_path, rows, study=claims, robustness=repeats)
     persons = texts(found.answer.depends)["Persons"]
-    assert unnamed(persons, "2 of 3", "difference at 1 s") == []
+    assert unnamed(persons, "2 of 3", "sign at 1 s") == []
+    stop = found.robustness.stops[-1]
+    own = len(found.finding.levels) - 1
+    low = min(float(found.finding.low[own]), *(other.low for other in stop.others))
+    high = max(float(found.finding.high[own]), *(other.high for other in stop.others))
+    lead = found.answer.lead.replace("\N{NO-BREAK SPACE}", " ")
+    limits = f"{signed(low, '')} to {signed(high, 's')}".replace("\N{NO-BREAK SPACE}", " ")
+    assert unnamed(lead, limits, "95 % limits; means") == []
+
+
+def test_where_every_pair_of_runs_gives_the_same_that_is_said_with_what_robots_did(tmp_path):
+    rows = synthetic_results.drive_rows(6, 2, effect_s=0.0, missed=0.0)
+    times: dict[object, float] = {}
+    for row in rows:
+        row["robot_share"] = 0.25
+        if not row["is_reference"]:
+            place = (row["person"], row["trial"], row["link.delay_s"], row["profile"])
+            row["drive_time_s"] = times.setdefault(place, row["drive_time_s"])
+    found = reading(tmp_path, rows).answer
+    assert "every pair of runs gives the same value" in found.lead
+    assert "messaging pattern changed nothing" in found.notes[0]
+    assert unnamed(found.notes[0].replace("\N{NO-BREAK SPACE}", " "), "25 % of the events") == []
+    usual = reading(tmp_path / "usual").answer
+    assert not any("changed nothing" in note for note in usual.notes)
 
 
 def test_the_answer_under_the_other_settings_that_were_run_stands_beside_it(tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from helpers.wording import unnamed
 
-from dva_sim.experiments.report.event_outcomes import outcomes_of
+from dva_sim.experiments.report.outcome_table import outcomes_of
 
 
 def events(*rows):

@@ -9,21 +9,19 @@ from helpers.wording import unnamed
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from dva_sim.experiments.analysis.cadence import Cadence
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
 from dva_sim.experiments.analysis.study_view import StudyView
+from dva_sim.experiments.report.answer_table import spread_table
 from dva_sim.experiments.report.figures.answer_figure import AnswerFigure
-from dva_sim.experiments.report.figures.commands import CommandAge, CommandRate
+from dva_sim.experiments.report.figures.commands import CommandAge
 from dva_sim.experiments.report.figures.cut_bars import fit_to
 from dva_sim.experiments.report.figures.delay_budget import DelayBudget, stages_of
 from dva_sim.experiments.report.figures.distribution import Distributions
-from dva_sim.experiments.report.figures.effect import Differences, _band, _possible
-from dva_sim.experiments.report.figures.factorial import FactorialEffects
-from dva_sim.experiments.report.figures.heat_map import HeatMap
+from dva_sim.experiments.report.figures.effect import Cadence, Differences, _band, _possible
+from dva_sim.experiments.report.figures.heat_map import EffectField, HeatMap
 from dva_sim.experiments.report.figures.legend import apart, columns_of
 from dva_sim.experiments.report.figures.palette import ONE
 from dva_sim.experiments.report.figures.scatter import trend
-from dva_sim.experiments.report.figures.story import Events, StoryOutcomes, StoryTimes, fates
 from dva_sim.experiments.report.figures.style import (
     ASIDE,
     is_to_scale,
@@ -35,9 +33,7 @@ from dva_sim.experiments.report.figures.style import (
     styled,
 )
 from dva_sim.experiments.report.figures.tradeoff import TradeOff
-from dva_sim.experiments.report.figures.trajectories import DrivenWays
 from dva_sim.experiments.report.figures.transport import Brought
-from dva_sim.experiments.report.spread_table import spread_table
 from dva_sim.statistics import band
 
 DELAY = Factor("link.delay_s", (0.0, 0.05, 0.1, 0.25, 0.5, 1.0))
@@ -77,9 +73,6 @@ def test_the_table_of_spreads_holds_both_sides_and_the_effect_at_every_stop():
 def test_lock_step_falls_behind_where_round_trip_and_processing_fill_the_period():
     wanted = Cadence(period_s=0.1, processing_s=0.05)
     assert wanted.boundary_s == pytest.approx(0.025)
-    assert wanted.lock_step_rate(wanted.boundary_s) == pytest.approx(10.0)
-    assert wanted.lock_step_rate(0.0) == pytest.approx(10.0)
-    assert wanted.lock_step_rate(1.0) == pytest.approx(1 / 2.05)
 
 
 def test_a_delay_lies_between_the_evenly_spaced_levels_around_it():
@@ -92,77 +85,10 @@ def test_a_boundary_outside_the_levels_has_no_place(delay):
     assert place_of(DELAY, delay) is None
 
 
-@blank
-def test_a_panel_where_no_run_went_on_takes_nothing_from_the_others(view):
-    rate = np.where(view.part.treated["profile"] == "default", 8.0, np.nan)
-    both = with_columns(replace(view, within={}), command_rate_hz=rate)
-    assert [panel["profile"] for panel in both.shown] == ["default", "dissertation"]
-    with styled():
-        assert CommandRate().draw(both, NOTHING_ELSE) is not None
-
-
-@blank
-@pytest.mark.filterwarnings("error::UserWarning")
-def test_a_rate_of_zero_everywhere_has_an_axis(view):
-    silent = with_columns(view, command_rate_hz=np.zeros_like(view.part.treated["drive_time_s"]))
-    with styled():
-        (axes, *_) = CommandRate().draw(silent, NOTHING_ELSE).figure.axes
-    assert axes.get_ylim()[0] == 0
-
-
 def test_names_of_lines_that_end_together_are_moved_apart_within_the_axes():
     placed = apart([0.95, 0.96, 0.97], gap=0.1)
     assert np.diff(placed).min() == pytest.approx(0.1)
     assert max(placed) == pytest.approx(1.0)
-
-
-def test_every_event_has_a_fate_even_one_nobody_foresaw():
-    values = {
-        ("confirmed", "robot", True): "confirmed by a robot",
-        ("confirmed", "guard", True): "confirmed by a guard",
-        ("confirmed", "guard", False): "false alarm confirmed",
-        ("refuted", "robot", True): "refuted",
-        ("refuted", "robot", False): "cleared",
-        ("expired", "robot", True): "expired",
-        ("open", "none", True): "open",
-        ("stolen", "none", True): "other",
-    }
-    assert fates(*map(np.array, zip(*values, strict=True))).tolist() == list(values.values())
-
-
-@blank
-def test_a_real_event_that_was_refuted_is_missed_and_what_one_event_weighs_is_said(view):
-    rows = synthetic_results.columns(synthetic_results.story_rows(4))
-    rows["is_true"] = np.arange(len(rows["part"])) % 2 == 0
-    rows["outcome"] = np.where(np.arange(len(rows["part"])) % 4 < 2, "refuted", "confirmed")
-    rows["responder_kind"] = np.full(len(rows["part"]), "robot")
-    drawn = StoryOutcomes().draw(view, SimpleNamespace(table={"events": rows}.get))
-    (key,) = drawn.figure.legends
-    names = " ".join(text.get_text() for text in key.get_texts())
-    assert unnamed(names, "missed", "cleared", "false alarm confirmed", "by a robot") == []
-    assert unnamed(drawn.caption, "8 events", "12.5") == []
-
-
-def test_shares_of_outcomes_add_up_to_one(view):
-    rows = synthetic_results.columns(synthetic_results.story_rows(4))
-    events = Events(rows, "story", view)
-    mask = events.under({"profile": "default"}, "req-rep", 1.0)
-    assert mask.sum() == 8
-    assert sum(events.shares(mask).values()) == pytest.approx(1.0)
-
-
-def test_a_way_is_found_by_its_pattern_delay_and_profile(view):
-    rows = synthetic_results.track_rows()
-    ways = DrivenWays(synthetic_results.columns(rows), view)
-    (way,) = ways.under("pub-sub", 0.25)
-    wanted = [
-        (r["x_m"], r["y_m"])
-        for r in rows
-        if (r["pattern"], r["link.delay_s"], r["profile"]) == ("pub-sub", 0.25, "default")
-        and not r["is_reference"]
-    ]
-    np.testing.assert_array_equal(way, wanted)
-    assert len(ways.reference()) == 1
 
 
 @pytest.mark.parametrize(
@@ -221,19 +147,6 @@ def test_narrow_bands_are_shown_whole():
 
 
 @blank
-def test_nobody_who_never_came_has_a_panel_and_one_fate_needs_no_picture(view):
-    rows = synthetic_results.columns(synthetic_results.story_rows(4))
-    rows["responder_kind"] = np.full(len(rows["part"]), "robot")
-    rows["outcome"] = np.full(len(rows["part"]), "confirmed")
-    events = Events(rows, "story", view)
-    assert list(events.kinds_of_times()) == ["Robot arrives", "Robot confirms"]
-    reading = SimpleNamespace(table={"events": rows}.get)
-    assert StoryOutcomes().draw(view, reading) is None
-    drawn = StoryTimes().draw(view, reading)
-    assert f"All {len(events):,} were confirmed" in drawn.caption
-
-
-@blank
 def test_bars_of_a_lower_panel_are_not_cut_by_the_first(view):
     runs, columns = view.part.treated, ("delay_uplink_s", "delay_downlink_s")
     longer = np.where(runs["profile"] == "dissertation", 3.0, 1.0)
@@ -283,21 +196,18 @@ def test_the_heat_map_draws_the_line_where_the_effect_turns_round_if_it_does(eff
     assert len(rows) == 1 + 12
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "shown"),
+    [(1.0, 5.0, 3.0), (0.0, 6.0, 0.0), (-6.0, 0.0, 0.0), (-6.0, -1.0, -3.0), (np.nan, np.nan, 3.0)],
+)
+def test_a_field_is_coloured_only_where_its_band_excludes_zero(low, high, shown):
+    mean = 3.0 if not low < -5 else -3.0
+    field = EffectField(Factor("b", (1,)), {}, *(np.full((1, 1), x) for x in (mean, low, high)))
+    assert field.shown[0, 0] == shown
+
+
 def test_a_second_factor_of_two_levels_needs_no_heat_map(view):
     assert HeatMap().draw(view, NOTHING_ELSE) is None
-
-
-@blank
-def test_main_effects_and_interactions_are_those_put_in():
-    with styled():
-        drawn = FactorialEffects().draw(
-            two_factor_view(lambda ratio, wait: 2.0 * ratio + 0.1 * wait), NOTHING_ELSE
-        )
-    rows = [row.split(",") for row in drawn.csv.decode().splitlines()[1:]]
-    found = {(name, to): float(mean) for name, _, to, mean, *_ in rows}
-    assert found["team", "robot"] == pytest.approx(2.0 * 1.875 + 0.1 * 20, abs=0.3)
-    assert found["team x ratio", "robot x 4.0"] == pytest.approx(2.0 * 3.5, abs=0.5)
-    assert found["ratio x wait_s", "4.0 x 40.0"] == pytest.approx(0.0, abs=0.6)
 
 
 @blank
@@ -385,7 +295,7 @@ def test_quarters_are_drawn_of_five_runs_and_not_made_up_of_fewer(persons, boxes
 @blank
 def test_panels_of_transports_that_are_logarithmic_say_so_in_their_titles(view):
     times = view.part.treated["drive_time_s"]
-    known = with_columns(view, round_trip_mean_s=times / 100, command_rate_hz=times / 10)
+    known = with_columns(view, round_trip_p95_s=times / 100, command_rate_hz=times / 10)
     with styled():
         axes = Brought().draw(known, NOTHING_ELSE).figure.axes
     values = {ax.get_title("left"): ax.get_yscale() for ax in axes if ax.get_visible()}

@@ -22,9 +22,9 @@ def test_the_persons_are_those_that_were_run(tmp_path):
 @pytest.mark.parametrize(
     ("key", "why", "names"),
     [
-        ("stop", "enough", ["4 (", "2 of 6 batches", "interval"]),
-        ("budget_s", "budget", ["4 (", "2 of 6 batches", "time"]),
-        ("stop", None, ["4 (", "all 6 batches"]),
+        ("stop", "enough", ["4;", "2 of 6 batches", "interval"]),
+        ("budget_s", "budget", ["4;", "2 of 6 batches", "time"]),
+        ("stop", None, ["4;", "All 6 batches"]),
     ],
 )
 def test_what_decided_the_number_of_persons_is_told(tmp_path, key, why, names):

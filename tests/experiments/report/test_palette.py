@@ -12,8 +12,7 @@ from matplotlib.colors import to_rgb
 import dva_sim.experiments.report.figures
 from dva_sim.experiments.analysis.competing_risks import WAYS
 from dva_sim.experiments.analysis.run_grid import Factor
-from dva_sim.experiments.report.figures import palette, story
-from dva_sim.experiments.report.figures import shift as dispatch
+from dva_sim.experiments.report.figures import palette
 from dva_sim.experiments.report.figures.palette import FATES, LOOKS, STAGES, colours, looks
 from dva_sim.network.patterns import PATTERNS
 
@@ -99,8 +98,6 @@ def test_text_has_the_contrast_of_small_print(colour):
 
 STACKS = {
     "delay budget": list(STAGES.values()),
-    "events of runs": [FATES[fate] for fate in story._FATES],
-    "events of shifts": list(dispatch.FILLS.values()),
     "ways to end": [FATES[way] for way in WAYS],
 }
 
@@ -145,11 +142,6 @@ def test_beside_patterns_nothing_has_a_colour_of_theirs():
     assert palette.ONE.colour.lower() not in rest
 
 
-def test_who_confirmed_has_the_colour_of_its_agents():
-    for kind in ("robot", "guard"):
-        assert FATES[f"confirmed by a {kind}"].colour == palette.look_of(kind).colour
-
-
 def test_policies_and_every_pattern_have_looks_that_no_other_of_them_has():
     policies = ("random", "nearest_idle", "min_eta", "priority_eta", "batch_optimal", "auction")
     policies += ("preemptive", "hazard_team", "operator_aware", "coverage", "preference", "oracle")
@@ -160,7 +152,7 @@ def test_policies_and_every_pattern_have_looks_that_no_other_of_them_has():
 
 def test_figures_bring_no_colour_of_their_own():
     """Otherwise the tests above would not cover all figures."""
-    files = [*ROOM.glob("figures/*.py"), ROOM / "transport_page.py"]
+    files = [*ROOM.glob("figures/*.py"), ROOM / "model_page.py"]
     colour = re.compile(r"#[0-9a-fA-F]{6}\b|cmap=\"|color=\"(?!none)[a-z]+\"")
     named = {path.name for path in files if colour.search(path.read_text(encoding="utf-8"))}
     assert named == {"palette.py"}

@@ -8,9 +8,10 @@ from helpers.studies import synthetic_results
 from helpers.wording import unnamed
 
 from dva_sim.experiments.report import printing
-from dva_sim.experiments.report.blocks import Folded, Verbatim, Words
+from dva_sim.experiments.report.blocks import First, Folded, Verbatim, Words
+from dva_sim.experiments.report.figures.registry import draw_all
 from dva_sim.experiments.report.printing import browser, print_page
-from dva_sim.experiments.report.report import _page, write_report
+from dva_sim.experiments.report.report import _page, blocks_of, write_report
 
 
 @pytest.fixture
@@ -60,8 +61,30 @@ def test_a_pdf_is_made_when_asked_for_and_kept_up_to_date_to_the_byte(results):
 @prints
 def test_what_is_folded_on_the_page_is_printed(tmp_path):
     text = "\n".join(f"line {n}" for n in range(1500))
-    blocks = [Words("Asked and run."), Folded("Manifest", (Verbatim(text),))]
-    page, pdf = tmp_path / "page.html", tmp_path / "page.pdf"
-    page.write_text(_page("What does it cost?", blocks), encoding="utf-8")
+    assert pages_of(tmp_path, [Words("Asked and run."), Folded("Manifest", (Verbatim(text),))]) > 2
+
+
+def pages_of(folder, blocks):
+    page, pdf = folder / "page.html", folder / "page.pdf"
+    page.write_text(_page("What does it cost to wait for each reply?", blocks), encoding="utf-8")
     print_page(page, pdf)
-    assert len(re.findall(rb"/Type /Page\b", pdf.read_bytes())) > 2
+    return len(re.findall(rb"/Type /Page\b", pdf.read_bytes()))
+
+
+@prints
+def test_the_answer_with_its_figure_and_conditions_is_one_page_of_its_own(tmp_path):
+    claims = {"robustness": synthetic_results.CLAIMS["robustness"]}
+    facts = synthetic_results.manifest(6, 2)
+    facts["study"] |= claims
+    facts["scenarios"] = dict.fromkeys(("drive", "story"), synthetic_results.SCENARIO)
+    rows = synthetic_results.drive_rows(6, 2, effect_s=20.0)
+    repeats = synthetic_results.repeat_rows({("pursuit", 0): 5, ("adaptive", 1): -4})
+    reading = synthetic_results.reading(tmp_path / "r", rows, facts, robustness=repeats)
+    blocks = blocks_of(reading, draw_all(reading))
+    (place,) = (n for n, block in enumerate(blocks) if isinstance(block, First))
+    first = blocks[: place + 1]
+    assert blocks[place].figure is not None
+    assert len(blocks[place].depends) >= 3
+    warned = [Words("A warning that takes two lines of the page, as warnings do. " * 2, "warning")]
+    assert pages_of(tmp_path, warned * 3 + first) == 1
+    assert pages_of(tmp_path, [*first, Words("Evidence.")]) == 2

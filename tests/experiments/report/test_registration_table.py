@@ -2,7 +2,7 @@ import pytest
 from helpers.studies import synthetic_results
 from helpers.wording import unnamed
 
-from dva_sim.experiments.report.registration_table import registration_table
+from dva_sim.experiments.report.hypothesis_tables import registration_table
 from dva_sim.experiments.study.hashing import fingerprint_of_judges
 
 PATTERNS = ["req-rep", "latest-wins"]

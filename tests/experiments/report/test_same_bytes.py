@@ -71,7 +71,7 @@ def points(folder):
     ranges = {"link.delay_s": {"low": 0, "high": 1}}
     ranges |= {"robot.processing_s": {"low": 0.01, "high": 1, "scale": "log"}}
     facts["study"]["factors"] = {"point": list(range(len(where))), "pattern": list(patterns)}
-    facts["study"]["design"] = {"saltelli": 8, "ranges": ranges}
+    facts["study"]["design"] = {"sobol": len(where), "ranges": ranges}
     facts["study"]["answer"] |= {"over": None, "within": {}}
     return synthetic_results.write(folder, {"runs": rows}, facts)
 
@@ -100,10 +100,8 @@ def contest(folder):
 
 
 KINDS = {
-    *("map", "distributions", "differences", "heat_map", "factorial_effects", "robustness"),
-    *("delay_budget", "command_age", "command_rate", "tradeoff", "trajectories", "story_times"),
-    *("time_lapse_typical", "time_lapse_worst", "story_outcomes", "endings", "scatter", "sobol"),
-    *("answer", "trade", "stages", "fates", "way", "percentiles", "burden", "brought", "taken"),
+    *("map", "answer", "distributions", "differences", "heat_map", "scatter", "delay_budget"),
+    *("command_age", "tradeoff", "endings", "trade", "way", "brought"),
 }
 
 

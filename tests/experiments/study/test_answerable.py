@@ -123,5 +123,12 @@ def test_the_only_contrast_is_the_answer_of_a_study_without_one(tmp_path):
     facts["study"] = declared | {"persons": 8, "replications": 1, "seed": 1}
     reading = synthetic_results.reading(tmp_path / "r", rows, facts)
     assert view_of(declared, reading.runs).contrast == ("latest-wins", "req-rep")
-    assert unnamed(reading.answer.lead, "PUB/SUB is faster than REQ/REP", "\N{MINUS SIGN}9.9") == []
+    assert (
+        unnamed(
+            reading.answer.lead,
+            "shorter with latest-wins PUB/SUB than with REQ/REP",
+            "\N{MINUS SIGN}9.9",
+        )
+        == []
+    )
     assert "No answer was declared" in " ".join(reading.answer.notes)

@@ -10,7 +10,6 @@ from helpers.wording import unnamed
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.designs import saltelli
 from dva_sim.experiments.study.factor_levels import size
 
 PLAIN = STUDY.split("answer:")[0]
@@ -189,7 +188,7 @@ def test_points_fill_each_range_evenly_on_its_scale_and_meet_every_level(tmp_pat
 
 
 @pytest.mark.system
-@pytest.mark.parametrize("kind", ["latin_hypercube", "sobol", "saltelli"])
+@pytest.mark.parametrize("kind", ["latin_hypercube", "sobol"])
 def test_points_depend_on_the_seed_of_the_study_alone(tmp_path, kind):
     text = ONLY_PATTERN + SAMPLED.format(kind=kind)
     first, again, other = (
@@ -203,22 +202,6 @@ def test_the_points_are_these_on_every_machine(tmp_path):
     study = study_in(tmp_path, text=ONLY_PATTERN + SAMPLED.format(kind="sobol"))
     values = [tuple(cell.values())[1:4] for cell in levels(study)[:4:2]]
     assert values == [(0.245664, 0.0343705, 2), (0.305481, 0.0011841, 4)]
-
-
-def test_the_sample_for_indices_changes_one_coordinate_at_a_time():
-    blocks = saltelli(3, 8, np.random.default_rng(5)).reshape(8, 5, 3)
-    for block in blocks:
-        first, second = block[0], block[-1]
-        assert (first != second).all()
-        for axis in range(3):
-            assert (block[axis + 1] != first).tolist() == [i == axis for i in range(3)]
-            assert block[axis + 1, axis] == second[axis]
-
-
-def test_a_sample_for_indices_has_two_more_points_than_ranges_for_each(tmp_path):
-    study = study_in(tmp_path, text=ONLY_PATTERN + SAMPLED.format(kind="saltelli"))
-    assert study.factors["point"] == tuple(range(16 * 5))
-    assert len(levels(study)) == 2 * 16 * 5
 
 
 def test_a_run_at_a_point_has_the_points_number_and_values_in_its_table(tmp_path):
@@ -309,7 +292,6 @@ def test_of_many_points_only_the_ends_of_the_ranges_are_rehearsed(tmp_path):
         ("design: {zip: [pattern, link.delay_s]}", 2),
         ("design: {rows: [{link.loss: 0}, {link.loss: 0.1}, {link.loss: 0.2}]}", 12),
         ("design: {sobol: 8, ranges: {link.loss: [0, 0.1]}}", 32),
-        ("design: {saltelli: 8, ranges: {link.loss: [0, 0.1]}}", 96),
     ],
 )
 def test_how_many_cells_there_will_be_is_known_before_they_are_made(tmp_path, asked, cells):

@@ -11,6 +11,7 @@ from dva_sim.experiments.study.scenario_mistakes import mistakes_of
 from dva_sim.kernel.config_overrides import build, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import load_yaml
+from dva_sim.options.runs import EpisodeOptions
 from dva_sim.simulation.scenario import Scenario
 
 
@@ -80,7 +81,7 @@ def test_settings_that_depend_on_each_other_are_reported_together(tmp_path, turn
     path = tmp_path / "one.yaml"
     path.write_text("horizon_s: 60\n")
     with pytest.raises(ConfigError) as caught, mistakes_of(str(path), settings, 1):
-        played(EpisodeRequest(str(path), set=["robot.count=1", *settings]))
+        played(EpisodeRequest(EpisodeOptions(path, set=["robot.count=1", *settings])))
     told = *(f"--set {each}" for each in settings), "nowhere.csv' not found"
     assert unnamed(str(caught.value), *told) == []
     assert "robot.count" not in str(caught.value)
@@ -105,6 +106,6 @@ def test_a_mistake_in_a_setting_of_an_episode_is_told_at_that_setting(tmp_path, 
     path = tmp_path / "one.yaml"
     path.write_text("description: one robot\nhorizon_s: 60\n")
     with pytest.raises(ConfigError) as caught, mistakes_of(str(path), ["horizon_s=5", setting], 1):
-        played(EpisodeRequest(str(path), set=["horizon_s=5", setting]))
+        played(EpisodeRequest(EpisodeOptions(path, set=["horizon_s=5", setting])))
     assert str(caught.value).startswith(f"--set {setting}: ")
     assert expected in str(caught.value)

@@ -1,19 +1,16 @@
 """A study can bring its own measures and models, in files that are read by every process."""
 
 import json
-import shutil
 
 import pytest
 from helpers.studies.report_text import words_of
 from helpers.studies.small_study import STUDY, study_in
 from helpers.wording import unnamed
 
-from dva_sim.cli import names
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.registration import plan_of
-from dva_sim.kernel import resources
 from dva_sim.kernel.errors import ConfigError
 
 MEASURE = """\
@@ -106,37 +103,6 @@ def test_a_run_whose_measure_fails_is_a_failure_that_is_told(tmp_path):
     run_study(study, tmp_path / "out", jobs=1)
     (error, *_) = [row["error"] for row in Results.load(tmp_path / "out").failures]
     assert unnamed(error, "'standing_s'", "ZeroDivisionError") == []
-
-
-QUEUE = """\
-question: How long do alarms wait?
-persons: 4
-replications: 1
-factors:
-  guards: [2, 3]
-parts:
-  queue: {scenario: queue.yaml}
-answer: {part: queue, measure: wait_mean_s, factor: guards, contrast: [2, 3]}
-"""
-
-
-def test_a_model_in_a_file_beside_its_scenario_is_played_in_every_process(tmp_path):
-    shipped = next(root for root in resources.roots() if (root / "experiments/models").is_dir())
-    shutil.copy(shipped / "experiments/models/alarm_queue.py", tmp_path / "queue.py")
-    (tmp_path / "queue.yaml").write_text("model: queue.py:AlarmQueue\nalarms: 200\n")
-    study = study_in(tmp_path, text=QUEUE)
-    run_study(study, tmp_path / "out", jobs=2)
-    (tmp_path / "queue.py").unlink()
-    found = Results.load(tmp_path / "out")
-    waits, guards = found.runs["wait_mean_s"], found.runs["guards"]
-    assert waits[guards == 2].mean() > waits[guards == 3].mean()
-    values = {column.name: column.meaning for column in found.columns("alarms")}
-    assert values["service_s"] == "that the guard needed"
-    assert study.question in words_of(tmp_path / "out")
-
-
-def test_what_can_be_named_holds_the_models():
-    assert {entry.name for entry in names.everything("models")["models"]} >= {"full", "timed"}
 
 
 def test_a_registration_fixes_what_an_own_measure_does(tmp_path):

@@ -6,8 +6,13 @@ from typing import Any
 
 import pytest
 from helpers.studies import small_study as kit
+from helpers.studies.report_text import words_of
+from helpers.wording import unnamed
 
 from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.report.study_size import not_reached
+from dva_sim.experiments.report.summary import Reading
+from dva_sim.experiments.report.terminal import show
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.cell_grid import StudyJob
 
@@ -56,7 +61,33 @@ def test_a_study_that_never_has_enough_runs_all_its_rounds(tmp_path):
     text = TEXT.replace("half_width: 0.1", "half_width: 0.0001").replace("40", "7")
     study = kit.study_in(tmp_path, text=text)
     out = run_study(study, tmp_path / "out", jobs=1, episode=steady)
-    assert stopped(out) == {"rounds": 3, "of": 3, "why": "limit"}
+    how = stopped(out)
+    assert 0.0001 < how.pop("half_width") < 1
+    assert how == {"rounds": 3, "of": 3, "why": "limit"}
+
+
+@pytest.mark.parametrize(("asked", "is_told"), [(0.0001, True), (50.0, False)])
+def test_what_was_asked_and_not_reached_is_said_first(asked, is_told, tmp_path, capsys):
+    text = TEXT.replace("half_width: 0.1", f"half_width: {asked}").replace("40", "7")
+    out = run_study(kit.study_in(tmp_path, text=text), tmp_path / "out", jobs=1, episode=steady)
+    results = Results.load(out)
+    show(results, None, columns=False, rows=3)
+    printed = capsys.readouterr().out.splitlines()
+    page = words_of(out)
+    assert printed[1].startswith("Asked and not reached") is is_told
+    assert (f"{results.question} Asked and not reached" in page) is is_told
+    assert not is_told or unnamed(page, "with 7 persons", "the widest is ±0.") == []
+
+
+def test_older_results_that_do_not_say_how_far_they_came_still_say_what_was_asked(tmp_path):
+    text = TEXT.replace("half_width: 0.1", "half_width: 0.0001").replace("40", "7")
+    out = run_study(kit.study_in(tmp_path, text=text), tmp_path / "out", jobs=1, episode=steady)
+    manifest = json.loads((out / "manifest.json").read_text())
+    del manifest["stopped"]["half_width"]
+    (out / "manifest.json").write_text(json.dumps(manifest))
+    text = not_reached(Reading(Results.load(out)))
+    assert unnamed(text, "Asked and not reached", "with 7 persons") == []
+    assert "widest" not in text
 
 
 def test_a_spent_budget_ends_after_a_whole_round_and_stays_ended(tmp_path):

@@ -12,6 +12,7 @@ from dva_sim.experiments.study.factor_levels import runs_of
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.tuning import tuning_study
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.options.studies import RunOptions
 
 
 @pytest.mark.parametrize("setting", ["persons=100000000", "replications=100000000"])
@@ -50,7 +51,7 @@ def test_what_takes_a_while_is_told(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(study_runs, "_MANY", 1)
     monkeypatch.setattr(study_runs, "_MANY_RUNS", 1)
     path = str(write_study(tmp_path))
-    study_runs.plan(RunRequest(path, tmp_path / "out"))
+    study_runs.plan(RunRequest(RunOptions(path, tmp_path / "out")))
     lines = capsys.readouterr().out.splitlines()
     assert lines[1].startswith("Checking every configuration")
     assert lines[-5].startswith("9/9 configurations")

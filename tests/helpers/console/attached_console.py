@@ -11,11 +11,11 @@ from helpers.console.simulated_phone import FIRE, PhonePage
 
 from dva_sim.console.attached.actions import AttachedActions
 from dva_sim.console.attached.links import AttachedLinks
-from dva_sim.console.attached.options import AttachOptions
 from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.kernel.recorder import Recorder
+from dva_sim.options.runs import ConsoleOptions
 from dva_sim.recordings.audit_log import AuditRow, read_rows
 from dva_sim.simulation.full.stage import id_of
 
@@ -44,7 +44,7 @@ class AttachedPage:
             own=OWN,
             address="198.51.100.9:5600",
         )
-        options = AttachOptions(dva="198.51.100.1:5600", scenario="hands-on", audit=audit)
+        options = ConsoleOptions(dva="198.51.100.1:5600", scenario="hands-on", audit=audit)
         self.system = AttachedSystem(options, links)
         self.keeper = AuditKeeper(audit, lambda: world.world.clock.now, {})
         self.pages = AttachedPages(self.system, self.keeper)

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -112,10 +112,12 @@ class Served:
         self._asked += [json.loads(line) for line in lines]
         return bool(data)
 
-    def next_asked(self, *kinds: str) -> Line:
+    def next_asked(self, *kinds: str, asker: Future[Any] | None = None) -> Line:
         """The next line of some kinds that the simulation is asked; others are forgotten."""
         ends = time.monotonic() + PATIENCE_S
         while time.monotonic() < ends:
+            if asker is not None and asker.done() and asker.exception():
+                asker.result()
             while self._asked:
                 line = self._asked.pop(0)
                 if line["do"] in kinds:
@@ -139,7 +141,7 @@ class Served:
         """Let somebody ask, and do it in the simulation: the answer, and what was asked there."""
         with ThreadPoolExecutor(1) as other:
             reported = other.submit(ask, *words)
-            asked = self.next_asked(kind)
+            asked = self.next_asked(kind, asker=reported)
             self.say({"k": "done", "id": asked["id"], "ok": True, "text": "done"} | done)
             return reported.result(PATIENCE_S), asked
 

@@ -13,7 +13,7 @@ from helpers.dva.dispatch_office import GUARD, HERE, Office
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dva import Dva
-from dva_sim.core.events import Event
+from dva_sim.core.events import Cause, Event
 from dva_sim.protocol import messages as m
 
 TABLE = Path(__file__).parents[3] / "protocol" / "models" / "event_table.pml"
@@ -85,7 +85,7 @@ class Case:
             case "ORDER_LIMIT" if event.open:
                 orders.take_back(event.times.get("act_assigned", BEGAN) + LIMIT + 1.0)
             case "ESCALATE":
-                orders.escalate(event, now)
+                orders.transition(event, Cause.WAITED, now)
 
     def _order(self) -> m.Order:
         orders, event = self.core.orders, self.event

@@ -20,8 +20,7 @@ from dva_sim.core.dispatch import (
     Situation,
 )
 from dva_sim.core.dva import Dva
-from dva_sim.core.events import ACT_STEPS, STEPS, Event, State
-from dva_sim.core.handling import Handling
+from dva_sim.core.events import ACT_STEPS, STEPS, Event, Handling, State
 from dva_sim.core.permissions import Access, AccessRule
 from dva_sim.core.roles import ControlRoomRole, Roles
 from dva_sim.core.sessions import Permissions, Send, Sessions

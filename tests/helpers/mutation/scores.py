@@ -2,12 +2,11 @@
 
 import csv
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Collection
 from datetime import date
 from pathlib import Path
 from typing import NamedTuple
 
-from helpers.mutation.faults import Mutant
 from helpers.paths import ROOT, TESTS
 
 SCORES = TESTS / "data" / "mutation" / "scores.csv"
@@ -20,22 +19,35 @@ def equivalents() -> dict[str, str]:
         return {row["fault"]: row["reason"] for row in csv.DictReader(file)}
 
 
+class Trial(NamedTuple):
+    """Result of planting a fault."""
+
+    name: str
+    description: str
+    noticed_by: str  # a test, or the rules that broke; empty: nothing
+    took_s: float
+
+    def __str__(self) -> str:
+        seen = "noticed " if self.noticed_by else "NOT SEEN"
+        return f"{seen} {self.description} {self.noticed_by} {self.took_s:.0f} s"
+
+
 class Verdicts:
-    """Verdicts on faults in a file; a test is the one that noticed, empty if none did."""
+    """Verdicts on faults in a file: by the name of each who noticed it, empty if nobody did."""
 
     def __init__(self, file: Path) -> None:
         self._file = file
-        self.tests: dict[str, str] = {}
+        self.noticed_by: dict[str, str] = {}
         if file.exists():
             with file.open(encoding="utf-8", newline="") as lines:
-                self.tests = dict(csv.reader(lines))
+                self.noticed_by = dict(csv.reader(lines))
 
-    def note(self, mutant: Mutant, test: str) -> None:
+    def note(self, name: str, noticed_by: str) -> None:
         """Append a verdict; a later one on the same fault counts."""
-        self.tests[mutant.name] = test
+        self.noticed_by[name] = noticed_by
         self._file.parent.mkdir(parents=True, exist_ok=True)
         with self._file.open("a", encoding="utf-8", newline="") as file:
-            csv.writer(file).writerow((mutant.name, test))
+            csv.writer(file).writerow((name, noticed_by))
 
 
 class Score(NamedTuple):
@@ -56,11 +68,11 @@ class Score(NamedTuple):
         return f"{self.room}: {self.noticed} of {real} faults noticed, {self.share:.0%}{alike}"
 
 
-def score(room: str, draw: str, mutants: Iterable[Mutant], verdicts: Verdicts) -> Score:
+def score(room: str, draw: str, names: Collection[str], verdicts: Verdicts) -> Score:
     """Return the share of noticed faults among those that change something."""
-    names, same = [mutant.name for mutant in mutants], equivalents()
-    noticed = sum(bool(verdicts.tests.get(name)) for name in names)
-    equivalent = sum(name in same and not verdicts.tests.get(name) for name in names)
+    same = equivalents()
+    noticed = sum(bool(verdicts.noticed_by.get(name)) for name in names)
+    equivalent = sum(name in same and not verdicts.noticed_by.get(name) for name in names)
     share = noticed / max(1, len(names) - equivalent)
     words = ["git", "-C", str(ROOT), "rev-parse", "--short=8", "HEAD"]
     commit = subprocess.check_output(words, text=True).strip()

@@ -20,6 +20,7 @@ from queue import SimpleQueue
 
 import pytest
 from helpers.mutation.faults import Mutant
+from helpers.mutation.scores import Trial
 from helpers.paths import ROOT
 
 PATIENCE_S = 900.0  # for all tests of a room
@@ -131,10 +132,8 @@ def end(program: subprocess.Popen[str]) -> None:
     program.wait()
 
 
-def tried(
-    mutants: Iterable[Mutant], jobs: int, only_quick: bool = False
-) -> Iterator[tuple[Mutant, str, float]]:
-    """Yield each fault, the test that notices it, and how long that took [s]."""
+def tried(mutants: Iterable[Mutant], jobs: int, only_quick: bool = False) -> Iterator[Trial]:
+    """Try faults in copies of the tree; yield what came of each."""
     with tempfile.TemporaryDirectory() as folder:
         trees: SimpleQueue[Path] = SimpleQueue()
         for number in range(jobs):
@@ -142,10 +141,11 @@ def tried(
             copy_of_the_tree(tree)
             trees.put(tree)
 
-        def try_out(mutant: Mutant) -> tuple[Mutant, str, float]:
+        def try_out(mutant: Mutant) -> Trial:
             tree, began = trees.get(), time.monotonic()
             try:
-                return mutant, notice(mutant, tree, only_quick), time.monotonic() - began
+                test = notice(mutant, tree, only_quick)
+                return Trial(mutant.name, mutant.description, test, time.monotonic() - began)
             finally:
                 trees.put(tree)
 

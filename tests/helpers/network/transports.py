@@ -5,7 +5,7 @@ with keys alike. Nothing here waits for a fixed time where it can wait for a con
 """
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from random import Random
 from typing import Any
@@ -17,7 +17,6 @@ from dva_sim.agents.device import AgentDevice
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.kernel.streams import Streams
-from dva_sim.network.carriers import LOCALHOST, free_port
 from dva_sim.network.connections import Connector
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
@@ -30,8 +29,6 @@ from dva_sim.network.messaging import (
     Transport,
     Wire,
 )
-from dva_sim.network.middleware.mqtt import MqttTransport
-from dva_sim.network.mqtt import MqttNetwork, open_broker
 from dva_sim.network.real_network import NetworkError
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
@@ -54,12 +51,6 @@ VIRTUAL: dict[str, Callable[[], Connector]] = {
     "virtual datagrams": lambda: Connector("datagrams"),
 }
 """Transports in virtual time."""
-
-NO_MQTT = MqttTransport().lacks()
-"""A line that says what is missing for MQTT; empty where nothing is."""
-
-WITH_MQTT = () if NO_MQTT else ("mqtt",)
-"""A further case for tests of everything real; test_mqtt.py says once where there is none."""
 
 LOSSY = "virtual segments with loss"  # what is promised, TCP keeps through losses
 
@@ -190,23 +181,6 @@ class SocketWorld(World):
         self._outside.destroy(linger=0)
         for network in [self.network, *self._elsewhere]:
             network.close()
-
-
-class MqttWorld(World):
-    """Clients of a broker on this machine, in real time."""
-
-    def __init__(self, nodes: Sequence[str] = NODES) -> None:
-        self.reports, self.port = list[str](), free_port(LOCALHOST)
-        self.broker = open_broker(LOCALHOST, self.port)
-        address = f"{LOCALHOST}:{self.port}"
-        self.network: MqttNetwork = MqttNetwork(LiveClock(), address, self.reports.append)
-        for node in nodes:
-            self.network.join(node)
-        self.leave, self.come_back = self.network.leave, self.network.join  # type: ignore[assignment, method-assign]
-
-    def close(self) -> None:
-        self.network.close()
-        self.broker.close()
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,8 @@ class Program:
                 cwd=folder,
                 env=environment,
                 start_new_session=True,  # what a test sends to it reaches nobody else
+                # `nohup` around the tests would be inherited.
+                preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),
             )
 
     @property

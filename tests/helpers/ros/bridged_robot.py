@@ -7,9 +7,10 @@ from helpers.processes.patience import PATIENCE_S
 from helpers.ros.ros_machine import RosMachine
 
 from dva_sim.kernel.recorder import Recorder
-from dva_sim.live.ros_robot import RosRobotOptions, stage_of
+from dva_sim.live.ros_robot import scenario_of, stage_of
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
+from dva_sim.options.runs import RobotOptions
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.ros.profile import RosProfile
@@ -30,10 +31,10 @@ class BridgedRobot:
 
     def __init__(self, machine: RosMachine, profile: RosProfile | None = None) -> None:
         self.machine, profile = machine, profile or RosProfile()
-        options = RosRobotOptions(ros=machine.url, changes=("request.timeout_s=0.3",))
+        options = RobotOptions(ros=machine.url, set=("request.timeout_s=0.3",))
         self.clock, self.recorder = LiveClock(), Recorder()
         self.network, self.dva = SocketNetwork(self.clock), SocketNetwork(self.clock)
-        stage = stage_of(options, options.scenario(profile), self.network, self.recorder, None)
+        stage = stage_of(options, scenario_of(options, profile), self.network, self.recorder, None)
         self.robot = RosRobot(
             stage, 1, profile, WebSocketUrl(machine.url, "--ros"), options.namespace
         )

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import socket
+import subprocess
 
 import pytest
 from helpers.network.emulated_link import children, need_link
@@ -43,6 +45,29 @@ def test_a_far_command_that_ignores_signals_is_killed_after_a_while(monkeypatch)
         before = children(os.getpid())
         assert pair.run_pair(link, "sleep 0.3; exit 3", DAEMON + STUBBORN, print).code == 3
         assert set(children(os.getpid())) <= set(before)
+
+
+def test_afterwards_signals_are_for_those_who_heard_them_before():
+    need_link()
+    reads, writes = socket.socketpair()
+    with reads, writes, LinkProcess(LinkConfig(), 1) as link:
+        writes.setblocking(False)
+        heard, woken = signal.getsignal(signal.SIGTERM), signal.set_wakeup_fd(writes.fileno())
+        try:
+            pair.run_pair(link, "true", "true", print)
+        finally:
+            left = signal.set_wakeup_fd(woken)
+        assert left == writes.fileno()
+        assert signal.getsignal(signal.SIGTERM) is heard
+
+
+def test_a_command_sees_its_own_processes_alone():
+    need_link()
+    if subprocess.run(["unshare", "-Urpf", "--mount-proc", "true"], check=False).returncode:
+        pytest.skip("/proc cannot be mounted here")
+    own = 'test "$(cat /proc/$$/comm)" = sh && test "$(readlink /proc/self)" -lt 100'
+    with LinkProcess(LinkConfig(), 1) as link:
+        assert pair.run_pair(link, own, "true", print).code == 0
 
 
 def test_ctrl_c_lets_the_near_command_tidy_up(programs):

@@ -56,6 +56,20 @@ def test_a_run_that_begins_again_after_40_000_requests_is_no_loss_of_25_000(tmp_
 
 
 @pytest.mark.parametrize(
+    "text",
+    [
+        "0 40\n",
+        "0 40\n0 41\n",
+        ping(EPOCH, 40, [1]),
+        ping(EPOCH, 40, [1]) + ping(EPOCH + 3600, 40, [1]),
+    ],
+)
+def test_probes_of_a_single_moment_of_each_run_are_no_log(tmp_path, text):
+    with pytest.raises(ConfigError, match="at least two moments"):
+        read_delay_log(write(tmp_path, text))
+
+
+@pytest.mark.parametrize(
     ("head", "time", "delay", "row", "units"),
     [
         ("", 1.0, 1.0, "{t} {d}", ("s", "ms")),
@@ -63,6 +77,7 @@ def test_a_run_that_begins_again_after_40_000_requests_is_no_loss_of_25_000(tmp_
         ("", 1e6, 1.0, "{t},{d}", ("us", "ms")),
         ("", 1e9, 1.0, "{t};{d}", ("ns", "ms")),
         ("time_s,delay_s", 1.0, 1e-3, "{t},{d}", ("s", "s")),
+        ("s,ms", 1.0, 1.0, "{t},{d}", ("s", "ms")),
         ("# s, us", 1.0, 1e3, "{t} {d}", ("s", "us")),
         ("timestamp (ms);rtt (us)", 1e3, 1e3, "{t};{d}", ("ms", "us")),
         ("seq,host,rtt_ms,time", 1.0, 1.0, "7,h,{d},{t}", ("s", "ms")),
@@ -88,6 +103,8 @@ def test_columns_are_read_in_the_units_of_their_head_or_size(
     ("text", "units", "names"),
     [
         ("0 40\n200 40\n400 40\n", ("ms", "ms"), []),
+        (f"{EPOCH}000 40\n{EPOCH}020 40\n{EPOCH}040 40\n", ("ms", "ms"), []),
+        ("0 40\n5 40\n10 40\n", ("s", "ms"), []),
         ("0 40\n20 40\n40 40\n", ("s", "ms"), ["20 s between probes", "time_s,delay_ms"]),
         ("0 0.04\n1 0.05\n", ("s", "ms"), ["0.045 ms", "time_s,delay_ms"]),
         ("0 40000\n1 40000\n", ("s", "ms"), ["4e+04 ms", "time_s,delay_ms"]),

@@ -1,6 +1,8 @@
 """Laws of the delay against what is known of each; bands are four standard errors."""
 
+import math
 from functools import partial
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -11,7 +13,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import LinkConfig
+from dva_sim.network.link.time_noise import SlowNoise, normal_quantile
 
 N = 10_000
 SLOW = {"correlation_s": 3.0}
@@ -151,6 +155,7 @@ def test_a_constant_law_is_what_is_meant_without_one():
     line = link(delay_s=0.1, delay_law="constant", rate_bps=8e6)
     assert line.carry(1.0, 1000) == pytest.approx(1.101)
     assert line.is_ideal()
+    assert LinkConfig(delay_s=0.1, delay_law="constant").moments() == (0.1, 0.0)
 
 
 def test_each_direction_may_have_its_own_delay():
@@ -177,3 +182,18 @@ def test_a_bad_file_of_delays_is_refused_with_its_line(tmp_path, text, words):
     path.write_text(text)
     with pytest.raises(ConfigError, match=words):
         link(delay_law={"law": "empirical", "file": str(path)})
+
+
+def test_slow_numbers_are_an_ornstein_uhlenbeck_process_at_each_millisecond():
+    """Also where a block of them ends: x' = k x + sqrt(1 - k^2) n with k = exp(-1 ms / 3 s)."""
+    normal, keep = Streams(1).fresh("slow"), math.exp(-0.001 / 3.0)
+    noise, count = SlowNoise(Streams(1), "slow", 3.0), 20_000
+    start, fresh = normal.standard_normal(), normal.standard_normal(count)
+    steps = accumulate(fresh, lambda x, n: keep * x + math.sqrt(1 - keep**2) * n, initial=start)
+    found = [noise.draw((slot + 0.5) / 1000) for slot in range(count)]
+    assert found == pytest.approx(stats.norm.cdf(list(steps)[1:]))
+
+
+@pytest.mark.parametrize("edge", [0.0, 1.0])
+def test_the_quantiles_at_the_edges_are_finite(edge):
+    assert normal_quantile(edge) == pytest.approx((edge - 0.5) * 14.07, abs=0.01)

@@ -76,18 +76,18 @@ def test_a_second_loss_below_the_first_remembers_less_than_the_window():
 
 
 def test_time_in_which_the_window_is_not_used_does_not_count():
-    used, rested = Cubic(OPTIONS), Cubic(OPTIONS)
-    for window in (used, rested):
+    used, rested, rested_twice = Cubic(OPTIONS), Cubic(OPTIONS), Cubic(OPTIONS)
+    for window in (used, rested, rested_twice):
         window.window = 50.0
         window.window = window.reduce(0.0)
         window.grow(1, 0.0, 0.1)
-    rested.rests(4.0)
-    used.grow(1, 4.0, 0.1)
-    rested.grow(1, 4.0, 0.1)
-    for step in range(1, 20):
-        used.grow(1, 4.0 + step / 100, 0.1)
-        rested.grow(1, 4.0 + step / 100, 0.1)
-    assert used.window > rested.window
+    rested_twice.rests(2.0)
+    for window in (rested, rested_twice):
+        window.rests(4.0)
+    for window in (used, rested, rested_twice):
+        for step in range(20):
+            window.grow(1, 4.0 + step / 100, 0.1)
+    assert used.window > rested.window == rested_twice.window
 
 
 def test_idle_time_halves_the_window_per_timeout_but_not_below_the_initial_one():

@@ -62,6 +62,16 @@ def test_one_lost_opening_leaves_the_window_and_two_reduce_it_to_one_segment():
         assert opened(lose_out=lost)[2].opener.congestion_window == window
 
 
+def test_after_an_answer_that_was_repeated_the_first_data_time_out_after_three_seconds():
+    """RFC 6298, rule 5.7: the peer cannot tell which of its answers was acknowledged."""
+    clock, out, back = Clock(), ScriptedLink(0.05), ScriptedLink(0.05)
+    back.lost = {1, 4}
+    connection = TcpConnection(clock, out, back, EXACT, options(tail_probe=False))
+    connection.open(lambda: clock.call_at(4.0, connection.peer.write, 400))
+    clock.run(12.0)
+    assert [at for at, size in back.carried if size > 60] == [4.0, 7.0]
+
+
 def test_without_a_handshake_the_opener_may_write_at_once():
     times, out, _ = opened(opener=options(handshake=False))
     assert times == {"opener": 0.0, "peer": 0.0}

@@ -39,6 +39,21 @@ def test_after_a_lost_probe_the_timeout_restarts_and_doubles():
     assert pair.sent(1.0) == pytest.approx([1.0, 1.3, 1.6, 2.2, 3.4])
 
 
+def test_what_is_written_after_a_lost_probe_brings_the_timeout_of_the_first_no_earlier():
+    # the probe at 1.212 restarted the time-out, and what leaves at 1.25 is due after 0.202 s
+    pair = lost_at([1.0, 1.01, 1.25], {1, 2, 3, 4})
+    assert pair.sent(1.0)[:5] == pytest.approx([1.0, 1.01, 1.212, 1.25, 1.452])
+    assert (pair.opener.sender.tail_probes, pair.opener.sender.timeouts) == (1, 1)
+
+
+def test_instead_of_a_second_probe_the_first_segment_waits_for_its_own_timeout():
+    # Whether the probe at 1.3 was needed is open after its acknowledgement at 1.4. The next probe
+    # would be due at 1.602; the first segment left at 1.35, and its time-out is 300 ms.
+    pair = lost_at([1.0, 1.35, 1.36], {1, 3, 4}, until=1.9)
+    assert pair.sent(1.0)[:5] == pytest.approx([1.0, 1.3, 1.35, 1.36, 1.65])
+    assert (pair.opener.sender.tail_probes, pair.opener.sender.timeouts) == (1, 1)
+
+
 def test_two_lost_at_the_tail_are_probed_after_two_round_trips_and_both_come_back():
     # the probe repeats the second at 1.212; its acknowledgement at 1.312 tells of the first
     pair = lost_at([1.0, 1.01], {1, 2})
@@ -138,6 +153,12 @@ def test_a_needless_recovery_is_taken_back_by_time_stamps():
     assert without.opener.congestion_window < 10.0
 
 
+def test_a_recovery_that_was_needed_is_not_taken_back():
+    pair = lost_at([1.0, 1.1, 1.101, 1.102], {1})
+    assert (pair.opener.sender.retransmitted, pair.opener.sender.timeouts) == (1, 0)
+    assert pair.opener.congestion_window == 7.0
+
+
 def test_once_reordering_was_seen_three_later_segments_do_not_end_the_patience():
     pair = lost_at([1.0, 1.001, 2.0, 2.001, 2.002, 2.003], {3}, late={1: 0.01})
     assert pair.sent(2.0)[-1] == pytest.approx(2.127)
@@ -176,11 +197,11 @@ def test_without_a_congestion_window_all_that_is_written_leaves_at_once():
     assert len(pair.sent(1.0)) == 42
 
 
-def sender_of(**changes):
-    """A sender whose segments go nowhere; its round trip was 100 ms."""
+def sender_of(opening=0.1, **changes):
+    """A sender whose segments go nowhere, after an opening of this round trip [s]."""
     clock, edge = Clock(), 1_000_000
     sender = Sender(clock, options(**changes), lambda *segment: None, lambda: None)
-    sender.established(0.1, 0, edge)
+    sender.established(opening, 0, edge)
 
     def hears(at, acknowledged, echo, duplicate=False):
         clock.run(at)
@@ -224,3 +245,52 @@ def test_the_timeout_of_another_segment_halves_again_that_of_the_same_one_does_n
     clock.run(1.5)
     assert sender.timeouts == 3
     assert sender.window.threshold < 7.0
+
+
+@pytest.mark.parametrize(
+    ("overtaken", "repeated_later"), [(True, []), (False, [(1200, pytest.approx(1.205))])]
+)
+def test_what_is_lost_besides_what_times_out_is_found_then_or_by_an_acknowledgement(
+    overtaken, repeated_later
+):
+    # The third is acknowledged after 0.27 s, and the first times out at 1.2. By then the second is
+    # lost, too, unless segments have overtaken each other: then it may come until 1.214.
+    clock, emitted, edge = Clock(), list[tuple[int, float]](), 1_000_000
+    sender = Sender(
+        clock,
+        options(tail_probe=False, congestion_window=False, collapse=False),
+        lambda start, end, now, pushes: emitted.append((start, now)),
+        lambda: None,
+    )
+    sender.established(0.1, 0, edge)
+    for at in (0.5, 0.5, 0.9, 0.919, 0.92, 1.205):
+        clock.call_at(at, sender.write, 400)
+    clock.run(0.6)
+    if overtaken:
+        sender.acknowledge(0.6, 0, edge, ((400, 800),), duplicate=False, echo=0.5)
+    sender.acknowledge(0.6, 800, edge, (), duplicate=False, echo=0.5)
+    clock.run(1.19)
+    sender.acknowledge(1.19, 800, edge, ((1600, 2000),), duplicate=False, echo=0.92)
+    emitted.clear()
+    clock.run(1.4)
+    assert emitted == [(800, pytest.approx(1.2)), *repeated_later, (2000, 1.205)]
+
+
+@pytest.mark.parametrize(("segments", "grows"), [(9, False), (10, True)])
+def test_beyond_slow_start_only_a_window_that_was_filled_grows(segments, grows):
+    _, sender, hears = sender_of(congestion="reno")
+    sender.window.threshold = sender.window.window
+    sender.write(segments * 1448)
+    hears(0.1, segments * 1448, echo=0.0)
+    assert (sender.window.window > 10.0) is grows
+
+
+def test_each_byte_written_by_itself_is_a_round_trip_of_its_own():
+    # the variance falls from 0.25 s by a quarter of the difference to the variation, 0.1406 s
+    _, sender, hears = sender_of(opening=0.5)
+    timeouts = []
+    for number in (1, 2):
+        sender.write(1)
+        hears(0.5 * number, number, echo=0.5 * (number - 1))
+        timeouts.append(sender.times.timeout)
+    assert timeouts == [1.5, 1.390625]

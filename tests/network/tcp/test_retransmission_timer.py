@@ -39,6 +39,13 @@ def test_the_variance_falls_by_a_quarter_of_the_difference_once_per_round_trip()
     assert after(0.2, 0.2, 0.2).timeout == pytest.approx(0.2 + 4 * (0.1 - 0.04375 / 4))
 
 
+def test_a_round_trip_ends_with_the_first_byte_beyond_what_was_sent_at_its_start():
+    times = RoundTrip(TcpOptions(tick=0.0))
+    for acknowledged, sent in ((0, 10), (10, 20), (11, 20), (21, 30)):
+        times.sample(0.2, acknowledged, sent)
+    assert times.timeout == pytest.approx(0.2 + 4 * (0.1 - 0.05 / 4))
+
+
 def test_a_sudden_improvement_hardly_raises_the_variance():
     # a difference of 0.7 s either way: (0.7 - 0.15) / 4 upwards, (0.7 - 0.5) / 32 downwards
     assert after(0.3, 1.0).variance == pytest.approx(0.15 + 0.1375)
@@ -95,13 +102,27 @@ def test_stopped_it_does_not_ring():
 
 @pytest.mark.parametrize(
     ("wait", "grid"),
-    [(0.04, 0.004), (0.25, 0.004), (0.3, 0.032), (2.0, 0.032), (3.0, 0.256), (20.0, 2.048)],
+    [
+        (0.04, 0.004),
+        (0.252, 0.004),
+        (0.256, 0.032),
+        (0.3, 0.032),
+        (2.0, 0.032),
+        (3.0, 0.256),
+        (20.0, 2.048),
+    ],
 )
 def test_the_longer_the_wait_the_coarser_the_wheel_at_250_ticks_a_second(wait, grid):
     for now in (0.0011, 0.77, 1.2345):
         ring = next_on_grid(now, wait, 0.004)
         assert now + wait <= ring <= now + wait + grid + 0.004
         assert ring / grid == pytest.approx(round(ring / grid))
+
+
+def test_a_short_wait_ends_one_tick_after_its_ticks_and_no_later():
+    assert next_on_grid(0.0, 0.04, 0.004) == pytest.approx(0.044)
+    assert next_on_grid(0.0039, 0.04, 0.004) == pytest.approx(0.044)
+    assert next_on_grid(0.004, 0.04, 0.004) == pytest.approx(0.048)
 
 
 def test_on_a_wheel_a_timeout_of_309_ms_ends_on_the_next_multiple_of_32_ms():

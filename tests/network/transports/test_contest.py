@@ -8,14 +8,13 @@ import pytest
 from dva_sim.kernel.config import validate
 from dva_sim.network.transports import Contest, ContestConfig, play
 
-CUBED = {"linear": 0.2, "square": 0.02, "decrease": 0.125}
-GAPS = {"tolerance_s": 0.02, "widen": 1.25, "narrow": 1.1, "longest_gap_s": 0.1}
+PLAIN: dict[str, Any] = {"kind": "datagrams", "header_bytes": 12}
 KINDS: dict[str, dict[str, Any]] = {
     "udp": {"kind": "udp"},
-    "rtnp": {"kind": "rtnp", "header_bytes": 12},
-    "trinomial": {"kind": "trinomial", "header_bytes": 12} | CUBED,
-    "irtp": {"kind": "irtp", "header_bytes": 12, "increase": 1.0, "decrease": 0.5},
-    "btp": {"kind": "btp", "header_bytes": 12} | GAPS,
+    "rtnp": PLAIN | {"priority": True},
+    "trinomial": PLAIN | {"increase": 0.2, "decrease": 0.125},
+    "irtp": PLAIN | {"increase": 1.0, "decrease": 0.5, "repeats_crucial": True},
+    "btp": PLAIN | {"increase": 1.0, "decrease": 0.2, "tolerance_s": 0.02},
     "tcp": {"kind": "tcp"},
     "zeromq": {"kind": "zeromq"},
 }

@@ -7,14 +7,16 @@ import pytest
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.transports.competition import Bottleneck, BottleneckConfig, ends_at
-from dva_sim.network.transports.config import Btp, Irtp, Rtnp, Trinomial, Udp
+from dva_sim.network.transports.config import Datagrams, Udp
 from dva_sim.network.transports.interface import TransportMessage
 from dva_sim.network.transports.sessions import open_session
 
-TRINOMIAL = Trinomial(kind="trinomial", header_bytes=12, linear=0.2, square=0.0, decrease=0.125)
-IRTP = Irtp(kind="irtp", header_bytes=12, increase=1.0, decrease=0.5)
-BTP = Btp(kind="btp", header_bytes=12, tolerance_s=0.01, widen=2.0, narrow=1.25, longest_gap_s=1.0)
-RTNP = Rtnp(kind="rtnp", header_bytes=12)
+TRINOMIAL = Datagrams(kind="datagrams", header_bytes=12, increase=0.2, decrease=0.125)
+IRTP = Datagrams(
+    kind="datagrams", header_bytes=12, increase=1.0, decrease=0.5, repeats_crucial=True
+)
+BTP = Datagrams(kind="datagrams", header_bytes=12, increase=1.0, decrease=0.2, tolerance_s=0.01)
+RTNP = Datagrams(kind="datagrams", header_bytes=12, priority=True)
 
 
 class Bench:
@@ -77,21 +79,11 @@ def test_unanswered_a_session_with_a_law_sends_ten_datagrams_and_then_the_newest
     assert bench.commands[-1][1] == pytest.approx(1.9 + 2.0 + 0.05, abs=0.01)
 
 
-def test_acknowledgements_of_the_trinomial_protocol_are_datagrams_of_their_own():
+def test_acknowledgements_are_datagrams_of_their_own():
     bench = Bench(TRINOMIAL)
     bench.send(1.0, 0)
     bench.clock.run(2.0)
     assert bench.ends.down.bytes == 28 + 12
-
-
-def test_acknowledgements_of_btp_ride_on_pictures():
-    bench = Bench(BTP)
-    for number in range(20):
-        bench.send(0.5 * number, number)
-        bench.clock.call_at(0.5 * number, bench.session.picture, TransportMessage(number, 400))
-    bench.clock.run(12.0)
-    assert [number for number, _ in bench.commands] == list(range(20))
-    assert bench.ends.down.bytes == 20 * (400 + 28 + 12)
 
 
 def test_once_the_round_trip_is_known_commands_flow_as_often_as_there_are_any():

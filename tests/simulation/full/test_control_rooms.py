@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
-from dva_sim.core.events import State
+from dva_sim.core.events import Cause, State
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.dva_trace import replay_dva, traced
 from dva_sim.simulation.full.run import Run
@@ -129,7 +129,7 @@ def test_a_false_alarm_called_from_the_control_room_breaks_no_rule(staffed):
 def test_an_event_that_is_refuted_by_nobody_is_found_out(staffed):
     """The checker above can fail: the same end without anybody's word."""
     core = staffed.run.dva.core
-    core.orders.settle(staffed.event, State.REFUTED, staffed.run.clock.now)
+    core.orders.transition(staffed.event, Cause.DISMISSED, staffed.run.clock.now)
     staffed.until(12.0)
     assert staffed.run.recorder.violations["S6"] > 0
 

@@ -3,7 +3,7 @@
 import pytest
 
 from dva_sim.core.assignments import Rules
-from dva_sim.core.events import Event, EventTable, State
+from dva_sim.core.events import Cause, Event, EventTable, State
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.event_ledger import EventLedger
 from dva_sim.simulation.full.observations import Page
@@ -28,7 +28,7 @@ class Hearer:
         self.event.operator, self.event.responder = OPERATOR, robot
         self.event.times["assigned"] = now
         if self.event.state is State.PENDING:
-            self.table.move(self.event, State.ASSIGNED, now)
+            self.table.move(self.event, Cause.ORDERED, now)
 
     def orders(self, now: float, robot: str = ROBOT) -> None:
         """An order is sent, and accepted."""
@@ -158,7 +158,7 @@ def test_an_order_that_still_waits_for_its_device_was_not_accepted(is_sent, brea
     heard.orders(1.0)
     assert heard.broken(2.0) == []
     heard.says(2.0, m.OrderProgress(heard.event.number, "declined"))
-    heard.table.move(heard.event, State.PENDING, 2.0)
+    heard.table.move(heard.event, Cause.GIVEN_BACK, 2.0)
     heard.event.operator = heard.event.responder = None
     assert heard.broken(10.0) == []
     heard.assigns(10.0)
@@ -178,7 +178,7 @@ def confirms(heard: Hearer, now: float, arrives: bool) -> list[str]:
     heard.says(now, report)
     if arrives:
         heard.event.times |= {"departed": now, "arrived": now}
-    heard.table.move(heard.event, State.CONFIRMED, now)
+    heard.table.move(heard.event, Cause.CONFIRMED, now)
     return heard.broken(now + 2.0)
 
 
@@ -219,6 +219,6 @@ def test_who_registers_again_on_the_way_has_taken_the_event_up(has_set_out, brea
         heard.says(1.5, m.OrderProgress(heard.event.number, "departed"))
     heard.broken(80.0)
     heard.event.operator = heard.event.responder = None
-    heard.table.move(heard.event, State.PENDING, 80.0)
+    heard.table.move(heard.event, Cause.GIVEN_BACK, 80.0)
     found = heard.broken(80.0 + RULES.escalate_after - 1.0)
     assert any("is pending after" in line for line in found) is breaks

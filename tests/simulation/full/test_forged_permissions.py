@@ -10,6 +10,7 @@ from dva_sim.agents.robot.controller import PATIENCE, RobotController
 from dva_sim.agents.robot.inquiry import BURST, RATE
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.dva import Dva
+from dva_sim.core.sessions import DvaAnswer
 from dva_sim.network.messaging import Request, Requester
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
@@ -223,17 +224,17 @@ def test_permissions_are_confirmed_over_a_slow_link_that_loses_much():
 # --- older ones -----------------------------------------------------------------------------
 
 
-def of_version(version: str) -> Callable[[Dva, m.Message, float], tuple[m.Reply, list[object]]]:
+def of_version(version: str) -> Callable[[Dva, m.Message, float], DvaAnswer]:
     """A DVA that answers questions of robots as one of an older version does."""
-    honest = Dva._handle
+    honest = Dva._answer
 
-    def handle(self: Dva, message: m.Message, now: float) -> tuple[m.Reply, list[object]]:
+    def answer(self: Dva, message: m.Message, now: float) -> DvaAnswer:
         body = message.body
         if isinstance(body, m.GetGrant) and (version < "1.4" or body.holder is None or body.level):
-            return m.Reply(message.message_id, m.BAD_MESSAGE, "not valid"), []
-        return honest(self, message, now)  # type: ignore[return-value]
+            return DvaAnswer(m.BAD_MESSAGE, "not valid")
+        return honest(self, message, now)
 
-    return handle
+    return answer
 
 
 @pytest.mark.parametrize(
@@ -242,7 +243,7 @@ def of_version(version: str) -> Callable[[Dva, m.Message, float], tuple[m.Reply,
 )
 def test_a_dva_that_cannot_confirm_its_grants_gives_nobody_a_robot(monkeypatch, version, outcomes):
     if version != "1.6":
-        monkeypatch.setattr(Dva, "_handle", of_version(version))
+        monkeypatch.setattr(Dva, "_answer", of_version(version))
     run = run_of().run()
     assert {drive.outcome for drive in run.recorder.drives} <= outcomes
     assert (run.recorder.drives[0].started is not None) is (version != "1.3")

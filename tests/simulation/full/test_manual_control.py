@@ -2,6 +2,7 @@
 
 import pytest
 from helpers.dva.permissions import enter
+from helpers.mutation.bugs import planted
 
 from dva_sim.agents.robot.controller import (
     LEASE_S,
@@ -17,7 +18,6 @@ from dva_sim.protocol import messages as m
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import id_of
-from dva_sim.storms.mutants import planted
 
 ROBOT, OPERATOR = id_of("robot", 1), id_of("operator", 9)
 HAND = "hand"

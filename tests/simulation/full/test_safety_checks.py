@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from helpers.dva.permissions import enter
+from helpers.mutation.bugs import planted
 from helpers.wording import counted
 
 from dva_sim.agents.device import command_topic
@@ -24,7 +25,7 @@ from dva_sim.agents.robot.faults import RobotFaults
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.core.dispatcher import Dispatcher
-from dva_sim.core.events import EventTable, State
+from dva_sim.core.events import Cause, EventTable, State
 from dva_sim.core.orders import Orders
 from dva_sim.core.registry import Registry
 from dva_sim.core.sessions import Sessions
@@ -39,7 +40,6 @@ from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.safety_checks import CHECKED, LEASE, Held, Witness
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.simulation.full.verdicts import RULES, judged
-from dva_sim.storms.mutants import planted
 from dva_sim.worlds.bodies import RobotBody, TickTarget
 
 ROBOT, STRANGER = id_of("robot", 1), "02:00:00:09:00:01"
@@ -335,7 +335,7 @@ def test_what_a_dva_remembers_of_an_earlier_life_breaks_no_rule():
     (event,) = page.events.closed.values()
     assert "confirmed" in event.times
     pending = page.events.add("fire", m.Position(38.66, -9.2), 0.5, 0.0)
-    page.events.move(pending, State.ASSIGNED, 0.5)
+    page.events.move(pending, Cause.ORDERED, 0.5)
     pending.responder = id_of("guard", 1)
     facts: list[Any] = []
     log = FactLog(facts.append, (), lambda _: STATIONARY)
@@ -343,7 +343,7 @@ def test_what_a_dva_remembers_of_an_earlier_life_breaks_no_rule():
     report = m.EventReport(2, "fire", pending.position, 0.5, 0.9, "confirmed")
     data = encode(m.Message(DVA, 9, id_of("guard", 1), "12:00:00", 0, report))
     log.delivered(1.2, id_of("guard", 1), DVA, data)
-    page.events.move(pending, State.CONFIRMED, 1.2)
+    page.events.move(pending, Cause.CONFIRMED, 1.2)
     log.shows(1.5, page)
     found = {verdict.rule: verdict.state for verdict in judged(facts, terms)}
     assert (found["S6"], found["S7"]) == ("held", "held")
@@ -683,7 +683,7 @@ def test_an_event_that_nobody_has_confirmed_breaks_s6(monkeypatch):
     def hasty(self: Orders, event: Any, device: str, now: float) -> None:
         honest(self, event, device, now)
         if event.state is State.ASSIGNED:
-            self.events.move(event, State.CONFIRMED, now)
+            self.events.move(event, Cause.CONFIRMED, now)
 
     assert broken(played()) == set()
     monkeypatch.setattr(Orders, "departed", hasty)

@@ -14,7 +14,7 @@ from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.resources import available
-from dva_sim.live.options import LiveOptions
+from dva_sim.options.runs import EpisodeOptions, LiveOptions
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import simulate
 from dva_sim.simulation.scenario import Scenario, contradictions
@@ -105,7 +105,7 @@ def test_a_study_tells_each_kind_once_with_the_number_of_configurations():
 def test_an_episode_begins_with_the_warning():
     out = Console(file=io.StringIO(), width=200)
     pairs = ["link.delay_s=1.2", "request.timeout_s=9", "horizon_s=20"]
-    stories.episode(EpisodeRequest("drive-to-event", 1, pairs), out)
+    stories.episode(EpisodeRequest(EpisodeOptions("drive-to-event", set=pairs)), out)
     first = out.file.getvalue().splitlines()[0]
     assert first.startswith("warning: request.timeout_s 9 ")
 
@@ -121,7 +121,7 @@ def test_check_tells_it_of_a_file_that_is_valid(tmp_path, capsys):
 
 def test_a_live_run_says_before_anything_starts_that_the_modelled_link_plays_no_part():
     out = Console(file=io.StringIO(), width=200)
-    live.warn(out, LiveOptions("drive-to-event", ("link.delay_s=0.5",)))
+    live.warn(out, LiveOptions("drive-to-event", set=("link.delay_s=0.5",)))
     assert out.file.getvalue().startswith("warning: link.delay_s: ")
 
 

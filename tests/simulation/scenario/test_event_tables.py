@@ -9,14 +9,15 @@ from typing import Any
 
 import pytest
 
-from dva_sim.console.options import ConsoleOptions
+from dva_sim.console import options as console
 from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.experiments.study.cell_grid import cells
 from dva_sim.experiments.study.hashing import stable_hash
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import load_yaml
-from dva_sim.live.options import LiveOptions
+from dva_sim.live import options as live
+from dva_sim.options.runs import ConsoleOptions, EpisodeOptions, LiveOptions
 from dva_sim.simulation.models import model_of
 from dva_sim.testing.files import check_file
 
@@ -203,9 +204,9 @@ def test_a_row_that_repeats_another_counts_again_and_is_named(tmp_path: Path, mo
 @pytest.mark.parametrize(
     "scenario_at",
     [
-        lambda file: EpisodeRequest(file).scenarios()[0],
-        lambda file: LiveOptions(scenario=file).read(),
-        lambda file: ConsoleOptions(scenario=file).read(),
+        lambda file: EpisodeRequest(EpisodeOptions(file)).scenarios()[0],
+        lambda file: live.scenario_of(LiveOptions(scenario=file)),
+        lambda file: console.scenario_of(ConsoleOptions(scenario=file)),
     ],
     ids=["episode", "live", "console"],
 )

@@ -6,6 +6,7 @@ import pytest
 from helpers.wording import unnamed
 
 from dva_sim.cli.validation import validate
+from dva_sim.options.studies import ValidateOptions
 from dva_sim.validation.dispatch import checks
 from dva_sim.validation.dispatch.cases import load_cases
 from dva_sim.validation.dispatch.checks import check_cases
@@ -50,18 +51,24 @@ def only_one_identity(monkeypatch):
 
 
 def test_a_right_core_passes_and_says_what_is_too_rough(tmp_path, capsys, only_one_identity):
-    assert validate("dispatch", case_file=a_file(tmp_path), quick=True, jobs=1, seed=1) == 0
+    assert (
+        validate(ValidateOptions("dispatch", cases=a_file(tmp_path), quick=True, jobs=1, seed=1))
+        == 0
+    )
     output = capsys.readouterr().out
     assert not unnamed(output, "agree", "quick run")
 
 
 def test_a_full_run_that_is_too_rough_fails(tmp_path, only_one_identity):
-    assert validate("dispatch", case_file=a_file(tmp_path), quick=False, jobs=1, seed=1) == 4
+    assert (
+        validate(ValidateOptions("dispatch", cases=a_file(tmp_path), quick=False, jobs=1, seed=1))
+        == 4
+    )
 
 
 def test_a_wrong_answer_fails(tmp_path, capsys, only_one_identity):
     path = a_file(tmp_path, measures="{utilisation: 0.6}", source="wrong on purpose")
-    assert validate("dispatch", case_file=path, quick=True, jobs=1, seed=1) == 4
+    assert validate(ValidateOptions("dispatch", cases=path, quick=True, jobs=1, seed=1)) == 4
     assert "1 of" in capsys.readouterr().out
 
 
@@ -69,7 +76,9 @@ def test_a_wrong_answer_fails(tmp_path, capsys, only_one_identity):
 def test_what_is_written_is_the_same_bytes_each_time(tmp_path, only_one_identity):
     path = a_file(tmp_path)
     for name in ("one", "two"):
-        validate("dispatch", tmp_path / name, case_file=path, quick=True, jobs=1, seed=3)
+        validate(
+            ValidateOptions("dispatch", out=tmp_path / name, cases=path, quick=True, jobs=1, seed=3)
+        )
     files = sorted(p.relative_to(tmp_path / "one") for p in (tmp_path / "one").rglob("*.*"))
     assert {f.name for f in files} >= {"dispatch.csv", "dispatch.parquet", "index.html"}
     assert {f.stem for f in files if f.suffix == ".svg"} == {"deviations", "relative", "waits"}

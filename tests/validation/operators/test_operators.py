@@ -7,6 +7,7 @@ import pytest
 from dva_sim.agents.operator.published import lines_of, load_split, load_targets
 from dva_sim.cli.validation import validate
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.options.studies import ValidateOptions
 from dva_sim.validation.operators import experiments
 from dva_sim.validation.operators.experiments import (
     EXPERIMENTS,
@@ -66,14 +67,14 @@ def test_the_seed_decides_who_the_persons_are_and_the_number_of_processes_nothin
 def test_an_unknown_strategy_is_refused_before_anything_is_played(monkeypatch):
     monkeypatch.setattr(experiments, "play_exact", lambda *given: pytest.fail("it was played"))
     with pytest.raises(ConfigError, match="'telepathy'"):
-        validate("operators", None, quick=True, jobs=1, strategy="telepathy")
+        validate(ValidateOptions("operators", quick=True, jobs=1, strategy="telepathy"))
 
 
 @pytest.mark.parametrize(
     ("what", "options", "words"),
     [
         ("robots", {}, "dispatch, operators or network"),
-        ("operators", {"case_file": "mine.yaml"}, "--cases .*`validate dispatch`"),
+        ("operators", {"cases": "mine.yaml"}, "--cases .*`validate dispatch`"),
         ("dispatch", {"strategy": "pursuit"}, "--strategy .*`validate operators`"),
         ("network", {"strategy": "adaptive"}, "--strategy .*`validate operators`"),
         ("dispatch", {"ablate": True}, "--ablate, --live, --measure and --beside"),
@@ -81,14 +82,16 @@ def test_an_unknown_strategy_is_refused_before_anything_is_played(monkeypatch):
 )
 def test_what_does_not_belong_together_is_refused(what, options, words):
     with pytest.raises(ConfigError, match=words):
-        validate(what, None, **options)
+        validate(ValidateOptions(what, **options))
 
 
 @pytest.mark.soak
 def test_what_is_written_is_the_same_bytes_each_time(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(experiments, "QUICK_PERSONS", 3)
     for name in ("one", "two"):
-        assert validate("operators", tmp_path / name, quick=True, jobs=2, strategy="oracle") == 4
+        out = tmp_path / name
+        options = ValidateOptions("operators", out=out, quick=True, jobs=2, strategy="oracle")
+        assert validate(options) == 4
     assert "negative" not in capsys.readouterr().err
     files = sorted(p.relative_to(tmp_path / "one") for p in (tmp_path / "one").rglob("*.*"))
     assert {f.name for f in files} >= {

@@ -51,9 +51,11 @@ class Corrections:
     """
 
     def __init__(self, person: Person) -> None:
-        self._habits, self._tempo = person.habits.correcting, person.tempo
+        self._habits = person.habits.correcting
+        self._tempo = person.tempo
         self._from = self._to = 0.0
-        self._begun, self._last = -math.inf, math.inf
+        self._begun = -math.inf
+        self._last = math.inf
         self._evidence = self._errors = self._gathered = 0.0
 
     @property
@@ -100,7 +102,8 @@ class Adaptive(Strategy):
 
     def __init__(self, person: Person, reach: Reach, closed: Strategy | None = None) -> None:
         super().__init__(person, reach)
-        self._closed, self._habits = closed, person.habits.waiting
+        self._closed = closed
+        self._habits = person.habits.waiting
         self._pursuit = closed or Pursuit(person, reach)
         self._moves = MoveAndWait(person, reach)
         self._aims = Submovements(person, self._most)
@@ -114,7 +117,8 @@ class Adaptive(Strategy):
 
     @override
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
-        seen, reach = view.seen, self.reach
+        seen = view.seen
+        reach = self.reach
         motion = seen.speed / reach.speed, seen.turn_rate / max(reach.turn_rate, 1e-3)
         self._moves.period = self.period.see(view.now, *motion, view.delay)
         left = max(route.remaining(seen.x, seen.y) - stop_before, 0.0)
@@ -150,7 +154,8 @@ class Adaptive(Strategy):
 
     @override
     def follow(self, view: PathView) -> Velocity:
-        seen, person = view.seen, self.person
+        seen = view.seen
+        person = self.person
         left = view.path.remaining(seen.x, seen.y)
         pace = fastest(seen.tolerance, view.delay, person, self._most)
         count = max(left / self._moves.trusted_in(seen.tolerance), 1.0)
@@ -178,7 +183,8 @@ class Adaptive(Strategy):
         It is the ratio of the two times that it expects, times its unease at the delay. In a closed
         loop that is the pace that the delay allows, and the time to close an error.
         """
-        person, delay = self.person, max(delay, SHORTEST)
+        person = self.person
+        delay = max(delay, SHORTEST)
         farthest = person.habits.steering.farthest_look_m
         pace = min(person.caution * farthest / delay, self._most)
         closed = left / pace + 1.0 / gain_at(person.crossover, person.margin, delay)

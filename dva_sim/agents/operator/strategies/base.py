@@ -66,7 +66,8 @@ class Strategy:
     first_failure = ""
 
     def __init__(self, person: Person, reach: Reach) -> None:
-        self.person, self.reach = person, reach
+        self.person = person
+        self.reach = reach
 
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
         """Return the command for a robot that follows a route.

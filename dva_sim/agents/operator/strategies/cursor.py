@@ -87,7 +87,8 @@ def through(path: Route, seen: Sighting, delay: float, person: Person, most: flo
     speed = fastest(seen.tolerance, delay, person, most)
     left = path.remaining(seen.x, seen.y)
     along = path.length - left
-    bend, room = _bend(path, along, speed * delay + seen.tolerance), seen.tolerance * person.caution
+    bend = _bend(path, along, speed * delay + seen.tolerance)
+    room = seen.tolerance * person.caution
     if 0.5 * bend * (speed * delay) ** 2 > room:
         speed = math.sqrt(2.0 * room / bend) / delay
     if left < speed * max(delay, 1.0 / gain):

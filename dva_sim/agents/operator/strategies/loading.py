@@ -71,7 +71,9 @@ def load_strategy(
         ConfigError: there is none of that name, its file or package cannot be loaded, or it is
             not a strategy; a bad option is reported when it is made.
     """
-    factory, given, word = PLUGINS.find(name, base), dict(options or {}), word_of(name)
+    factory = PLUGINS.find(name, base)
+    given = dict(options or {})
+    word = word_of(name)
 
     def make(person: Person, reach: Reach) -> Driver:
         used: dict[str, Any] = {}

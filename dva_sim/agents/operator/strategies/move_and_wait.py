@@ -38,7 +38,8 @@ class Moves:
     """
 
     def __init__(self, reaction: float, habits: WaitingHabits) -> None:
-        self._reaction, self._habits = reaction, habits
+        self._reaction = reaction
+        self._habits = habits
         self._least_wait = max(reaction, habits.settled_s)
         self.waits = 0
         self._parts: list[MovePart] = []  # the first number is when it ends
@@ -59,7 +60,10 @@ class Moves:
     def halt(self, now: float, peak: float) -> None:
         """Something moves that was no move of this kind: let go at `now` [s], and wait."""
         self.waits += 1
-        self._parts, self._peak, self._ended, self._was_seen = [], peak, now, True
+        self._parts = []
+        self._peak = peak
+        self._ended = now
+        self._was_seen = True
 
     def begin(self, now: float, parts: Sequence[MovePart], peak: float) -> Pair:
         """Begin a move, and say what is wanted first.
@@ -69,11 +73,15 @@ class Moves:
             parts: Duration [s] and command of each part; at least one.
             peak: Top speed of the move, in the unit of `pace` in `next`.
         """
-        ends, at = [], now
+        ends = []
+        at = now
         for lasts, one, other in parts:
             at += lasts
             ends.append((at, one, other))
-        self._parts, self._peak, self._ended, self._was_seen = ends, peak, None, False
+        self._parts = ends
+        self._peak = peak
+        self._ended = None
+        self._was_seen = False
         return ends[0][1:]
 
     def next(self, now: float, delay: float, pace: float) -> Pair | None:
@@ -95,7 +103,8 @@ class Moves:
                 return one, other
         if self._parts:
             self.waits += 1
-            self._parts, self._ended = [], now
+            self._parts = []
+            self._ended = now
         return (0.0, 0.0) if self._waits_on(now, delay) else None
 
     def _waits_on(self, now: float, delay: float) -> bool:
@@ -175,23 +184,27 @@ class MoveAndWait(Strategy):
         wanted = self.moves.next(view.now, view.delay, self._flow(seen.vx, seen.vy))
         if wanted is not None:
             return wanted
-        dx, dy = seen.target_x - seen.x, seen.target_y - seen.y
+        dx = seen.target_x - seen.x
+        dy = seen.target_y - seen.y
         lead = view.delay + self._lasting(math.hypot(dx, dy), self._most)
-        dx, dy = dx + seen.target_vx * lead, dy + seen.target_vy * lead
+        dx = dx + seen.target_vx * lead
+        dy = dy + seen.target_vy * lead
         if math.hypot(dx, dy) <= seen.tolerance:
             return 0.0, 0.0
         return self._straight(view.now, dx, dy)
 
     @override
     def follow(self, view: PathView) -> Velocity:
-        seen, path = view.seen, view.path
+        seen = view.seen
+        path = view.path
         left = path.remaining(seen.x, seen.y)
         wanted = self.moves.next(view.now, view.delay, self._flow(seen.vx, seen.vy))
         if wanted is not None:
             return wanted
         if left <= 0.0:
             return 0.0, 0.0
-        along, room = path.length - left, self.person.caution * seen.tolerance
+        along = path.length - left
+        room = self.person.caution * seen.tolerance
         way = min(self.trusted_in(seen.tolerance), left)
         way = straight_way(path, (seen.x, seen.y), along, way, room)
         x, y = path.point_at(along + way)
@@ -215,7 +228,9 @@ class MoveAndWait(Strategy):
         self, route: Route, seen: Observation, left: float, stop_before: float
     ) -> list[MovePart]:
         """The next move of a robot, with so much way left [m]; none where it has come to stay."""
-        here, turns, go = (seen.x, seen.y), self.reach.radius == 0.0, left - stop_before
+        here = (seen.x, seen.y)
+        turns = self.reach.radius == 0.0
+        go = left - stop_before
         habits = self._habits
         most = max(min(self.trusted, go), habits.least_m)
         way = straight_way(route, here, route.length - left, most, habits.off_way_m)
@@ -249,7 +264,8 @@ class MoveAndWait(Strategy):
     def _straight(self, now: float, dx: float, dy: float) -> Velocity:
         """A move of a cursor by so much [m]."""
         lasts = self._lasting(math.hypot(dx, dy), self._most)
-        vx, vy = dx / lasts, dy / lasts
+        vx = dx / lasts
+        vy = dy / lasts
         return self.moves.begin(now, [(lasts, vx, vy)], self._flow(vx, vy))
 
     def _lasting(self, way: float, most: float) -> float:
@@ -257,7 +273,8 @@ class MoveAndWait(Strategy):
 
         Moves shorter than the period may be lost, and a command lasts for whole periods.
         """
-        lasts, period = max(way / most, self._habits.shortest_s), self.period
+        lasts = max(way / most, self._habits.shortest_s)
+        period = self.period
         if period <= self._habits.shortest_s:
             return lasts
         return period * max(1.0, math.ceil(lasts / period - WHOLE))

@@ -88,10 +88,14 @@ class Predictor(Strategy):
 
     def _moved_on(self, seen: Observation, now: float, delay: float) -> Observation:
         """The robot as it will be once what was asked for has happened."""
-        x, y, heading = seen.x, seen.y, seen.heading
-        speed, turn_rate = seen.speed, seen.turn_rate
+        x = seen.x
+        y = seen.y
+        heading = seen.heading
+        speed = seen.speed
+        turn_rate = seen.turn_rate
         for lasts, one, other in self._unseen(now, delay):
-            speed, turn_rate = self._quality * one, self._quality * other
+            speed = self._quality * one
+            turn_rate = self._quality * other
             middle = heading + 0.5 * turn_rate * lasts
             x += speed * lasts * math.cos(middle)
             y += speed * lasts * math.sin(middle)
@@ -100,10 +104,15 @@ class Predictor(Strategy):
 
     def _cursor(self, seen: Sighting, now: float, delay: float) -> Sighting:
         """Predict a cursor; its target is assumed to keep moving as it is seen to."""
-        x, y, vx, vy = seen.x, seen.y, seen.vx, seen.vy
+        x = seen.x
+        y = seen.y
+        vx = seen.vx
+        vy = seen.vy
         for lasts, one, other in self._unseen(now, delay):
-            vx, vy = self._quality * one, self._quality * other
-            x, y = x + vx * lasts, y + vy * lasts
+            vx = self._quality * one
+            vy = self._quality * other
+            x = x + vx * lasts
+            y = y + vy * lasts
         ahead = self._quality * delay
         return seen._replace(
             x=x,
@@ -116,7 +125,9 @@ class Predictor(Strategy):
 
     def _unseen(self, now: float, delay: float) -> list[tuple[float, float, float]]:
         """Return the requests since `now - delay`: for how long [s], and what."""
-        asked, since, end = self._asked, now - delay, now
+        asked = self._asked
+        since = now - delay
+        end = now
         while len(asked) > 1 and asked[1][0] < now - self._remembers:
             asked.popleft()
         pieces = []

@@ -72,7 +72,8 @@ class TwoPoint(Pursuit):
 
     def _along(self, route: Route, view: View, ahead: Ahead, look: float, speed: float) -> Intent:
         speed = super()._along(route, view, ahead, look, speed).speed
-        passed, cycle = view.now - self._corrected, self._steering_habits.cycle_s
+        passed = view.now - self._corrected
+        cycle = self._steering_habits.cycle_s
         if passed >= cycle - 1e-6:
             self._corrected = view.now
             self._correct(route, view, ahead, look, speed, min(passed, 2.0 * cycle))
@@ -82,7 +83,8 @@ class TwoPoint(Pursuit):
         self, route: Route, view: View, ahead: Ahead, look: float, speed: float, passed: float
     ) -> None:
         """One correction, `passed` [s] after the last one."""
-        seen, person = view.seen, self.person
+        seen = view.seen
+        person = self.person
         x, y = route.point_at(route.length - ahead.remaining + look * NEAR_TIME / FAR_TIME)
         near = wrap(math.atan2(y - seen.y, x - seen.x) - seen.heading)
         counted = min(max(near, -LARGEST), LARGEST)
@@ -92,4 +94,5 @@ class TwoPoint(Pursuit):
         self._steering += change / (FAR + NEAR)
         # The gain is applied to the sum: it changes while the delay is being learnt.
         self._turn_rate = gain_at(person.crossover, person.margin, view.delay) * self._steering
-        self._near, self._far = near, ahead.bearing
+        self._near = near
+        self._far = ahead.bearing

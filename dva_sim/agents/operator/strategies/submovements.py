@@ -85,15 +85,21 @@ class Submovements:
     """
 
     def __init__(self, person: Person, most: float) -> None:
-        self._person, self._habits, self._most = person, person.habits.aiming, most
+        self._person = person
+        self._habits = person.habits.aiming
+        self._most = most
         self._usual = person.usual_delay
         self._asked: deque[tuple[float, float, float]] = deque()
-        self._begun, self._lasts = -math.inf, 0.0
+        self._begun = -math.inf
+        self._lasts = 0.0
         self._way: Velocity = (0.0, 0.0)
         self._last: float | None = None
         self._gap = OFTEN
-        self._pressed, self._failures, self._boldness = -math.inf, 0, 0.0
-        self.off, self._unseen = math.inf, 0.0
+        self._pressed = -math.inf
+        self._failures = 0
+        self._boldness = 0.0
+        self.off = math.inf
+        self._unseen = 0.0
         self.waited = self.total = 0.0
 
     def point(self, now: float, seen: Sighting, delay: float, noise: Iterator[float]) -> Velocity:
@@ -116,7 +122,8 @@ class Submovements:
         tx, target_vx = foreseen(seen.target_x, seen.target_vx, counted, seen.edge)
         ty, target_vy = foreseen(seen.target_y, seen.target_vy, counted, seen.edge)
         x, y = self._predicted(now, seen, counted)
-        dx, dy = tx - x, ty - y
+        dx = tx - x
+        dy = ty - y
         self.off = math.hypot(dx, dy)
         if (
             now >= self._rests_until(delay) - 1e-6
@@ -167,15 +174,18 @@ class Submovements:
         self, now: float, dx: float, dy: float, tolerance: float, noise: Iterator[float]
     ) -> None:
         """A movement by so much, which misses by a share of it; the target's own is added."""
-        habits, off = self._habits, math.hypot(dx, dy)
-        along, across = habits.misses * next(noise), habits.misses * next(noise)
+        habits = self._habits
+        off = math.hypot(dx, dy)
+        along = habits.misses * next(noise)
+        across = habits.misses * next(noise)
         self._boldness = 0.5 * math.erfc(next(noise) / math.sqrt(2.0))  # even, from 0 to 1
         if off > FAILS * math.hypot(*self._way) > 0.0:
             self._failures += 1
         bits = math.log2(1.0 + off / (2.0 * max(tolerance, habits.finest_m)))
         lasts = self._person.tempo * (habits.shortest_s + habits.per_bit_s * bits)
         lasts = max(lasts, 1.9 * off / self._most)  # the least jerk is fastest at 1.9 of its mean
-        self._begun, self._lasts = now, lasts
+        self._begun = now
+        self._lasts = lasts
         self._way = dx + along * dx - across * dy, dy + along * dy + across * dx
 
     def _moving(self, now: float) -> Velocity:
@@ -193,7 +203,10 @@ class Submovements:
         The hand follows what is asked for with a lag that the person knows: what was asked for
         longer ago than the rest of the delay is seen but for the share that the hand still lacks.
         """
-        x, y, until, hand = seen.x, seen.y, now, self._person.hand_lag
+        x = seen.x
+        y = seen.y
+        until = now
+        hand = self._person.hand_lag
         dead = max(counted - hand, 0.0)
         self._unseen = 0.0
         asked = self._asked
@@ -203,5 +216,7 @@ class Submovements:
             age = now - 0.5 * (at + until) - dead
             lasts = (until - at) * (1.0 if age <= 0.0 else math.exp(-age / hand))
             self._unseen += lasts * math.hypot(vx - seen.target_vx, vy - seen.target_vy)
-            x, y, until = x + vx * lasts, y + vy * lasts, at
+            x = x + vx * lasts
+            y = y + vy * lasts
+            until = at
         return x, y

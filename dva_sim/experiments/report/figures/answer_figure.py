@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dva_sim.experiments.analysis.answer import Finding, too_few
-from dva_sim.experiments.analysis.level_phrases import condition
 from dva_sim.experiments.analysis.run_grid import Factor, Floats, present
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
@@ -16,7 +15,7 @@ from dva_sim.experiments.report.figures.cut_bars import Bars, fit_to, mark_cuts
 from dva_sim.experiments.report.figures.palette import FAINT, INK, ONE, PAPER, SOFT
 from dva_sim.experiments.report.prose import caption
 from dva_sim.kernel.wording import capital, number
-from dva_sim.simulation.labels import level_name, measure_name
+from dva_sim.simulation.labels import level_name, measure_name, setting
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -73,11 +72,12 @@ class AnswerFigure(style.ReportFigure):
         _values(ax, finding)
         x = np.arange(len(finding.mean), dtype=np.float64)
         mark_cuts([Bars(ax, x, finding.low, finding.high, ONE.colour)])
-        first, second = _names(finding)
+        sides = (finding.first, finding.second)
+        first, second = (level_name(finding.factor, side) for side in sides)
         unit = f" [{finding.unit}]" if finding.unit else ""
         ax.set_ylabel(style.wrapped(f"{capital(first)} minus {second}{unit}", 34))
         title = f"{capital(first)} minus {second}: {measure_name(finding.measure)}"
-        within = condition(finding)
+        within = f"with {setting(finding.within)}" if finding.within else ""
         title = f"{title}, {within}" if within else title
         few = too_few(finding.persons, finding.cluster) if finding.has_too_few else ""
         words = caption(
@@ -92,15 +92,12 @@ class AnswerFigure(style.ReportFigure):
         return self.finish(figure, words, _table(finding), title=title, reads=(cut,))
 
 
-def _names(f: Finding) -> tuple[str, str]:
-    return level_name(f.factor, f.first), level_name(f.factor, f.second)
-
-
 def _marks(ax: Axes, f: Finding, over: Factor | None) -> None:
     """A bar for the band, a mark for the mean: what it tells is its filling, named in a key."""
     from matplotlib.lines import Line2D
 
-    x, (differs, is_open) = np.arange(len(f.mean)), (f.differs, f.is_open)
+    x = np.arange(len(f.mean))
+    (differs, is_open) = (f.differs, f.is_open)
     ax.axhline(0, color=INK, lw=0.8, zorder=1)
     if over is not None and over.is_numeric and style.is_to_scale(over):
         ax.plot(x, f.mean, color=ONE.colour, lw=1, alpha=0.5, zorder=2)

@@ -63,6 +63,8 @@ class ChoiceMapFigure(style.ReportFigure):
         ax.grid(False)
         ax.tick_params(length=0)
         unit = f" [{found.unit}]" if found.unit else ""
+        key = f"Beyond the best choice{unit}. Shaded: worse, by the simultaneous 95 % band"
+        figure.supxlabel(key, fontsize=_WORDS, color=SOFT)
         words = caption("map", **facts_of(found))
         title = (
             f"{capital(measure_name(found.measure))} beyond the best choice{unit}, by "
@@ -75,7 +77,7 @@ def _paint(ax: Axes, found: ChoiceMap) -> None:
     last = len(found.given.levels)
     for (g, c), worst in np.ndenumerate(found.worst):
         is_best = bool(found.is_best[g, c])
-        shade = _shade(found, float(worst), is_plain=not found.is_worse[g, c])
+        shade = _shade(found, float(worst), is_plain=not found.is_shaded[g, c])
         _cell(ax, _place(found, g, c), shade, regret_text(found, g, c), is_best)
     border = ax.axvline if found.is_tall else ax.axhline
     border(last - 0.5, color=SOFT, linewidth=0.8)

@@ -35,7 +35,8 @@ def fit_to(axes: Axes, values: Floats) -> str:
     if not len(values):
         return ""
     room = _ROOM * (float(np.ptp(values)) or abs(float(values[0])) or 1.0)
-    low, high = max(bottom, values.min() - room), min(top, values.max() + room)
+    low = max(bottom, values.min() - room)
+    high = min(top, values.max() + room)
     axes.set_ylim(low, high)
     if (low, high) == (bottom, top):
         return ""
@@ -87,11 +88,17 @@ def _arrow_head(bars: Bars, at: float, edge: float, side: int, row: int, bound: 
     """At an edge; of several bounds at one stop one stands below the other."""
     look: dict[str, Any] = {"color": bars.colour, "label": ASIDE, "clip_on": False, "zorder": 6}
     if bars.along == "y":
-        place, mark, offset = (at, edge), "v^"[side > 0], (6.0, -side * (2 + _LINE_PT * row))
-        across, up = "left", "top" if side > 0 else "bottom"
+        place = (at, edge)
+        mark = "v^"[side > 0]
+        offset = (6.0, -side * (2 + _LINE_PT * row))
+        across = "left"
+        up = "top" if side > 0 else "bottom"
     else:
-        place, mark, offset = (edge, at), "<>"[side > 0], (-2.0 * side, 6 + _LINE_PT * row)
-        across, up = "right" if side > 0 else "left", "bottom"
+        place = (edge, at)
+        mark = "<>"[side > 0]
+        offset = (-2.0 * side, 6 + _LINE_PT * row)
+        across = "right" if side > 0 else "left"
+        up = "bottom"
     bars.axes.plot(*place, mark, ms=6, **look)
     bars.axes.annotate(
         bound,

@@ -41,7 +41,9 @@ class Distributions(style.ReportFigure):
             len(shown), 1, 2.7 if len(shown) < 3 else 2.2, sharex=True, sharey=True
         )
         look = looks(view.line)
-        raw, confirmed, numbers = view.part.grid(view.measure), _confirmed(view), Numbers()
+        raw = view.part.grid(view.measure)
+        confirmed = _confirmed(view)
+        numbers = Numbers()
         for (ax,), panel in zip(axes, shown, strict=True):
             for level, offset in style.dodge(view.lines):
                 values = view.curve(raw, panel, level).reshape(len(view.stops), -1)
@@ -70,7 +72,8 @@ class Distributions(style.ReportFigure):
 
 def _columns(view: StudyView, values: Floats, ok: NDArray[np.bool_]) -> dict[str, Any]:
     """The runs of a cell that gave a value, with who drove and whether it was confirmed."""
-    persons, trials = view.part.persons, view.part.trials
+    persons = view.part.persons
+    trials = view.part.trials
     there = np.isfinite(values)
     columns = {
         "person": np.repeat(persons, len(trials))[there],
@@ -87,7 +90,8 @@ def _dots(
     stops, runs = values.shape
     spots = width * ((np.arange(runs) * _GOLDEN) % 1 - 0.5)  # even, and the same every time
     x = np.arange(stops)[:, np.newaxis] + offset + spots
-    good, missed = np.isfinite(values) & ok, np.isfinite(values) & ~ok
+    good = np.isfinite(values) & ok
+    missed = np.isfinite(values) & ~ok
     dots: dict[str, Any] = {
         "s": 5 if runs > _CROWD else 14,
         "lw": 0.5,
@@ -105,7 +109,8 @@ def _boxes(ax: Axes, offset: float, width: float, values: Floats) -> None:
     if not len(stops):
         return
     low, middle, high = np.nanquantile(values[stops], [0.25, 0.5, 0.75], axis=1)
-    left, right = stops + offset - width / 2, stops + offset + width / 2
+    left = stops + offset - width / 2
+    right = stops + offset + width / 2
     box: dict[str, Any] = {"color": INK, "zorder": 3}
     for x in (left, right):
         ax.vlines(x, low, high, lw=0.8, **box)

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dva_sim.agents.robot.command_queue import mean_of
 from dva_sim.experiments.analysis.answer import too_few
-from dva_sim.experiments.analysis.run_grid import Floats, present
+from dva_sim.experiments.analysis.run_grid import Factor, Floats, present
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
-from dva_sim.experiments.report.figures.cadence_line import boundary, cadences, mark_boundary
 from dva_sim.experiments.report.figures.csv_numbers import Numbers, in_units
 from dva_sim.experiments.report.figures.cut_bars import Bars, fit_to, mark_cuts
 from dva_sim.experiments.report.figures.legend import Ends, legend, name_lines
-from dva_sim.experiments.report.figures.palette import FAINT, INK, PAPER, Look, looks
+from dva_sim.experiments.report.figures.palette import FAINT, INK, PAPER, SOFT, Look, looks
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.wording import capital
+from dva_sim.network.patterns import PATTERNS
 from dva_sim.simulation.labels import level_name, measure_name
+from dva_sim.simulation.scenario import build, phone_profile
 from dva_sim.statistics import Band, band
 
 if TYPE_CHECKING:
@@ -52,7 +56,7 @@ class Differences(style.ReportFigure):
         figure, axes, ends, bars, cut, numbers = _curves(view, others, baseline, label)
         for ax, found in zip(axes, there, strict=True):
             ax.axhline(0, color=INK, lw=0.8, zorder=1)
-            mark_boundary(ax, view.over, found, text=True)
+            mark_boundary(ax, view.over, found)
         zoomed = view.smallest_effect is not None and _zoom_on_small(axes, view.smallest_effect)
         mark_cuts(bars)
         _name(view, others, figure, axes, ends)
@@ -92,7 +96,10 @@ def _curves(
         that are cut, and the numbers drawn.
     """
     figure, axes = style.panel_grid(view, 3.4)
-    look, every, seen, numbers = looks(view.line), [], [np.zeros(1)], Numbers()
+    look = looks(view.line)
+    every = []
+    seen = [np.zeros(1)]
+    numbers = Numbers()
     bars: list[Bars] = []
     draw = _band if style.has_lines(view) else _points
     for ax, panel in zip(axes, view.shown, strict=True):
@@ -194,7 +201,8 @@ def _points(ax: Axes, bands: Band, look: Look, shift: float) -> float:
 
 def _band(ax: Axes, bands: Band, look: Look, shift: float) -> float:
     """One line with its band and bars; gives the height of its end."""
-    x, colour = _places(bands, shift), look.colour
+    x = _places(bands, shift)
+    colour = look.colour
     ax.fill_between(x, bands.low, bands.high, color=colour, alpha=0.16, lw=0)
     ax.vlines(x, bands.pointwise_low, bands.pointwise_high, color=colour, lw=1.2)
     ax.plot(x, bands.mean, "-", marker=look.mark, color=colour, ms=4.5)
@@ -205,3 +213,77 @@ def _band(ax: Axes, bands: Band, look: Look, shift: float) -> float:
 def _what(view: StudyView) -> str:
     in_excess = view.part.has_reference(view.measure)
     return f"{'excess ' if in_excess else ''}{measure_name(view.measure)}"
+
+
+def cadences(view: StudyView, scenario: Mapping[str, Any]) -> list[Cadence | None]:
+    """Cadence of each panel shown; None unless delay and a waiting pattern are varied."""
+    waits = any(level in PATTERNS and PATTERNS[str(level)].in_step for level in view.lines)
+    if view.over is None or view.over.name != "link.delay_s" or not waits:
+        return [None for _ in view.shown]
+    return [cadence(scenario, panel) for panel in view.shown]
+
+
+def boundary(over: Factor | None, cadence: Cadence | None) -> float | None:
+    """Position on x where the wanted rate becomes too high; None if outside the levels.
+
+    Where places are not to scale, between two levels is the middle between them.
+    """
+    place = style.place_of(over, cadence.boundary_s) if over and cadence else None
+    if place is None or over is None or style.is_to_scale(over) or place.is_integer():
+        return place
+    return math.floor(place) + 0.5
+
+
+def mark_boundary(ax: Axes, over: Factor | None, cadence: Cadence | None) -> None:
+    """The delay from which request/reply must fall behind the wanted rate."""
+    place = boundary(over, cadence)
+    if place is None or over is None or cadence is None:
+        return
+    ax.axvline(place, color=SOFT, lw=1, ls=(0, (4, 2)), zorder=1)
+    ax.annotate(
+        f"2d + P = T\n(d = {level_name(over.name, round(cadence.boundary_s, 4))})",
+        (place, 0.98),
+        xycoords=("data", "axes fraction"),
+        xytext=(4, 0),
+        textcoords="offset points",
+        va="top",
+        fontsize=8,
+        color=SOFT,
+    )
+
+
+@dataclass(frozen=True)
+class Cadence:
+    """Send period of the phone, and the time a robot needs per command.
+
+    Attributes:
+        period_s: Wanted time between two commands; the shortest, where it is not constant.
+        processing_s: Time a robot needs for one command, on average.
+    """
+
+    period_s: float
+    processing_s: float
+
+    @property
+    def boundary_s(self) -> float:
+        """One-way delay at which round trip and processing fill the wanted period.
+
+        Beyond it a request waits for the reply to the one before: 2 d + P = T.
+        """
+        return (self.period_s - self.processing_s) / 2
+
+
+def cadence(scenario: Mapping[str, Any], changes: Mapping[str, Level]) -> Cadence | None:
+    """The cadence of a scenario under some levels; None where its profile is not to be had.
+
+    A phone that looks only when its batch is full or its time is up wants no more than that.
+    """
+    try:
+        resolved = build(scenario, changes)
+        phone = phone_profile(resolved)
+    except ConfigError:
+        return None
+    period = 1.0 / resolved.command.rate_hz
+    if phone.send == "on_change":
+        period = min(phone.max_delay_s, 20 / phone.sample_rate_hz)
+    return Cadence(period, mean_of(resolved.robot.processing_s or 0.0))

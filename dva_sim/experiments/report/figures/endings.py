@@ -28,7 +28,9 @@ if TYPE_CHECKING:
     from dva_sim.experiments.report.summary import Reading
 
 
-_MOST_STOPS, _MOST_LINES, _POINTS = 4, 3, 241
+_MOST_STOPS = 4
+_MOST_LINES = 3
+_POINTS = 241
 _TITLE = 70  # characters that the width holds
 
 
@@ -50,7 +52,8 @@ class EndingsInTime(style.ReportFigure):
         if not stops:
             return None
         figure, axes = style.panels(len(lines), len(stops), 1.9, sharex=True, sharey=True)
-        times, numbers = np.linspace(0.0, endings.horizon, _POINTS), Numbers()
+        times = np.linspace(0.0, endings.horizon, _POINTS)
+        numbers = Numbers()
         for row, line in zip(axes, lines, strict=True):
             for ax, stop in zip(row, stops, strict=True):
                 mask = endings.under(line, stop)
@@ -71,7 +74,11 @@ class EndingsInTime(style.ReportFigure):
             )
         for ax in axes[-1]:
             ax.set_xlabel("Since the report [s]")
-        key(figure, [box(FATES[way]) for way in endings.ways], [_named(w) for w in endings.ways])
+        key(
+            figure,
+            [box(FATES[way]) for way in endings.ways],
+            ["nothing yet" if way == NOTHING else way for way in endings.ways],
+        )
         words = caption("endings", part=view.part.name, place=brief(view.panels[0]))
         return self.finish(figure, words, numbers)
 
@@ -107,11 +114,8 @@ def stack_in_time(
     """Shares that add up to one, one above the other."""
     floor = np.zeros_like(times)
     for way, share in shares.items():
-        fill, top = fills[way], floor + share
+        fill = fills[way]
+        top = floor + share
         look: dict[str, Any] = {"facecolor": fill.colour, "hatch": fill.hatch, "edgecolor": PAPER}
         ax.fill_between(times, floor, top, step="post", lw=0.6, **look)
         floor = top
-
-
-def _named(way: str) -> str:
-    return "nothing yet" if way == NOTHING else way

@@ -35,7 +35,8 @@ _MOST_WRITTEN = 12  # levels along x, beyond which numbers have no room
 _DARK = 0.65  # of the strongest colour, from where on writing is white
 
 
-_ABOVE, _BELOW = "▲", "▼"
+_ABOVE = "▲"
+_BELOW = "▼"
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,12 @@ class EffectField:
     mean: Floats
     low: Floats
     high: Floats
+
+    @property
+    def shown(self) -> Floats:
+        """The mean where the band excludes zero, else 0: colour claims no more than the mark."""
+        is_unclear = (self.low <= 0) & (self.high >= 0)
+        return np.where(is_unclear, 0.0, self.mean)
 
 
 class HeatMap(style.ReportFigure):
@@ -76,7 +83,7 @@ class HeatMap(style.ReportFigure):
         reach = max(float(np.nanmax(abs(field.mean))) for field in fields) or 1.0
         has_zero = False
         for ax, field in zip(axes, fields, strict=True):
-            image = _colours(ax, field.mean, reach)
+            image = _colours(ax, field.shown, reach)
             has_zero |= _contours(ax, field)
             _write(ax, field, image, reach)
             style.level_axis(ax, second)
@@ -109,7 +116,8 @@ def _field(
 ) -> EffectField:
     columns = [view.difference(panel | {second.name: x}, *contrast) for x in second.levels]
     values = np.stack(columns, axis=1)  # (persons, levels of the second, stops)
-    found, shape = band(values.reshape(len(values), -1)), values.shape[1:]
+    found = band(values.reshape(len(values), -1))
+    shape = values.shape[1:]
     mean, low, high = (x.reshape(shape) for x in (found.mean, found.low, found.high))
     return EffectField(second, panel, mean, low, high)
 
@@ -123,11 +131,11 @@ def _second(view: StudyView) -> Factor | None:
     return max(worth, key=lambda f: (len(f.levels), f.is_numeric), default=None)
 
 
-def _colours(ax: Axes, mean: Floats, reach: float) -> QuadMesh:
+def _colours(ax: Axes, shown: Floats, reach: float) -> QuadMesh:
     """Fields from purple, below zero, over white to orange: far apart for every eye."""
     return ax.pcolormesh(
-        *np.meshgrid(np.arange(mean.shape[1] + 1) - 0.5, np.arange(mean.shape[0] + 1) - 0.5),
-        np.ma.masked_invalid(mean),
+        *np.meshgrid(np.arange(shown.shape[1] + 1) - 0.5, np.arange(shown.shape[0] + 1) - 0.5),
+        np.ma.masked_invalid(shown),
         cmap=DIVERGING,
         vmin=-reach,
         vmax=reach,
@@ -141,8 +149,8 @@ def _write(ax: Axes, field: EffectField, image: QuadMesh, reach: float) -> None:
     for (y, x), mean in np.ndenumerate(field.mean):
         if not np.isfinite(mean):
             continue
-        paint = image.to_rgba(np.asarray(mean))
-        mark = _mark(float(field.low[y, x]), float(field.high[y, x]))
+        paint = image.to_rgba(np.asarray(field.shown[y, x]))
+        mark = _ABOVE if field.low[y, x] > 0 else _BELOW if field.high[y, x] < 0 else ""
         text = number(float(mean)) if field.mean.shape[1] <= _MOST_WRITTEN else ""
         ax.text(
             x,
@@ -152,14 +160,10 @@ def _write(ax: Axes, field: EffectField, image: QuadMesh, reach: float) -> None:
             va="center",
             fontsize=8,
             fontweight="bold" if mark else "normal",
-            color=PAPER if abs(mean) > _DARK * reach else INK,
+            color=PAPER if abs(field.shown[y, x]) > _DARK * reach else INK,
             bbox={"fc": paint, "ec": "none", "pad": 0.6},  # no line through it
             zorder=5,
         )
-
-
-def _mark(low: float, high: float) -> str:
-    return _ABOVE if low > 0 else _BELOW if high < 0 else ""
 
 
 def _contours(ax: Axes, field: EffectField) -> bool:

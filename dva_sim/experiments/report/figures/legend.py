@@ -65,7 +65,8 @@ def legend(figure: Figure, factor: Factor | None, levels: Sequence[Level] | None
 
     if factor is None:
         return
-    look, shown = looks(factor), factor.levels if levels is None else levels
+    look = looks(factor)
+    shown = factor.levels if levels is None else levels
     handles = [Line2D([], [], color=look[v].colour, marker=look[v].mark, ls="") for v in shown]
     key(figure, handles, [level_name(factor.name, level) for level in shown])
 
@@ -111,7 +112,8 @@ def name_lines(axes: Sequence[Axes], ends: Sequence[Ends], factor: Factor | None
 def _in_axes(axes: Axes, ends: Ends) -> Ends:
     """Heights as fractions of the axes, from the lowest up; lines without an end are left out."""
     edges = axes.transData.transform([(0.0, y) for y in axes.get_ylim()])
-    bottom, top = float(edges[0, 1]), float(edges[1, 1])
+    bottom = float(edges[0, 1])
+    top = float(edges[1, 1])
     there = sorted((item for item in ends.items() if np.isfinite(item[1])), key=lambda i: i[1])
     return {
         level: (float(axes.transData.transform((0.0, end))[1]) - bottom) / (top - bottom)

@@ -23,8 +23,12 @@ if TYPE_CHECKING:
     pass
 
 
-INK, SOFT, FAINT, PAPER = "#222222", "#6b6b6b", "#d9d9d9", "white"
-WARNING, HAZARD = "#8a3800", "#8a0000"
+INK = "#222222"
+SOFT = "#6b6b6b"
+FAINT = "#d9d9d9"
+PAPER = "white"
+WARNING = "#8a3800"
+HAZARD = "#8a0000"
 DIVERGING = "PuOr_r"  # purple below zero, white, orange above: far apart for every eye
 
 
@@ -42,11 +46,21 @@ class Fill(NamedTuple):
     hatch: str = ""
 
 
-_BLUE, _VERMILION, _GREEN = Look("#0072B2", "o"), Look("#D55E00", "s"), Look("#009E73", "^")
-_PURPLE, _ORANGE, _SKY = Look("#CC79A7", "D"), Look("#E69F00", "v"), Look("#56B4E9", "P")
-_BLACK, _VIOLET, _BROWN = Look("#222222", "X"), Look("#7a2fd0", "*"), Look("#613305", "h")
-_OLIVE, _PLUM, _CRIMSON = Look("#b4b464", "<"), Look("#91086f", ">"), Look("#da0b3f", "d")
-_NAVY, _MINT, _LILAC = Look("#2929a3", "p"), Look("#87c5a6", "8"), Look("#906ef7", "H")
+_BLUE = Look("#0072B2", "o")
+_VERMILION = Look("#D55E00", "s")
+_GREEN = Look("#009E73", "^")
+_PURPLE = Look("#CC79A7", "D")
+_ORANGE = Look("#E69F00", "v")
+_SKY = Look("#56B4E9", "P")
+_BLACK = Look("#222222", "X")
+_VIOLET = Look("#7a2fd0", "*")
+_BROWN = Look("#613305", "h")
+_OLIVE = Look("#b4b464", "<")
+_PLUM = Look("#91086f", ">")
+_CRIMSON = Look("#da0b3f", "d")
+_NAVY = Look("#2929a3", "p")
+_MINT = Look("#87c5a6", "8")
+_LILAC = Look("#906ef7", "H")
 LOOKS = (
     *(_BLUE, _VERMILION, _GREEN, _PURPLE, _ORANGE, _SKY, _BLACK, _VIOLET),
     *(_BROWN, _OLIVE, _PLUM, _CRIMSON, _NAVY, _MINT, _LILAC),
@@ -89,8 +103,6 @@ _OWN: Mapping[str, Look] = {
 
 # What may become of an event, the best first. In a stack neighbours differ in a print, too.
 FATES: Mapping[str, Fill] = {
-    "confirmed by a robot": Fill(_NAVY.colour),
-    "confirmed by a guard": Fill(_ORANGE.colour, "////"),
     "confirmed": Fill("#87c5a6"),
     "cleared": Fill("#56B4E9", "----"),
     "refuted": Fill(HAZARD, "...."),
@@ -100,9 +112,7 @@ FATES: Mapping[str, Fill] = {
     "escalated": Fill("#906ef7", "\\\\\\\\"),
     "open": Fill("#dedede"),
     "expired": Fill("#b4b464", "++++"),
-    "undetected": Fill("#222222"),
     "never reported": Fill("#222222", "||||"),
-    "other": Fill("#f0f0f0", "****"),
     "nothing": Fill("#dedede"),
 }
 

@@ -1,4 +1,4 @@
-"""Continuous factors: the outcome at every point against each of them, and Sobol's indices."""
+"""Continuous factors: the outcome at every point against each of them."""
 
 from __future__ import annotations
 
@@ -12,13 +12,12 @@ from dva_sim.experiments.analysis.study_view import StudyView, layout_of
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.csv_numbers import Numbers, with_unit
 from dva_sim.experiments.report.figures.legend import legend
-from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, SOFT, Look, looks
+from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, Look, looks
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import POINT, Level
 from dva_sim.kernel.wording import capital
-from dva_sim.simulation.labels import factor_name, level_name, measure_name, setting
+from dva_sim.simulation.labels import level_name, measure_name, setting
 from dva_sim.simulation.labels import with_unit as head_of
-from dva_sim.statistics import SobolIndex, sobol_indices
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -145,7 +144,8 @@ def _place(panel: Setting) -> str:
 def _dots(ax: Axes, x: Floats, y: Floats, look: Look) -> None:
     """Points, and the means of as many equal parts of them as there are enough for."""
     there = np.isfinite(x) & np.isfinite(y)
-    x, y = x[there], y[there]
+    x = x[there]
+    y = y[there]
     few: dict[str, Any] = {"s": 12 if len(x) < 200 else 5, "rasterized": len(x) > 500}
     ax.scatter(x, y, marker=look.mark, color=look.colour, alpha=0.35, lw=0, zorder=2, **few)
     middle, mean, half = trend(x, y)
@@ -172,62 +172,3 @@ def trend(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
     spread = [np.std(y[i], ddof=1) / math.sqrt(len(i)) * t.ppf(0.975, len(i) - 1) for i in order]
     middle = [np.median(x[part]) for part in order]
     return np.array(middle), np.array([y[part].mean() for part in order]), np.array(spread)
-
-
-# --- Sobol's indices -------------------------------------------------------------------------
-class Sobol(style.ReportFigure):
-    name = "sobol"
-    title = "Which factors the outcome varies with: Sobol' indices"
-    pages = ("driving",)
-
-    def applies(self, view: StudyView, reading: Reading) -> bool:
-        """Only for Saltelli's sample."""
-        is_sample = bool((reading.study.get("design") or {}).get("saltelli"))
-        return super().applies(view, reading) and is_sample and bool(reading.points)
-
-    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
-        """Draw it."""
-        clouds, names, where, panel = points_of(view, reading)
-        height = 1.2 + 0.42 * len(names)
-        figure, (axes,) = style.panels(1, len(clouds), height, sharey=True, sharex=True)
-        numbers = Numbers()
-        for ax, cloud in zip(axes, clouds, strict=True):
-            found = _sobol(cloud, names, where)
-            for row, index in enumerate(found):
-                _bar(ax, row - 0.14, index, "first")
-                _bar(ax, row + 0.14, index, "total")
-                columns = {
-                    f"{kind}_{edge}": getattr(getattr(index, kind), edge)
-                    for kind in ("first", "total")
-                    for edge in ("mean", "low", "high")
-                }
-                numbers.row(panel | {"of": cloud.name, "factor": index.factor}, **columns)
-            ax.axvline(0, color=INK, lw=0.8)
-            ax.set_title(cloud.name)
-            ax.set_xlabel("Share of the variance")
-            style.lying(ax)
-        axes[0].set_yticks(range(len(names)), [capital(factor_name(name)) for name in names])
-        axes[0].set_ylim(len(names) - 0.5, -0.5)
-        title = (
-            f"Which factors the {_what(view, clouds)} varies with: Sobol' indices{_place(panel)}"
-        )
-        return self.finish(figure, caption("sobol"), numbers, title=title)
-
-
-def _sobol(cloud: Cloud, names: list[str], where: Floats) -> tuple[SobolIndex, ...]:
-    """From every run, flat."""
-    shape = cloud.values.shape
-    levels = {
-        name: np.broadcast_to(x[:, np.newaxis, np.newaxis], shape).ravel()
-        for name, x in zip(names, where, strict=True)
-    }
-    person = np.broadcast_to(np.arange(shape[1])[:, np.newaxis], shape).ravel()
-    cell = np.broadcast_to(np.arange(shape[0])[:, np.newaxis, np.newaxis], shape).ravel()
-    return sobol_indices(levels, cloud.values.ravel(), person, cell)
-
-
-def _bar(ax: Axes, row: float, index: SobolIndex, kind: str) -> None:
-    interval = index.first if kind == "first" else index.total
-    ax.hlines(row, interval.low, interval.high, color=INK if kind == "first" else SOFT, lw=1.4)
-    fill = INK if kind == "first" else "white"
-    ax.plot(interval.mean, row, "o", ms=5.5, mfc=fill, mec=INK, zorder=3)

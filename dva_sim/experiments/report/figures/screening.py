@@ -23,7 +23,8 @@ def draw_screening(study: Study, found: Screening, folder: Path) -> Iterator[str
     """Draw the few that move the answer most into a folder; the text that belongs to it."""
     _, answer = rule_of(study)
     first, second = (level_name(answer.factor, level) for level in answer.contrast)
-    words, unit = measure_name(answer.measure), unit_of(answer.measure)
+    words = measure_name(answer.measure)
+    unit = unit_of(answer.measure)
     most = found.most_moving
     with style.styled():
         _draw(found, f"{first} minus {second} in {words} [{unit}]", folder / FIGURE)

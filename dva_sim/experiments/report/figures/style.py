@@ -151,7 +151,8 @@ def finish(
     if layout is not None:
         layout.execute(figure)
     figure.set_layout_engine("none")  # both files get one and the same layout
-    png, svg = io.BytesIO(), io.BytesIO()
+    png = io.BytesIO()
+    svg = io.BytesIO()
     # The canvases themselves, since savefig would draw each figure twice; the PNG first,
     # because the SVG leaves the figure at its own resolution.
     metadata: dict[str, str | None] = {"Software": None}
@@ -305,17 +306,6 @@ def panel_title(axes: Axes, panel: Setting, width: int = 90) -> None:
 def panel_name(panel: Setting) -> str:
     """`250 ms, latest-wins`; nothing if there is but one panel."""
     return capital(brief(panel))
-
-
-def outer_labels(axes: list[list[Axes]], shown: Sequence[Setting], text: str) -> None:
-    """In a grid with a row for each panel: label the left and the lower edge only."""
-    for row, panel in zip(axes, shown, strict=True):
-        name = wrapped(panel_name(panel), _ROW_LABEL)
-        row[0].set_ylabel(f"{name}\n{text}" if panel else text)
-        for ax in row:
-            _make_room(ax, len(row))
-            if row is not axes[-1]:
-                ax.set_xlabel("")
 
 
 def _make_room(axes: Axes, columns: int) -> None:

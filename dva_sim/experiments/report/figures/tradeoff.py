@@ -43,7 +43,9 @@ class TradeOff(style.ReportFigure):
         if columns is None:
             return None
         figure, axes = style.panel_grid(view, 3.6)
-        numbers, ends, bars = Numbers(), [], list[Bars]()
+        numbers = Numbers()
+        ends = []
+        bars = list[Bars]()
         for ax, panel in zip(axes, view.shown, strict=True):
             for level in view.lines:
                 bands = [_band(view, column, panel, level) for column in columns]
@@ -102,14 +104,16 @@ def _fit(ax: Axes, view: StudyView, columns: tuple[str, str]) -> None:
         seen = present(np.concatenate([values.ravel() for values in every]))
         room = _ROOM * (float(np.ptp(seen)) or 1.0)
         low, high = ax.get_xlim() if name == "x" else ax.get_ylim()
-        low, high = max(low, seen.min() - _BELOW * room), min(high, seen.max() + room)
+        low = max(low, seen.min() - _BELOW * room)
+        high = min(high, seen.max() + room)
         ax.set(**{f"{name}lim": (low, high)})
 
 
 def _line(ax: Axes, view: StudyView, level: Level, exposure: Band, response: Band) -> list[Bars]:
     """A mark at each stop, joined where stops are numbers; gives the bars of its crosses."""
     paint, mark = looks(view.line)[level]
-    x, y = exposure.mean, response.mean
+    x = exposure.mean
+    y = response.mean
     ax.hlines(y, exposure.pointwise_low, exposure.pointwise_high, color=paint, lw=0.8, alpha=0.7)
     ax.vlines(x, response.pointwise_low, response.pointwise_high, color=paint, lw=0.8, alpha=0.7)
     ax.plot(x, y, "-" if style.leads_on(view) else "", marker=mark, color=paint, ms=5, lw=1.2)
@@ -121,7 +125,8 @@ def _name_stops(ax: Axes, view: StudyView, x: Floats, y: Floats) -> None:
     """The ends of a line, or each word; none beside another that it would be written over."""
     if view.over is None or len(x) < 2:
         return
-    wide, high = np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())
+    wide = np.ptp(ax.get_xlim())
+    high = np.ptp(ax.get_ylim())
     named: list[int] = []
     for stop in (0, len(x) - 1) if style.leads_on(view) else range(len(x)):
         gaps = [(abs(x[i] - x[stop]) / wide, abs(y[i] - y[stop]) / high) for i in named]

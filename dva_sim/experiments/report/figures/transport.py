@@ -1,9 +1,9 @@
-"""The figures of a study of transports: what each brings, what it takes, and how one drives."""
+"""The figure of a study of transports: what each brings, and what it leaves to others."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -33,35 +33,28 @@ class ShownMeasure(NamedTuple):
     is_log: bool = False
 
 
-BROUGHT = (
-    ShownMeasure("round_trip_mean_s", "Round trip [s]", is_log=True),
+SHOWN = (
+    ShownMeasure("movement_time_s", "Driving time [s]", is_log=True),
     ShownMeasure("round_trip_p95_s", "Round trip, 95th percentile [s]", is_log=True),
     ShownMeasure("picture_rate_hz", "Pictures shown [Hz]"),
     ShownMeasure("picture_age_p95_s", "Age of pictures, 95th percentile [s]", is_log=True),
     ShownMeasure("command_rate_hz", "Commands applied [Hz]"),
     ShownMeasure("age_in_force_mean_s", "Age of the command in force [s]", is_log=True),
-)
-TAKEN = (
-    ShownMeasure("session_down_bps", "Rate of the session, pictures' way [kbit/s]", scale=1e-3),
-    ShownMeasure("share_of_fair_down", "The same in shares of an equal one"),
-    ShownMeasure("bulk_use_down", "All TCP flows, share of the line"),
+    ShownMeasure("share_of_fair_down", "Rate of the session, in equal shares"),
     ShownMeasure("jain_down", "Jain's index of fairness"),
 )
-FELT = (
-    ShownMeasure("movement_time_s", "Driving time [s]", is_log=True),
-    ShownMeasure("delay_felt_s", "Delay as the person takes it [s]", is_log=True),
-)
 
 
-class _Measures(style.ReportFigure):
+class Brought(style.ReportFigure):
     """A panel for each of some measures that the runs have."""
 
+    name = "brought"
+    title = "What each transport brings, and what it leaves to TCP"
     pages = ("transport",)
-    shown: ClassVar[tuple[ShownMeasure, ...]]
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
-        there = [each for each in self.shown if view.part.has(each.column)]
+        there = [each for each in SHOWN if view.part.has(each.column)]
         if not there:
             return None
         figure, _, axes = style.places(len(there), 2, 2.3)
@@ -70,24 +63,13 @@ class _Measures(style.ReportFigure):
         for ax in axes[: len(there) - 2]:
             ax.set_xlabel("")
         legend(figure, view.line)
-        return self.finish(figure, caption(self.name), _numbers(view, there))
-
-
-class Brought(_Measures):
-    name = "brought"
-    title = "What each transport brings, and how one drives with it"
-    shown = FELT + BROUGHT
-
-
-class Taken(_Measures):
-    name = "taken"
-    title = "What each transport takes, and what it leaves to TCP"
-    shown = TAKEN
+        return self.finish(figure, caption("brought"), _numbers(view, there))
 
 
 def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> Numbers:
     """Means over persons and the middle 90 % of them, in the units of the table of runs."""
-    numbers, panel = Numbers(), view.panels[0]
+    numbers = Numbers()
+    panel = view.panels[0]
     grids = {each.column: view.part.grid(each.column) for each in shown}
     for level in view.lines:
         curves = {name: view.curve(grid, panel, level) for name, grid in grids.items()}
@@ -100,7 +82,8 @@ def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> Numbers:
 
 
 def _panel(ax: Axes, view: StudyView, shown: ShownMeasure) -> None:
-    grid, count = shown.scale * view.part.grid(shown.column), len(view.lines)
+    grid = shown.scale * view.part.grid(shown.column)
+    count = len(view.lines)
     for index, (level, look) in enumerate(looks(view.line).items()):
         values = person_means(view.curve(grid, view.panels[0], level))
         place = WIDTH * ((index + 0.5) / count - 0.5)

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 LONGEST = 30.0  # of what moves on a line, in a picture [s]
 SMOOTH = (0.5, 1.0, 1.0, 1.0, 0.5)  # speeds are averaged so: readings of a device come in steps
 BODY_EVERY = 3.0  # half widths of a body between those that are drawn
-PATH, TOUCHED = LOOKS[0].colour, LOOKS[1].colour
+PATH = LOOKS[0].colour
+TOUCHED = LOOKS[1].colour
 
 
 class LengthUnit(NamedTuple):
@@ -75,7 +76,8 @@ def _unit_of(trace: Trace) -> LengthUnit:
 
 
 def _title(scenario: TaskScenario, row: Row) -> str:
-    link, kind = scenario.link, capital(scenario.task.kind)
+    link = scenario.link
+    kind = capital(scenario.task.kind)
     count = len(list(scenario.task.conditions())) * scenario.trials
     conditions = ", ".join(_condition_text(key, row[key]) for key in list(row)[2:4])
     done = "done" if row["completed"] else "not done"
@@ -97,7 +99,8 @@ def _condition_text(key: str, value: float) -> str:
     """A condition in words: `width 6.8 mm`."""
     name, unit = name_and_unit(key)
     if unit == "m" and value < 1.0:
-        value, unit = 1000.0 * value, "mm"
+        value = 1000.0 * value
+        unit = "mm"
     return f"{name} {value:.4g} {unit}"
 
 
@@ -153,7 +156,8 @@ def _place(ax: Axes, trace: Trace, unit: LengthUnit) -> None:
         times, at = zip(*target, strict=True)
         ax.plot(times, unit.per_m * np.array(at), color=SOFT, lw=1.2, label="target")
     for x, _, radius in trace.marks:
-        low, high = unit.per_m * (x - radius), unit.per_m * (x + radius)
+        low = unit.per_m * (x - radius)
+        high = unit.per_m * (x + radius)
         ax.axhspan(low, high, color=FAINT, lw=0, label="target")
     places = [unit.per_m * x for x, _ in trace.places]
     ax.plot(trace.times, places, color=PATH, lw=1.4, label="cursor")

@@ -73,7 +73,8 @@ class Carrier(ABC):
     on_free: Act = staticmethod(_nothing)
 
     def __init__(self, between: BetweenPrograms) -> None:
-        self.between, self.clock = between, between.clock
+        self.between = between
+        self.clock = between.clock
 
     @abstractmethod
     def open(self, ready: Act) -> None:
@@ -91,7 +92,8 @@ class Carrier(ABC):
 class DatagramCarrier(Carrier):
     """UDP: a command each, nothing is sent again."""
 
-    GREETING, AGAIN_S = 5 + IP_UDP, 0.2
+    GREETING = 5 + IP_UDP
+    AGAIN_S = 0.2
     _is_ready = _knows_peer = False
 
     @override
@@ -157,9 +159,11 @@ class StreamCarrier(Carrier):
         exchanges: Exchanges,
     ) -> None:
         super().__init__(between)
-        self._header, self._exchanges = header, deque(exchanges)
+        self._header = header
+        self._exchanges = deque(exchanges)
         self._tcp = TcpConnection(self.clock, between.up, between.down, tcp, tcp)
-        operator, robot = self._tcp.opener, self._tcp.peer
+        operator = self._tcp.opener
+        robot = self._tcp.peer
         self._up = OrderedMessages(operator, robot, self._at_robot)
         self._down = OrderedMessages(robot, operator, self._at_operator)
         self._ready: Act = _nothing
@@ -233,7 +237,9 @@ class MqttLeg:
     """
 
     def __init__(self, out: OrderedMessages, qos: int) -> None:
-        self._out, self._qos, self._in_flight = out, qos, 0
+        self._out = out
+        self._qos = qos
+        self._in_flight = 0
         self._waiting: deque[tuple[Any, int]] = deque()
 
     def publish(self, what: Any, size: int) -> None:
@@ -272,13 +278,16 @@ class MqttClient:
     ) -> None:
         tcp = TcpOptions(nodelay=options.nodelay)
         self._tcp = TcpConnection(clock, *links, tcp, tcp)
-        client, broker = self._tcp.opener, self._tcp.peer
-        self._qos, self._takes = options.qos, (at_broker, at_client)
+        client = self._tcp.opener
+        broker = self._tcp.peer
+        self._qos = options.qos
+        self._takes = (at_broker, at_client)
         self._out = OrderedMessages(client, broker, lambda what: self._heard(0, what))
         self._back = OrderedMessages(broker, client, lambda what: self._heard(1, what))
         self._streams = self._out, self._back
         self._legs = MqttLeg(self._out, options.qos), MqttLeg(self._back, options.qos)
-        self._exchanges, self._ready = deque(MQTT_OPENING), cast(Act, _nothing)
+        self._exchanges = deque(MQTT_OPENING)
+        self._ready = cast(Act, _nothing)
 
     def open(self, ready: Act) -> None:
         """Connect and subscribe."""
@@ -325,8 +334,10 @@ class MqttCarrier(Carrier):
     def __init__(self, between: BetweenPrograms, options: MqttTransport) -> None:
         super().__init__(between)
         out, back = (make_link(LOOPBACK, "up", Streams(0), name) for name in ("out", "back"))
-        up, down = between.up, between.down
-        is_far, self._qos = options.broker == "far", options.qos
+        up = between.up
+        down = between.down
+        is_far = options.broker == "far"
+        self._qos = options.qos
         here = out, back
         operators, robots = ((up, down), here) if is_far else (here, (down, up))
         self._operator = MqttClient(
@@ -379,7 +390,8 @@ class ZeroMqCarrier(Carrier):
         self, at_robot: Callable[[Any], object], at_operator: Callable[[Any], object]
     ) -> ZmtpConnection:
         """A connection that the operator opens."""
-        links, both = (self.between.up, self.between.down), self._options
+        links = (self.between.up, self.between.down)
+        both = self._options
         return ZmtpConnection(self.clock, *links, at_robot, at_operator, both, both)
 
     @override
@@ -461,7 +473,8 @@ class RequestCarrier(ZeroMqCarrier):
         return True
 
     def _ask(self) -> None:
-        number, self._attempts = self._under_way, self._attempts + 1
+        number = self._under_way
+        self._attempts += 1
         assert number is not None
         self._commands.opener.send(number, framed(0) + framed(len(command(number))))
         self.clock.call_after(self._timeout_s, self._late, number, self._attempts)

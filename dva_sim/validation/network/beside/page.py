@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 NAME: Final = "beside"
 MEANINGS: Final = {column.name: column.meaning for column in RUN_COLUMNS}
 DRAWN: Final = ("age_in_force_p95_s", "longest_gap_s")
-_GOOD, _BAD, _PALE = "#0072B2", "#D55E00", "#9a9a9a"
+_GOOD = "#0072B2"
+_BAD = "#D55E00"
+_PALE = "#9a9a9a"
 _COLUMNS = 3  # panels side by side
 _LEAST_S = 0.01  # where logarithmic axes begin [s]
 
@@ -91,7 +93,8 @@ def summary_of(beside: Beside) -> list[tuple[str, str, str, str]]:
     lines = []
     for measure in ALLOWANCES:
         words = [row.word for row in beside.rows if row.measure == measure]
-        inside, judged = words.count("inside"), words.count("inside") + words.count("outside")
+        inside = words.count("inside")
+        judged = words.count("inside") + words.count("outside")
         if judged:
             verdict = "all inside" if inside == judged else f"{judged - inside} outside"
             lines.append((measure, str(inside), str(judged), verdict))
@@ -119,7 +122,8 @@ def _sheet(title: str, rows: Sequence[BesideRow], with_measure: bool = False) ->
 
 
 def _numbers(row: BesideRow) -> tuple[str, ...]:
-    values, band = row.values, row.band
+    values = row.values
+    band = row.band
     measured = (row.median, min(values), max(values)) if len(values) else (math.nan,) * 3
     shown = (*measured, *((band.predicted, band.low, band.high) if band else (math.nan,) * 3))
     return (*map(number, shown), row.word if not row.why else f"{row.word}: {row.why}")
@@ -127,7 +131,8 @@ def _numbers(row: BesideRow) -> tuple[str, ...]:
 
 def row_of(row: BesideRow) -> Row:
     """A row of the table that is written."""
-    values, band = row.values, row.band
+    values = row.values
+    band = row.band
     return {
         **row.levels,
         "measure": row.measure,
@@ -180,7 +185,8 @@ def _draw(beside: Beside, measure: str) -> Drawn:
 def _mark(axes: Axes, place: int, row: BesideRow) -> None:
     """The band as a bar, the runs as a thin line, their median as a mark."""
     if row.band is not None:
-        low, high = max(row.band.low, _LEAST_S), max(row.band.high, _LEAST_S)
+        low = max(row.band.low, _LEAST_S)
+        high = max(row.band.high, _LEAST_S)
         axes.barh(place, high - low, left=low, height=0.7, color=FAINT)
         axes.plot([row.band.predicted] * 2, [place - 0.35, place + 0.35], color=SOFT, lw=0.8)
     if len(row.values):

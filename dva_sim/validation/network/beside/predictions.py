@@ -155,7 +155,8 @@ def plays_in(asked: Sequence[AskedCell], plays: int) -> int:
 
 def perform(job: StudyJob) -> Tables:
     """The plays of one seed of one configuration."""
-    scenario, plays = job.scenario, int(str(dict(job.cell)["plays"]))
+    scenario = job.scenario
+    plays = int(str(dict(job.cell)["plays"]))
     assert isinstance(scenario, MiddlewareScenario)
     rows = []
     for play in range(plays):
@@ -168,7 +169,8 @@ def perform(job: StudyJob) -> Tables:
 def _bands(cell: AskedCell, by_seed: Sequence[Sequence[Row]]) -> dict[str, PredictedBand]:
     assert cell.scenario is not None
     rng = np.random.default_rng(derive_seed("bands", cell.config))
-    plays, seeds = len(by_seed[0]), range(len(by_seed))
+    plays = len(by_seed[0])
+    seeds = range(len(by_seed))
     drawn = rng.integers(plays, size=(DRAWS, len(by_seed)))
     bands = {}
     for measure, allowance in ALLOWANCES.items():

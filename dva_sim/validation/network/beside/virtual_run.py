@@ -25,7 +25,8 @@ from dva_sim.validation.network.beside.carriers import Act, BetweenPrograms, Car
 PROGRAM_S = 0.0005
 """From the arrival of a command's last packet to its application: assumed. It also decides what
 comes first where a round trip is a whole number of periods."""
-STARTS_S, ENDS_S = (0.3, 1.0), (0.0, 0.6)
+STARTS_S = (0.3, 1.0)
+ENDS_S = (0.0, 0.6)
 """Start of the programs after the link, and time the operator's takes to end: assumed ranges,
 uniform."""
 
@@ -72,12 +73,14 @@ class VirtualRun:
     """
 
     def __init__(self, scenario: MiddlewareScenario, seed: int, times: ProgramTimes) -> None:
-        self._scenario, self._times = scenario, times
+        self._scenario = scenario
+        self._times = times
         since = scenario.set_up_s
         self._window = Window(0.0, since, since + scenario.measure_s)
         self._clock = Clock()
         up, down = links_of(scenario.link, seed, by_packet=False)
-        self._up, self._down = CountedLink(up), CountedLink(down)
+        self._up = CountedLink(up)
+        self._down = CountedLink(down)
         pictures = scenario.pictures
         self._carrier = self._carried_by(
             load_transport(scenario.transport.name, scenario.transport.options)(),
@@ -98,7 +101,9 @@ class VirtualRun:
 
     def play(self) -> Row:
         """The measures of the run, by the columns of a real one."""
-        clock, window, times = self._clock, self._window, self._times
+        clock = self._clock
+        window = self._window
+        times = self._times
         end = window.until + times.ending + LINGER_S
         clock.call_at(max(times.near, times.far), self._carrier.open, self._begin)
         if self._scenario.pictures is not None:

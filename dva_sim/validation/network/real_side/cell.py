@@ -134,7 +134,8 @@ def _live(parent: int, program: Program, channel: socket.socket, notes: Notes) -
 PORT = 5555
 _STDIN = 0
 LinkColumns = dict[str, float | int]
-PACKETS, PROXY = "packets", "proxy"
+PACKETS = "packets"
+PROXY = "proxy"
 """Kinds of link: whole packets between namespaces, or a relay of TCP over the loopback."""
 
 
@@ -225,7 +226,8 @@ class EmulatedCell:
 
     def play(self) -> EmulatedOutcome:
         """Set up, run, and end everything; problems become part of the outcome."""
-        problem, realtime = "", False
+        problem = ""
+        realtime = False
         columns: LinkColumns = {}
         try:
             realtime = linux_calls.be_punctual(FORWARDER_PRIORITY)
@@ -336,7 +338,8 @@ def run_job(job: EmulatedJob) -> EmulatedOutcome:
             process.wait()
             if process.stdin is not None:
                 process.stdin.close()
-        output, complaint = _text(out), _text(err)
+        output = _text(out)
+        complaint = _text(err)
     if not output:
         raise EmulatorError(f"the run ended without an answer: {_last_line(complaint)}")
     outcome = EmulatedOutcome.from_json(output)

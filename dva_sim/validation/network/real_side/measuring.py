@@ -298,7 +298,8 @@ def measure_all(
     """
     machine = describe_machine(link)
     wanted = [(condition, seed) for seed in seeds for condition in conditions]
-    failures, in_a_row = list[str](), 0
+    failures = list[str]()
+    in_a_row = 0
     with Table(path, (*_IDENTITY, *COLUMNS)) as table:
         table.sign(machine)
         known = {(row["cond_id"], row["seed"]) for row in table.rows}
@@ -310,7 +311,8 @@ def measure_all(
             identity = dict(zip(_IDENTITY, (cell, group, str(seed), condition.hash), strict=True))
             try:
                 table.append(identity | measure(condition, seed, link))
-                done, in_a_row = done + 1, 0
+                done += 1
+                in_a_row = 0
             except EmulatorError as error:
                 failures.append(f"{cell}: {error}")
                 in_a_row += 1

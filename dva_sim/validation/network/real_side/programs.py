@@ -156,7 +156,8 @@ class SocketOperator:
 
     def ask(self) -> None:
         """REQ: a command, its reply or an alert, then the next."""
-        number, due = 0, self._start
+        number = 0
+        due = self._start
         while due < self._end:
             _pause_until(due)
             issue = self._note(NoteKind.ISSUED, number)

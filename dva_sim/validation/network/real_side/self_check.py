@@ -168,7 +168,8 @@ def find_jitter(crossing: Crossing) -> list[LinkFinding]:
 
 def find_loss(crossing: Crossing) -> list[LinkFinding]:
     """The share of independent losses."""
-    share, lost = crossing.wire.loss, crossing.lost
+    share = crossing.wire.loss
+    lost = crossing.lost
     sigma = np.sqrt(share * (1 - share) / len(lost))
     return [LinkFinding("loss", "", share, float(lost.mean()), float(_SIGMAS * sigma))]
 

@@ -21,7 +21,8 @@ def main() -> None:
     line = sys.stdin.readline()
     job = json.loads(line)
     os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
-    way, problem = job["link"], ""
+    way = job["link"]
+    problem = ""
     if way != "proxy":
         try:
             way = become_owner(job["rootless"])

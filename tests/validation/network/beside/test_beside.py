@@ -13,6 +13,7 @@ from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.errors import ConfigError, ExitCode
+from dva_sim.options.studies import ValidateOptions
 from dva_sim.validation.network.beside import measured, page
 from dva_sim.validation.network.beside.measured import (
     Measured,
@@ -90,7 +91,12 @@ def rows_in(folder):
 @pytest.mark.system  # it draws
 def test_measured_rows_stand_beside_their_bands(results, tmp_path, capsys):
     written = tmp_path / "page"
-    assert validation.validate("network", written, beside=results(), quick=True, jobs=1) == 0
+    assert (
+        validation.validate(
+            ValidateOptions("network", out=written, beside=results(), quick=True, jobs=1)
+        )
+        == 0
+    )
     assert unnamed(capsys.readouterr().out, "14 of 14", "is not modelled") == []
     rows = rows_in(written)
     assert len(rows) == 4 * len(ALLOWANCES)
@@ -111,7 +117,7 @@ def test_measured_rows_stand_beside_their_bands(results, tmp_path, capsys):
 
 def test_a_row_outside_its_band_is_named_and_fails_the_model(results, capsys, monkeypatch):
     monkeypatch.setitem(GOOD, "command_rate_hz", 15.0)
-    found = validation.validate("network", beside=results(), quick=True, jobs=1)
+    found = validation.validate(ValidateOptions("network", beside=results(), quick=True, jobs=1))
     assert found == ExitCode.GATE_FAILED
     output = capsys.readouterr().out
     assert unnamed(output, "12 of 14", "command_rate_hz", "outside") == []
@@ -179,8 +185,8 @@ def test_the_median_of_at_least_three_runs_has_to_lie_inside(values, word):
 
 def test_what_is_no_middleware_study_is_refused(tmp_path):
     with pytest.raises(ConfigError, match="middleware"):
-        validation.validate("network", beside="processing-time", quick=True)
+        validation.validate(ValidateOptions("network", beside="processing-time", quick=True))
     with pytest.raises(ConfigError, match="results"):
-        validation.validate("network", beside=str(tmp_path), quick=True)
+        validation.validate(ValidateOptions("network", beside=str(tmp_path), quick=True))
     with pytest.raises(ConfigError, match="--beside"):
-        validation.validate("dispatch", beside="middleware")
+        validation.validate(ValidateOptions("dispatch", beside="middleware"))

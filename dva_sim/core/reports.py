@@ -1,0 +1,182 @@
+"""Reports about events, by sensors and people, and what those who were sent there say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from dva_sim.core.control_rooms import ControlRooms
+from dva_sim.core.dispatcher import Dispatcher
+from dva_sim.core.events import Cause, Event, EventTable, State, apart
+from dva_sim.core.registry import CONTROL_ROOM, ROBOT, DeviceEntry
+from dva_sim.core.roles import ControlRoomRole
+from dva_sim.core.sensing import Sensing
+from dva_sim.core.sessions import DvaAnswer, Send
+from dva_sim.protocol import messages as m
+
+FOUND_WITHIN = 20.0  # farthest that a finding may be from its event [m]
+REACH = 20.0  # farthest source of what a robot's sensor measures [m]; assumed
+CONFIDENCE = 0.6  # in what a robot's sensor alone reports; assumed
+SEVERITY = 0.5  # of an event whose source nobody has seen
+NO_NEWS = 600.0  # after an event is settled, its place is reported no more for so long [s]; assumed
+_FOUND = frozenset({State.CONFIRMED, State.CONTAINED, State.ESCALATED})
+
+
+@dataclass
+class Reports:
+    """Books reports as events, and findings as their ends.
+
+    Attributes:
+        dispatcher: Dispatcher, with all orders.
+        events: All events.
+        sensing: Robot sensors that the DVA uses.
+        control_rooms: Tells which control room may report.
+    """
+
+    dispatcher: Dispatcher
+    events: EventTable
+    sensing: Sensing
+    control_rooms: ControlRooms
+
+    # --- by those who were sent ----------------------------------------------------------
+
+    def found(self, device: str, body: m.EventReport, now: float) -> DvaAnswer:
+        """Book what a device has found at an event that it was sent to."""
+        event = self.events.get(body.event_id or 0)
+        if event is None:
+            return DvaAnswer(m.UNKNOWN_EVENT, f"no event {body.event_id}")
+        if device not in event.sent:
+            return DvaAnswer(m.NOT_PERMITTED, f"was not sent to event {event.number}")
+        if body.kind != event.kind or apart(body.position, event.position) > FOUND_WITHIN:
+            # A life of the DVA that could keep nothing may have given its number to another event.
+            text = f"event {event.number} is another one, a {event.kind} elsewhere"
+            return DvaAnswer(m.UNKNOWN_EVENT, text)
+        sends = self.dispatcher.orders.found(event, device, body.finding, now)
+        if event.waits_for is not None:
+            sends += self.dispatcher.decide(now)
+        return DvaAnswer(sends=sends)
+
+    def progress(self, device: str, body: m.OrderProgress, now: float) -> DvaAnswer:
+        """Book the progress of an order."""
+        event = self.dispatcher.orders.engaged.find(device, body.event_id)
+        if event is None or not self.dispatcher.orders.has_order(event, device):
+            text = f"device {device} has no order for event {body.event_id}"
+            return DvaAnswer(m.UNKNOWN_EVENT, text)
+        sends: list[Send] = []
+        if body.state == "departed":
+            self.dispatcher.orders.departed(event, device, now)
+        elif body.state == "arrived":
+            self.dispatcher.orders.arrived(event, device, now)
+        elif body.state in ("done", "failed", "declined"):
+            sends = self.dispatcher.orders.ends(event, device, body.state, now)
+            sends += self.dispatcher.decide(now)
+        return DvaAnswer(sends=sends)
+
+    # --- by anybody ----------------------------------------------------------------------
+
+    def sighted(self, source: DeviceEntry, body: m.EventReport, now: float) -> DvaAnswer:
+        """Book what a device sees that was not sent; a control room needs a role for it."""
+        device = source.device
+        if device.device_type != CONTROL_ROOM:
+            return self._sighted(device.id_tag, body, now)
+        need = ControlRoomRole.DRIVE
+        if (text := self.control_rooms.may(device, need, "report an event")) is not None:
+            return DvaAnswer(m.NOT_PERMITTED, text)
+        answer = self._sighted(device.id_tag, body, now)
+        if (event := self.events.near(body.kind, body.position)) is not None:
+            self.control_rooms.raised(event, device, now)
+        return answer
+
+    def _sighted(self, source: str, body: m.EventReport, now: float) -> DvaAnswer:
+        if body.finding == "refuted":
+            return self._withdrawn(source, body, now)
+        event = self.events.near(body.kind, body.position)
+        sends: list[Send] = []
+        if event is None:
+            event, sends = self._corrected(source, body, now)
+        if event is None and self.events.full:
+            return DvaAnswer(m.BUSY, "too many events are open; no more are accepted")
+        if event is None:
+            contain = self.dispatcher.orders.rules.containment
+            event = self.events.add(body.kind, body.position, body.severity, now, contain)
+        else:
+            self.events.merge(event, body.severity)
+        self.events.note_source(event, source, body.confidence)
+        return DvaAnswer(sends=sends + self.dispatcher.decide(now))
+
+    def _withdrawn(self, source: str, body: m.EventReport, now: float) -> DvaAnswer:
+        """Close an event that all its reporters have withdrawn before anybody was sent."""
+        sends = list[Send]()
+        for event in self.events.reported_by(source, body.kind, body.position):
+            self.events.take_back(event, source)
+            if event.state is State.PENDING and not event.sources:
+                sends += self.dispatcher.orders.transition(event, Cause.WITHDRAWN, now)
+        return DvaAnswer(sends=sends)
+
+    def _corrected(
+        self, source: str, body: m.EventReport, now: float
+    ) -> tuple[Event | None, list[Send]]:
+        """Correct the position of an event that only sensors felt, by a report of somebody on site.
+
+        The event is moved there, or ends, if somebody is on the way to where it was felt.
+        """
+        if not self.sensing.alarms:
+            return None, []
+        felt = (e for e in self.events.open.values() if self._is_only_felt(e))
+        event = _within_reach(felt, body.kind, body.position)
+        if event is None or source in event.sources:
+            return None, []
+        if event.state is State.PENDING:
+            event.position = body.position
+            return event, []
+        if event.state is State.CONFIRMED:
+            return None, []  # people are at it: what was reported may be something else
+        return None, self.dispatcher.orders.transition(event, Cause.SUPERSEDED, now)
+
+    def _is_only_felt(self, event: Event) -> bool:
+        """Return True if only robots' sensors support an event: its position is uncertain."""
+        entries = self.dispatcher.orders.registry.entries
+        return {e.device.device_type for s in event.sources if (e := entries.get(s))} == {ROBOT}
+
+    # --- by sensors of robots ------------------------------------------------------------
+
+    def felt(self, robot: str, body: m.SensorValue, place: m.Position, now: float) -> DvaAnswer:
+        """Handle a sensor value of a robot: it may be a new event, or support a known one."""
+        alarm = self.sensing.crossed(robot, body)
+        if alarm is None:
+            return DvaAnswer()
+        event = _within_reach(self.events.open.values(), alarm.kind, place)
+        counters = self.dispatcher.orders.counters
+        if event is None:
+            if _is_no_news(self.events, alarm.kind, place, now):
+                return DvaAnswer()
+            counters["event raised by a sensor"] += 1
+            report = m.EventReport(None, alarm.kind, place, SEVERITY, CONFIDENCE, "detected")
+            return self._sighted(robot, report, now)
+        others = event.sources.keys() - {robot}
+        self.events.merge(event, 0.0)
+        self.events.note_source(event, robot, CONFIDENCE)
+        there = apart(event.position, place) < self.dispatcher.orders.rules.merge_distance
+        if not (there and others) or event.state is State.CONFIRMED:
+            return DvaAnswer()
+        counters["event confirmed by a sensor"] += 1
+        sends = self.dispatcher.orders.transition(event, Cause.SENSED, now)
+        return DvaAnswer(sends=sends + self.dispatcher.decide(now))
+
+
+# --- which event it is ---------------------------------------------------------------------
+
+
+def _within_reach(events: Iterable[Event], kind: str, place: m.Position) -> Event | None:
+    """The nearest event that can be felt at a place."""
+    near = [(apart(e.position, place), e.number, e) for e in events if e.kind == kind]
+    found = min((entry for entry in near if entry[0] < REACH), default=None)
+    return found[2] if found else None
+
+
+def _is_no_news(events: EventTable, kind: str, place: m.Position, now: float) -> bool:
+    """Return True if people recently found such an event nearby, or were called to one."""
+    lately = (
+        e for e in events.closed.values() if e.state in _FOUND and now - e.times["closed"] < NO_NEWS
+    )
+    return _within_reach(lately, kind, place) is not None
