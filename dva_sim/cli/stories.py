@@ -31,7 +31,6 @@ from dva_sim.recordings.channels import STORY
 from dva_sim.recordings.pictures import Wanted
 from dva_sim.recordings.pictures.run_endings import story
 from dva_sim.simulation.full import Playback, Recording
-from dva_sim.simulation.full.episode_measures import RUN_COLUMNS
 from dva_sim.simulation.full.verdicts import (
     BROKEN,
     HELD,
@@ -39,6 +38,7 @@ from dva_sim.simulation.full.verdicts import (
     Verdict,
     unjudged_rules,
 )
+from dva_sim.simulation.measures.episodes import RUN_COLUMNS
 from dva_sim.simulation.models import Tables, model_for
 from dva_sim.simulation.task import TaskScenario
 from dva_sim.simulation.timed import TimedRecording, TimedScenario

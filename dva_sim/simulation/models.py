@@ -19,19 +19,20 @@ from dva_sim.kernel.suggestions import unknown
 from dva_sim.kernel.yaml_files import Document
 from dva_sim.simulation import full, middleware, task, timed, transports
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full import episode_measures as of_full
-from dva_sim.simulation.full import workload
-from dva_sim.simulation.full.drive_tables import COMMAND_COLUMNS, DRIVE_COLUMNS
+from dva_sim.simulation.measures import episodes as of_full
+from dva_sim.simulation.measures import middleware as of_middleware
+from dva_sim.simulation.measures import sessions as of_transports
+from dva_sim.simulation.measures import shifts as of_timed
+from dva_sim.simulation.measures import trials as of_task
+from dva_sim.simulation.measures import workload
+from dva_sim.simulation.measures.commands import Row
+from dva_sim.simulation.measures.drives import COMMAND_COLUMNS, DRIVE_COLUMNS
 from dva_sim.simulation.middleware import MiddlewareScenario
-from dva_sim.simulation.middleware import freshness_measures as of_middleware
 from dva_sim.simulation.run_measures import RunMeasure, values_of
 from dva_sim.simulation.scenario import Scenario, contradictions
 from dva_sim.simulation.task import TaskScenario
-from dva_sim.simulation.task import trial_measures as of_task
 from dva_sim.simulation.timed import TimedScenario
-from dva_sim.simulation.timed import shift_measures as of_timed
 from dva_sim.simulation.transports import TransportScenario
-from dva_sim.simulation.transports import session_measures as of_transports
 
 Tables = dict[str, list[dict[str, Any]]]
 
@@ -201,7 +202,7 @@ class _Task(_Operated[TaskScenario]):
     def rehearse(self, scenario: TaskScenario, seed: int) -> None:
         task.rehearse(scenario)
 
-    def rows(self, recording: list[of_task.Row], with_tracks: bool = False) -> Tables:
+    def rows(self, recording: list[Row], with_tracks: bool = False) -> Tables:
         return {"runs": [of_task.run_row(recording)], "trials": recording}
 
 
@@ -218,7 +219,7 @@ class _Transports(_Operated[TransportScenario]):
         transports.rehearse(scenario)
 
     def rows(self, recording: transports.SessionRecording, with_tracks: bool = False) -> Tables:
-        return transports.tables(recording)
+        return of_transports.tables(recording)
 
 
 class _Middleware(Model[MiddlewareScenario]):
@@ -236,7 +237,7 @@ class _Middleware(Model[MiddlewareScenario]):
         return middleware.lacks(scenario)
 
     def rows(self, recording: middleware.MiddlewareRun, with_tracks: bool = False) -> Tables:
-        return middleware.tables(recording)
+        return of_middleware.tables(recording)
 
 
 MODELS: Final[dict[str, Model[Any]]] = {

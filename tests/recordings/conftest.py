@@ -7,7 +7,7 @@ from recordings.runs import drill, drive, evacuation
 
 from dva_sim.recordings.reading import Opened, read_recording
 from dva_sim.recordings.writing import write_recording
-from dva_sim.simulation.full.episode_measures import tables_of
+from dva_sim.simulation.measures.episodes import tables_of
 
 
 @pytest.fixture(scope="session")

@@ -14,8 +14,8 @@ from dva_sim.kernel.errors import ExitCode
 from dva_sim.recordings.pictures import Wanted
 from dva_sim.recordings.reading import read_recording
 from dva_sim.recordings.writing import COUNTS, write_recording
-from dva_sim.simulation.full.episode_measures import tables_of
 from dva_sim.simulation.full.verdicts import HELD, RulesNotJudged
+from dva_sim.simulation.measures.episodes import tables_of
 from dva_sim.testing.evidence import judged_recording
 
 OF_ROBOTS, OF_THE_DVA = ["S1", "S2", "S3", "S4", "S5"], ["S6", "S7"]

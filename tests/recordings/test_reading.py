@@ -18,7 +18,7 @@ from dva_sim.recordings.reading import read_recording
 from dva_sim.recordings.writing import write_recording
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import simulate
-from dva_sim.simulation.full.episode_measures import tables_of
+from dva_sim.simulation.measures.episodes import tables_of
 
 RUNS = {"drive": drive, "drill": drill, "evacuation": evacuation}
 

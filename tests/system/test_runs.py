@@ -10,8 +10,9 @@ from helpers.processes.second_process import run_here_and_elsewhere
 from dva_sim.agents.operator.delay_estimation import DelayEstimate
 from dva_sim.agents.robot.controller import Decision, RobotController
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full import Recording, episode_measures, simulate
-from dva_sim.simulation.full.loop_delay import STAGES
+from dva_sim.simulation.full import Recording, simulate
+from dva_sim.simulation.measures import episodes
+from dva_sim.simulation.measures.loop_delay import STAGES
 
 pytestmark = pytest.mark.system
 
@@ -26,7 +27,7 @@ def run(name: str = "drive-to-event", seed: int = 1, **changes: Any) -> Recordin
 def rows(recording: Recording) -> str:
     """Everything measured and every place taken, as text."""
     tracks = {k: [tuple(p) for p in v] for k, v in recording.recorder.tracks.items()}
-    measured = episode_measures.run_row(recording), episode_measures.event_rows(recording)
+    measured = episodes.run_row(recording), episodes.event_rows(recording)
     return json.dumps([measured, tracks, recording.recorder.timeline], default=str)
 
 
@@ -62,8 +63,8 @@ def test_adding_a_guard_changes_nobody_elses_random_numbers():
 def test_keeping_traffic_for_pictures_changes_nothing(name, changes):
     scenario = scenarios.build(scenarios.load(name), changes)
     plain, filmed = simulate(scenario, 3), simulate(scenario, 3, keep_traffic=True)
-    assert str(episode_measures.run_row(plain)) == str(episode_measures.run_row(filmed))
-    assert str(episode_measures.people_rows(plain)) == str(episode_measures.people_rows(filmed))
+    assert str(episodes.run_row(plain)) == str(episodes.run_row(filmed))
+    assert str(episodes.people_rows(plain)) == str(episodes.people_rows(filmed))
 
 
 @pytest.mark.parametrize("pattern", ["req-rep", "pipelined", "pub-sub", "latest-wins"])
@@ -120,13 +121,13 @@ def test_the_oracle_is_faster_than_any_operator():
         robot__processing_s=0.0,
         link__delay_s=0.0,
     )
-    best = episode_measures.run_row(reference)["drive_time_s"]
+    best = episodes.run_row(reference)["drive_time_s"]
     for delay in (0.0, 0.5):
-        assert episode_measures.run_row(run(link__delay_s=delay))["drive_time_s"] > best - 0.5
+        assert episodes.run_row(run(link__delay_s=delay))["drive_time_s"] > best - 0.5
 
 
 def test_each_stage_of_the_delay_budget_is_what_it_is_made_of():
-    row = episode_measures.run_row(run(link__delay_s=0.25))
+    row = episodes.run_row(run(link__delay_s=0.25))
     stages = {s: row[f"delay_{s}_s"] for s in STAGES}
     assert stages["uplink"] == pytest.approx(0.25, abs=0.002)
     assert stages["downlink"] == pytest.approx(0.255, abs=0.003)
@@ -151,16 +152,16 @@ def test_the_loop_delay_is_what_operators_come_to_see(delay, monkeypatch):
         guesses.append(self.value)
 
     monkeypatch.setattr(DelayEstimate, "see", overheard)
-    loop = episode_measures.run_row(run(link__delay_s=delay))["loop_delay_mean_s"]
+    loop = episodes.run_row(run(link__delay_s=delay))["loop_delay_mean_s"]
     later = sorted(guesses[len(guesses) // 2 :])
     assert loop - 0.2 < later[len(later) // 2] < loop + 0.1
 
 
 def test_waiting_for_the_last_reply_is_told_as_the_patterns_own_delay():
     slow = {"phone__profile": "dissertation", "link__delay_s": 0.5, "horizon_s": 60}
-    waited = episode_measures.run_row(run(pattern="req-rep", **slow))["delay_pattern_s"]
+    waited = episodes.run_row(run(pattern="req-rep", **slow))["delay_pattern_s"]
     assert 0.05 < waited < 1.05
-    assert episode_measures.run_row(run(pattern="pub-sub", **slow))["delay_pattern_s"] == 0.0
+    assert episodes.run_row(run(pattern="pub-sub", **slow))["delay_pattern_s"] == 0.0
 
 
 @pytest.mark.invariant("S1")
@@ -205,7 +206,7 @@ def cut_link_run(pattern: str = "latest-wins", until: float = 65.0, **more: Any)
 @pytest.mark.parametrize("pattern", ["req-rep", "pub-sub", "latest-wins"])
 def test_when_a_dead_link_comes_back_the_event_is_confirmed_under_any_pattern(pattern):
     recording = cut_link_run(pattern, horizon_s=400)
-    row = episode_measures.run_row(recording)
+    row = episodes.run_row(recording)
     assert row["confirmed"], recording.recorder.timeline
     assert row["stop_share"] > 0.05
     assert row["age_in_force_mean_s"] < 6.0
@@ -217,25 +218,25 @@ def test_a_link_that_stays_dead_ends_the_drive_and_the_event_goes_to_a_guard():
     first = recording.recorder.drives[0]
     assert first.started is not None
     assert first.outcome == "lost link"
-    event = episode_measures.event_rows(recording)[0]
+    event = episodes.event_rows(recording)[0]
     assert (event["outcome"], event["responder_kind"]) == ("confirmed", "guard")
 
 
 def test_a_robot_that_could_never_be_driven_counts_with_the_whole_horizon():
-    row = episode_measures.run_row(run(link__loss=0.9, horizon_s=60))
+    row = episodes.run_row(run(link__loss=0.9, horizon_s=60))
     assert (row["confirmed"], row["outcome"], row["drive_time_s"]) == (False, "no drive", 60)
 
 
 def test_two_fires_reported_as_one_event_are_both_accounted_for():
     twins = [{"kind": "fire", "room": "Server room", "reported": True}] * 2
-    rows_ = episode_measures.event_rows(run(events=twins, seed=3))
+    rows_ = episodes.event_rows(run(events=twins, seed=3))
     assert [r["outcome"] for r in rows_] == ["confirmed", "confirmed"]
 
 
 def test_a_story_ends_with_every_event_accounted_for():
     for seed in range(2):
         recording = run("fire-drill", seed)
-        events = episode_measures.event_rows(recording)
+        events = episodes.event_rows(recording)
         assert len(events) == 2
         assert {e["outcome"] for e in events} <= {"confirmed", "escalated", "open", "undetected"}
         assert recording.recorder.violations == {}

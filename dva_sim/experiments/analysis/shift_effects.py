@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from dva_sim.experiments.analysis.run_grid import Table, codes_of, nan_mean, person_means
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.simulation.labels import setting
+from dva_sim.simulation.measures.shifts import FOLLOW_S
 from dva_sim.simulation.timed.bounds import Floats, share_of_the_way
-from dva_sim.simulation.timed.shift_measures import FOLLOW_S
 from dva_sim.statistics import LEVEL, Band, band
 
 POLICY = "dispatch.policy"

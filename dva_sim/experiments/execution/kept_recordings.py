@@ -26,8 +26,8 @@ from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.simulation.full import simulate
-from dva_sim.simulation.full.episode_measures import tables_of
 from dva_sim.simulation.labels import measure_called
+from dva_sim.simulation.measures.episodes import tables_of
 from dva_sim.simulation.models import Tables, model_for
 from dva_sim.simulation.scenario import Scenario
 

@@ -12,7 +12,7 @@ from dva_sim.experiments.results.results import Frame, frame_of, plain
 from dva_sim.experiments.results.results import Results as ResultsData
 from dva_sim.kernel.suggestions import listed
 from dva_sim.simulation.full import Recording
-from dva_sim.simulation.full.episode_measures import track_rows
+from dva_sim.simulation.measures.episodes import track_rows
 from dva_sim.simulation.models import AnyScenario, Tables, model_for
 
 if TYPE_CHECKING:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import os
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Final, NamedTuple
-
-import numpy as np
 
 from dva_sim.kernel.errors import ConfigError, RunsFailed
 from dva_sim.network.emulator.needs import EmulatorError
@@ -25,21 +21,26 @@ from dva_sim.network.middleware.programs import (
     NOT_CONNECTED,
     Plan,
     ProgramNote,
-    ProgramNoteKind,
     ProgramNotes,
 )
 from dva_sim.serving.processes import Child, end_all
-from dva_sim.simulation.middleware.freshness_measures import (
-    Floats,
-    Row,
-    Window,
-    command_row,
-    picture_row,
-)
 from dva_sim.simulation.middleware.scenario import MiddlewareScenario
 
 LINGER_S: Final = 0.2  # the robot still hears what was sent last
 PATIENCE_S: Final = 10.0  # for the operator's program to end
+
+
+class Window(NamedTuple):
+    """The time that is measured, and when the run began, by one clock [s]."""
+
+    start: float
+    since: float
+    until: float
+
+    @property
+    def length(self) -> float:
+        """Length of the window [s]."""
+        return self.until - self.since
 
 
 class MiddlewareRun(NamedTuple):
@@ -163,90 +164,3 @@ def _await_end(near: Child, limit: float) -> None:
 def _problem(program: Child) -> str:
     """Return why a program failed; empty if it runs, was done or found no connection."""
     return "" if program.poll() in (None, 0, NOT_CONNECTED) else program.why()
-
-
-# --- tables ------------------------------------------------------------------------------
-def tables(run: MiddlewareRun) -> dict[str, list[Row]]:
-    """A row of the run, and one of each command and picture."""
-    scenario = run.scenario
-    window = run.window
-    sent = _times(run.near, ProgramNoteKind.SENT)
-    refused = {note.number for note in run.near if note.kind is ProgramNoteKind.REFUSED}
-    applied = [note for note in run.far if note.kind is ProgramNoteKind.APPLIED]
-    outdated = [note for note in run.far if note.kind is ProgramNoteKind.OUTDATED]
-    arrived = _floats(note.time for note in applied)
-    made = _floats(sent[note.number] for note in applied)
-    taken = _times(run.far, ProgramNoteKind.PICTURE_TAKEN)
-    shown = run.near
-    pictures = [note for note in shown if note.kind is ProgramNoteKind.PICTURE_SHOWN]
-    row = {
-        **_connection(run),
-        "commands": sum(window.since <= time < window.until for time in sent.values()),
-        "not_taken": len(refused),
-        "outdated_share": _share(len(outdated), len(outdated) + len(applied)),
-        **command_row(
-            made,
-            applied=arrived,
-            window=window,
-            max_age_s=scenario.robot.max_age_s,
-            watchdog_s=scenario.robot.watchdog_s,
-        ),
-        **picture_row(
-            _floats(taken[note.number] for note in pictures),
-            _floats(note.time for note in pictures),
-            window,
-        ),
-        **_link_row(run),
-    }
-    return {
-        "runs": [row],
-        "commands": _fates(sent, applied, window),
-        "pictures": _fates(taken, pictures, window),
-    }
-
-
-def _connection(run: MiddlewareRun) -> Row:
-    ready = [note.time for note in run.near if note.kind is ProgramNoteKind.READY]
-    return {
-        "connected": int(bool(ready)),
-        "connected_after_s": ready[0] - run.window.start if ready else math.nan,
-    }
-
-
-def _link_row(run: MiddlewareRun) -> Row:
-    link = run.link
-    return {
-        "up_bytes": link.up.passed_bytes,
-        "down_bytes": link.down.passed_bytes,
-        "late_p99_s": link.late_p99_s,
-        "late_max_s": link.late_max_s,
-        "attempts": run.attempts,
-        "disturbed": int(run.is_disturbed),
-        "load": run.load,
-    }
-
-
-def _times(notes: list[ProgramNote], kind: ProgramNoteKind) -> dict[int, float]:
-    """Return when each command or picture of some notes was made [s], by number."""
-    return {note.number: note.time for note in notes if note.kind is kind}
-
-
-def _fates(made: dict[int, float], arrived: list[ProgramNote], window: Window) -> list[Row]:
-    """Return when each was made and arrived, in the run's time; nan for what never arrived."""
-    found = {note.number: note.time - window.start for note in arrived}
-    return [
-        {
-            "number": number,
-            "made_s": time - window.start,
-            "arrived_s": found.get(number, math.nan),
-        }
-        for number, time in made.items()
-    ]
-
-
-def _floats(values: Iterable[float]) -> Floats:
-    return np.array(list(values), dtype=float)
-
-
-def _share(part: int, whole: int) -> float:
-    return part / whole if whole else math.nan

@@ -6,7 +6,6 @@ from dva_sim.simulation.transports.scenario import (
     build,
     rehearse,
     simulate_session,
-    tables,
 )
 
 __all__ = [
@@ -15,5 +14,4 @@ __all__ = [
     "build",
     "rehearse",
     "simulate_session",
-    "tables",
 ]

@@ -16,7 +16,6 @@ from pydantic import Field
 from dva_sim.kernel import config_overrides
 from dva_sim.kernel.config import Config, Fail, Key
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.measure import names_of
 from dva_sim.kernel.yaml_files import Document
 from dva_sim.network.transports import Contest, ContestConfig, Fates, play
 from dva_sim.simulation import task
@@ -25,8 +24,6 @@ from dva_sim.simulation.task import TaskScenario
 from dva_sim.simulation.task.recorded_delays import FrameStream, RecordedDelays
 from dva_sim.simulation.task.scenario import PlantConfig
 from dva_sim.simulation.task.tasks import Corner, Course, Slalom
-from dva_sim.simulation.task.trial_measures import DRIVEN_COLUMNS
-from dva_sim.simulation.transports.session_measures import Row, contest_row, flow_rows
 
 
 class DriveConfig(Config):
@@ -107,10 +104,6 @@ def _complete(scenario: TransportScenario, error: Fail) -> TransportScenario:
     return scenario
 
 
-DRIVEN = (*names_of(DRIVEN_COLUMNS), "plugin_failures")
-"""Settings taken from a drive."""
-
-
 class SessionRecording(NamedTuple):
     """Results of a run.
 
@@ -121,7 +114,7 @@ class SessionRecording(NamedTuple):
 
     scenario: TransportScenario
     contest: Contest
-    trial: Row
+    trial: dict[str, Any]
 
 
 def simulate_session(scenario: TransportScenario, seed: int) -> SessionRecording:
@@ -130,14 +123,6 @@ def simulate_session(scenario: TransportScenario, seed: int) -> SessionRecording
     trials = task.play(scenario.task(), seed, recording_of(scenario, contest))
     failures = sum(trial["plugin_failures"] for trial in trials)  # while practising, too
     return SessionRecording(scenario, contest, trials[-1] | {"plugin_failures": failures})
-
-
-def tables(recording: SessionRecording) -> dict[str, list[Row]]:
-    """A row of the run, and one of each flow."""
-    scenario, contest, trial = recording
-    row = contest_row(scenario, contest) | {name: trial[name] for name in DRIVEN}
-    row["simulated_s"] = contest.until + float(trial["trial_time_s"])
-    return {"runs": [row], "flows": flow_rows(contest)}
 
 
 def rehearse(scenario: TransportScenario) -> None:

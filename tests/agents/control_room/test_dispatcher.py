@@ -10,10 +10,10 @@ from dva_sim.core.audit import Fact
 from dva_sim.core.events import State
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
-from dva_sim.simulation.full.episode_measures import event_rows, measures_of, run_row
 from dva_sim.simulation.full.recording import Recording
 from dva_sim.simulation.full.run import simulate
 from dva_sim.simulation.full.stage import id_of
+from dva_sim.simulation.measures.episodes import event_rows, measures_of, run_row
 from dva_sim.simulation.scenario import Scenario, build
 
 ROOM = id_of("control-room", 1)

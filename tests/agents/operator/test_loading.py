@@ -22,7 +22,8 @@ from dva_sim.agents.operator.strategies import (
 )
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full import episode_measures, simulate
+from dva_sim.simulation.full import simulate
+from dva_sim.simulation.measures import episodes
 
 HEAD = "from dva_sim.agents.operator.strategies import Intent, Strategy\n\n"
 
@@ -206,6 +207,6 @@ def test_a_run_tells_how_often_its_operator_waited_and_how_long_it_steered_so(
     """At a link delay of a second each way, adaptive persons come to move and wait."""
     changes = {"operator.strategy": strategy, "link.delay_s": 1.0}
     run = simulate(scenarios.build(scenarios.load("drive-to-event"), changes), 1)
-    row = episode_measures.run_row(run)
+    row = episodes.run_row(run)
     assert least <= row["move_waits"] <= most
     assert row["move_and_wait_share"] == pytest.approx(share, abs=0.1)

@@ -6,7 +6,8 @@ from helpers.wording import unnamed
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full import episode_measures, simulate
+from dva_sim.simulation.full import simulate
+from dva_sim.simulation.measures import episodes
 
 FILTER = """
 from dva_sim.agents.tilt import Filter
@@ -98,9 +99,9 @@ def test_a_stage_that_fails_is_told_at_once_and_counted_in_the_row_of_its_run(
     begun = run.recorder.drives[0].started
     assert begun is not None
     assert begun <= story[0].time < begun + 3.0
-    assert episode_measures.run_row(run)["plugin_failures"] > 100
+    assert episodes.run_row(run)["plugin_failures"] > 100
 
 
 def test_in_a_run_of_shipped_parts_no_plugin_fails():
     run = simulate(scenarios.build(scenarios.load("drive-to-event"), {"horizon_s": 60}), 1)
-    assert episode_measures.run_row(run)["plugin_failures"] == 0
+    assert episodes.run_row(run)["plugin_failures"] == 0

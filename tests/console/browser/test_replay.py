@@ -17,7 +17,7 @@ from recordings.runs import drill, drive
 
 from dva_sim.recordings.audit_log import AuditEntry, AuditLog, plain_row
 from dva_sim.recordings.writing import write_recording
-from dva_sim.simulation.full.episode_measures import tables_of
+from dva_sim.simulation.measures.episodes import tables_of
 
 
 @pytest.fixture(scope="module")

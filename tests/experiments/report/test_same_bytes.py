@@ -14,7 +14,7 @@ from helpers.studies import synthetic_results
 
 import dva_sim
 from dva_sim.kernel.measure import names_of
-from dva_sim.simulation.transports.session_measures import RUN_COLUMNS
+from dva_sim.simulation.measures.sessions import RUN_COLUMNS
 
 pytestmark = pytest.mark.soak
 

@@ -26,7 +26,7 @@ def test_a_profile_in_the_working_folder_changes_it_and_a_page_does_not(tmp_path
 
 def test_what_is_left_out_of_it_is_imported_by_nothing_that_counts():
     counted = {name: path.read_text() for name, path in _code(_CODE)}
-    assert "simulation/full/episode_measures.py" in counted
+    assert "simulation/measures/episodes.py" in counted
     for words in _WORDS:
         assert words not in counted
         assert (Path(dva_sim.__file__).parent / words).is_file()

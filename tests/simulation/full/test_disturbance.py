@@ -7,9 +7,9 @@ import pytest
 import dva_sim
 from dva_sim.agents.robot.controller import LEASE_S
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full.episode_measures import measures_of, run_row
 from dva_sim.simulation.full.run import Run
-from dva_sim.simulation.full.workload import operator_rows
+from dva_sim.simulation.measures.episodes import measures_of, run_row
+from dva_sim.simulation.measures.workload import operator_rows
 
 KINDS = ("revoke", "take_over", "refuse")
 PATTERNS = ("req-rep", "latest-wins")

@@ -13,9 +13,10 @@ from dva_sim.network.messaging import Request
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full import episode_measures, simulate
+from dva_sim.simulation.full import simulate
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA, id_of
+from dva_sim.simulation.measures import episodes
 
 ROBOT = id_of("robot", 1)
 DRIVE = """
@@ -63,7 +64,7 @@ def test_a_robot_without_power_neither_hears_nor_speaks_until_it_has_some_again(
 def test_who_stands_without_power_is_missed_and_another_one_is_sent(robots, ended):
     # Enough to get so far that who stands there blocks no door to the other.
     run = simulate(scenario({"robot.charge": 0.0013, "robot.count": robots}), 1)
-    row = episode_measures.run_row(run)
+    row = episodes.run_row(run)
     assert row["outcome"] == ended
     assert row["cause"] == ("battery" if robots == 1 else "")
     assert not run.recorder.violations

@@ -6,10 +6,10 @@ import pytest
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
-from dva_sim.simulation.full.drive_tables import command_rows, drive_rows
-from dva_sim.simulation.full.episode_measures import tables_of
 from dva_sim.simulation.full.run import Run, Watched
 from dva_sim.simulation.full.run_journal import RunJournal, recording_of
+from dva_sim.simulation.measures.drives import command_rows, drive_rows
+from dva_sim.simulation.measures.episodes import tables_of
 from dva_sim.simulation.scenario import build, load
 
 KEPT = 5  # entries of each list of a drive that are not forgotten

@@ -9,8 +9,9 @@ from helpers.wording import unnamed
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full import episode_measures, simulate
+from dva_sim.simulation.full import simulate
 from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.measures import episodes
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.worlds.site import load_site
 
@@ -49,7 +50,7 @@ def test_a_longer_way_begins_elsewhere_with_the_same_event_and_the_same_person()
         simulate(drill(guard={"count": 1, "way_m": way}, **GUARD_ALONE), 3) for way in (6.0, 24.0)
     )
     assert near.incidents[0].hazard.position == far.incidents[0].hazard.position
-    times = [episode_measures.run_row(run)["response_mean_s"] for run in (near, far)]
+    times = [episodes.run_row(run)["response_mean_s"] for run in (near, far)]
     assert 18.0 / 2.2 < times[1] - times[0] < 18.0 / 0.6  # the same mobilisation, the same pace
 
 
@@ -118,8 +119,7 @@ def test_guards_get_ready_in_the_time_the_scenario_says_with_the_spread_of_their
         for m in (1.0, 90.0)
     )
     waits = [
-        episode_measures.event_rows(run)[0]["t_departed_s"]
-        - episode_measures.event_rows(run)[0]["t_assigned_s"]
+        episodes.event_rows(run)[0]["t_departed_s"] - episodes.event_rows(run)[0]["t_assigned_s"]
         for run in (at_once, late)
     ]
     assert waits[1] - waits[0] == pytest.approx(89.0 * waits[1] / 90.0, rel=0.02)

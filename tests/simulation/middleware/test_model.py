@@ -11,7 +11,8 @@ from dva_sim.experiments.execution.runner import _at_random, _workers
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.simulation.middleware import build, lacks, measure, tables
+from dva_sim.simulation.measures.middleware import tables
+from dva_sim.simulation.middleware import build, lacks, measure
 from dva_sim.simulation.models import MODELS
 
 SHORT = {"model": "middleware", "set_up_s": 1.5, "measure_s": 1.0, "attempts": 1}

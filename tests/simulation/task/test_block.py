@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from dva_sim.kernel.streams import Streams
+from dva_sim.simulation.measures.trials import run_row
 from dva_sim.simulation.task import block, build, play, trace_of
 from dva_sim.simulation.task.block import TunnelGoal, seat_of
 from dva_sim.simulation.task.movement_laws import fit_line
 from dva_sim.simulation.task.target_goals import Wandering
 from dva_sim.simulation.task.tasks import Pointing
-from dva_sim.simulation.task.trial_measures import run_row
 
 EXACT = {
     "motor_noise": 1e-9,

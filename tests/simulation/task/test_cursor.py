@@ -4,10 +4,10 @@ import math
 
 import pytest
 
+from dva_sim.simulation.measures.trials import run_row
 from dva_sim.simulation.task import build, play
 from dva_sim.simulation.task.block import seat_of
 from dva_sim.simulation.task.pointing import Motion, Places
-from dva_sim.simulation.task.trial_measures import run_row
 
 EXACT = {"motor_noise": 1e-9, "perceptual_delay_s": 0.1, "hand_lag_s": 0.02, "margin": 0.5}
 TILT = {

@@ -12,8 +12,9 @@ from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel import resources
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import Document, load_yaml
+from dva_sim.simulation.measures.sessions import tables
 from dva_sim.simulation.models import model_of
-from dva_sim.simulation.transports import build, simulate_session, tables
+from dva_sim.simulation.transports import build, simulate_session
 
 SHORT = {
     "warm_up_s": 5,

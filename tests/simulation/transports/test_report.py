@@ -9,7 +9,7 @@ from helpers.wording import unnamed
 
 from dva_sim.experiments.report.report import write_report
 from dva_sim.kernel.measure import names_of
-from dva_sim.simulation.transports.session_measures import RUN_COLUMNS
+from dva_sim.simulation.measures.sessions import RUN_COLUMNS
 
 pytestmark = pytest.mark.system
 

@@ -12,8 +12,8 @@ import numpy as np
 from dva_sim.experiments.report.figures.palette import FAINT, INK, LOOKS, SOFT
 from dva_sim.experiments.report.figures.style import panels, styled
 from dva_sim.kernel.wording import capital
+from dva_sim.simulation.measures.commands import Row
 from dva_sim.simulation.task import TaskScenario, Trace, trace_of
-from dva_sim.simulation.task.trial_measures import Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

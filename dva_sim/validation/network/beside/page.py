@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from dva_sim.experiments.report.figures.palette import FAINT, SOFT
 from dva_sim.experiments.report.figures.style import Drawn, log_axis, panels, styled
-from dva_sim.simulation.middleware.freshness_measures import RUN_COLUMNS
+from dva_sim.simulation.measures.middleware import RUN_COLUMNS
 from dva_sim.validation.frame import ResultSheet, Row, ValidationResult, captioned
 from dva_sim.validation.frame import short_number as number
 from dva_sim.validation.network.beside.measured import MIN_INSIDE, Beside, BesideRow

@@ -17,9 +17,10 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.network.emulator.forwarder import links_of
 from dva_sim.network.link import Link, PartedLink
 from dva_sim.network.middleware import CommandTransport, load_transport
+from dva_sim.simulation.measures.commands import Row
+from dva_sim.simulation.measures.middleware import command_row
 from dva_sim.simulation.middleware import MiddlewareScenario
-from dva_sim.simulation.middleware.freshness_measures import Row, Window, command_row
-from dva_sim.simulation.middleware.run import LINGER_S
+from dva_sim.simulation.middleware.run import LINGER_S, Window
 from dva_sim.validation.network.beside.carriers import Act, BetweenPrograms, Carrier, carrier_of
 
 PROGRAM_S = 0.0005

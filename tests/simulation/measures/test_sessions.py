@@ -7,59 +7,15 @@ import pytest
 
 from dva_sim.kernel.config import validate
 from dva_sim.network.transports import Contest, ContestConfig, Fates
-from dva_sim.simulation.transports.session_measures import (
-    age_in_force,
-    applied,
+from dva_sim.simulation.measures.sessions import (
     contest_row,
     flow_rows,
     jain,
-    round_trips,
 )
 
 
 def times(*values: float) -> np.ndarray:
     return np.array(values)
-
-
-def test_what_a_newer_one_has_overtaken_and_what_never_came_is_not_applied():
-    arrived = times(1.0, 4.0, 3.0, math.inf, 5.0)
-    assert applied(arrived).tolist() == [True, False, True, False, True]
-
-
-def test_commands_read_at_the_same_moment_are_all_applied():
-    assert applied(times(2.0, 2.0, 2.0)).all()
-
-
-def test_the_age_in_force_of_a_command_a_second_late_by_a_tenth_is_six_tenths():
-    made = np.arange(0.0, 12.0)
-    assert age_in_force(made, made + 0.1, 2.0, 10.0) == pytest.approx(0.1 + 0.5)
-
-
-def test_a_lost_command_lets_the_one_before_it_grow_old():
-    made = np.arange(0.0, 12.0)
-    arrived = made.copy()
-    arrived[5] = math.inf
-    # half a second on average, and a second more for the one second of the eight
-    assert age_in_force(made, arrived, 2.0, 10.0) == pytest.approx(0.5 + 1.0 / 8)
-
-
-def test_nothing_in_force_at_the_beginning_has_no_age():
-    assert math.isnan(age_in_force(times(0.0), times(5.0), 2.0, 10.0))
-
-
-def test_a_round_trip_lasts_until_the_first_picture_taken_after_the_command_was_applied():
-    # applied at 1.2; the picture of 1.1 was too early, that of 1.4 is there at 1.9
-    trips = round_trips(times(1.0), times(1.2), times(1.1, 1.4), times(1.6, 1.9))
-    assert trips == pytest.approx([0.9])
-
-
-def test_a_later_picture_stands_in_for_one_that_was_lost():
-    trips = round_trips(times(1.0), times(1.2), times(1.3, 1.5), times(math.inf, 2.0))
-    assert trips == pytest.approx([1.0])
-
-
-def test_a_command_that_nothing_shows_any_more_has_no_round_trip():
-    assert len(round_trips(times(1.0), times(1.2), times(1.1), times(1.6))) == 0
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,7 @@
 """Measures of a session on a congested link: meaning of each column, and its computation.
 
 **Delivered** is a message all of which has arrived before the run was over, some time after the
-last message that counts.
-**Applied** is a command that was delivered before any newer one: a robot drops older ones. Its
-**age** is from when it was made until then. The **age in force** at any moment is that of the
-newest applied command. The **round trip** of an applied command lasts from when it was made until
+last message that counts. The **round trip** of an applied command lasts from when it was made until
 the first picture taken after it was applied has arrived, so it holds the wait for that picture.
 
 Rates are of bytes put on the line, with all headers and what is sent again. **Jain's index** is of
@@ -15,7 +12,6 @@ A session that does not want its share lowers it without doing harm, so `share_o
 References:
     R. Jain, D. Chiu, W. Hawe: A quantitative measure of fairness and discrimination for resource
     allocation in shared computer systems. DEC-TR-301, 1984.
-    S. Kaul, R. Yates, M. Gruteser: Real-time status: how often should one update? INFOCOM 2012.
 """
 
 from __future__ import annotations
@@ -27,14 +23,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.kernel.measure import Measure, text
+from dva_sim.kernel.measure import Measure, names_of, text
+from dva_sim.network.age_in_force import AgeInForce
 from dva_sim.network.link import Direction
 from dva_sim.network.transports import Contest, ContestConfig, Fates
 from dva_sim.network.transports.competition import WAYS
-from dva_sim.simulation.task.trial_measures import DRIVEN_COLUMNS
-
-Row = dict[str, Any]
-Floats = NDArray[np.float64]
+from dva_sim.simulation.measures.commands import (
+    AGE_IN_FORCE,
+    COMMAND_AGE_MEAN,
+    COMMAND_AGE_P50,
+    COMMAND_AGE_P95,
+    COMMAND_RATE,
+    PICTURE_AGE_P95,
+    PICTURE_RATE,
+    Floats,
+    Row,
+    applied,
+    mean,
+    percentile,
+    percentiles,
+    round_trips,
+)
+from dva_sim.simulation.measures.trials import DRIVEN_COLUMNS
+from dva_sim.simulation.transports import SessionRecording
 
 _WHERE: dict[Direction, str] = {"up": "towards the robot", "down": "from the robot"}
 
@@ -59,28 +70,15 @@ RUN_COLUMNS = (
         better="large",
     ),
     Measure("crucial_age_p95_s", "percentile 95 of the age of crucial commands at arrival"),
-    Measure(
-        "command_rate_hz",
-        "commands applied per second",
-        title="applied command rate",
-        better="large",
-    ),
-    Measure(
-        "command_age_mean_s",
-        "mean age of applied commands at arrival",
-        title="mean command age at application",
-    ),
-    Measure("command_age_p50_s", "median of this age", title="median command age at application"),
-    Measure("command_age_p95_s", "percentile 95 of this age"),
-    Measure(
-        "age_in_force_mean_s",
-        "age of the newest applied command, mean over time",
-        title="mean age of the command in force",
-    ),
+    COMMAND_RATE,
+    COMMAND_AGE_MEAN,
+    COMMAND_AGE_P50,
+    COMMAND_AGE_P95,
+    AGE_IN_FORCE,
     Measure("picture_delivered_share", "share of the pictures that arrived whole", better="large"),
-    Measure("picture_rate_hz", "pictures shown per second", better="large"),
+    PICTURE_RATE,
     Measure("picture_age_mean_s", "mean age of pictures at arrival"),
-    Measure("picture_age_p95_s", "percentile 95 of this age"),
+    PICTURE_AGE_P95,
     Measure(
         "round_trip_mean_s", "command until the first picture taken after it was applied, mean"
     ),
@@ -95,11 +93,20 @@ RUN_COLUMNS = (
     Measure("simulated_s", "virtual time simulated"),
 )
 """Columns of a run, which a study may ask for."""
+_DRIVEN = (*names_of(DRIVEN_COLUMNS), "plugin_failures")
 FLOW_COLUMNS = (
     text("way", "up is towards the robot"),
     text("flow", "session, or a TCP flow beside it"),
     Measure("rate_bps", "rate on the line, with headers and what is sent again"),
 )
+
+
+def tables(recording: SessionRecording) -> dict[str, list[Row]]:
+    """A row of the run, and one of each flow."""
+    scenario, contest, trial = recording
+    row = contest_row(scenario, contest) | {name: trial[name] for name in _DRIVEN}
+    row["simulated_s"] = contest.until + float(trial["trial_time_s"])
+    return {"runs": [row], "flows": flow_rows(contest)}
 
 
 def contest_row(config: ContestConfig, contest: Contest) -> Row:
@@ -128,61 +135,6 @@ def flow_rows(contest: Contest) -> list[Row]:
 
 
 # --- messages ----------------------------------------------------------------------------
-def applied(arrived: Floats) -> NDArray[np.bool_]:
-    """Return which messages, in order of making, arrived before all newer ones, shape `(n,)`."""
-    newer = np.minimum.accumulate(arrived[::-1])[::-1]
-    first_newer = np.append(newer[1:], math.inf)
-    return np.isfinite(arrived) & (arrived <= first_newer)
-
-
-def age_in_force(made: Floats, arrived: Floats, since: float, until: float) -> float:
-    """Mean over time of the age of the newest message that has arrived [s].
-
-    Args:
-        made: Creation time of each message, ascending [s], shape `(n,)`.
-        arrived: Arrival time [s], shape `(n,)`; infinity if never.
-        since: Beginning of the time looked at [s].
-        until: Its end [s].
-
-    Returns:
-        nan if none had arrived at the beginning.
-    """
-    used = applied(arrived)
-    at = arrived[used]
-    made = made[used]
-    edges = np.clip(np.append(at, math.inf), since, until)
-    if not len(at) or at[0] > since:
-        return math.nan
-    middle = 0.5 * (edges[1:] + edges[:-1])
-    length = np.diff(edges)
-    return float(((middle - made) * length).sum() / (until - since))
-
-
-def round_trips(made: Floats, arrived: Floats, taken: Floats, shown: Floats) -> Floats:
-    """From an applied command to the first picture that can show it, for each [s].
-
-    Args:
-        made: Creation times of the commands [s], shape `(n,)`.
-        arrived: At the robot [s], shape `(n,)`.
-        taken: Capture times of the pictures [s], shape `(m,)`.
-        shown: At the operator [s], shape `(m,)`.
-    """
-    used = applied(arrived)
-    soonest = np.append(np.minimum.accumulate(shown[::-1])[::-1], math.inf)
-    trips = soonest[np.searchsorted(taken, arrived[used])] - made[used]
-    return trips[np.isfinite(trips)]
-
-
-def percentile(values: Floats, q: float) -> float:
-    """nan of nothing."""
-    return float(np.percentile(values, q)) if len(values) else math.nan
-
-
-def mean(values: Sequence[float] | NDArray[Any]) -> float:
-    """nan of nothing."""
-    return float(np.mean(values)) if len(values) else math.nan
-
-
 def _counted(contest: Contest, fates: Fates) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Return when messages were made and arrived, and which are counted; shape `(n,)` each."""
     made = np.array(fates.made)
@@ -202,9 +154,8 @@ def _command_row(contest: Contest, made: Floats, arrived: Floats, counts: NDArra
         "crucial_age_p95_s": percentile(late, 95),
         "command_rate_hz": len(ages) / seconds,
         "command_age_mean_s": mean(ages),
-        "command_age_p50_s": percentile(ages, 50),
-        "command_age_p95_s": percentile(ages, 95),
-        "age_in_force_mean_s": age_in_force(made, arrived, contest.since, contest.until),
+        **percentiles("command_age", ages, (50, 95)),
+        "age_in_force_mean_s": _in_force(contest, made, arrived).mean,
     }
 
 
@@ -216,6 +167,12 @@ def _picture_row(contest: Contest, made: Floats, arrived: Floats, counts: NDArra
         "picture_age_mean_s": mean(ages),
         "picture_age_p95_s": percentile(ages, 95),
     }
+
+
+def _in_force(contest: Contest, made: Floats, arrived: Floats) -> AgeInForce:
+    used = applied(arrived)
+    looked_at = {"start": 0.0, "since": contest.since, "until": contest.until}
+    return AgeInForce.of_newest(made[used], arrived[used], **looked_at)
 
 
 # --- rates -------------------------------------------------------------------------------

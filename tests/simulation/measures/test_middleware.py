@@ -1,40 +1,14 @@
-"""The age of the command in force, beside what a look at every moment finds."""
+"""Commands and pictures over middleware, by hand."""
 
 import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from dva_sim.simulation.middleware.freshness_measures import Ages, Window, command_row, picture_row
+from dva_sim.simulation.measures.middleware import command_row, picture_row
+from dva_sim.simulation.middleware.run import Window
 
 WINDOW = Window(0.0, 2.0, 6.0)
-
-
-@st.composite
-def arrivals(draw):
-    """Times at which commands were made and applied, in order; some before the window."""
-    steps = st.lists(st.floats(0.01, 2.0), min_size=0, max_size=12)
-    made = np.cumsum(draw(steps))
-    late = np.array(draw(st.lists(st.floats(0.01, 3.0), min_size=len(made), max_size=len(made))))
-    return made, np.maximum.accumulate(made + late)
-
-
-@given(arrivals())
-def test_age_in_force_is_what_one_finds_at_every_moment(found):
-    made, applied = found
-    moments = np.linspace(WINDOW.since, WINDOW.until, 4001)[:-1] + 0.0005
-    newest = np.searchsorted(applied, moments, side="right")
-    seen = moments - np.concatenate([[WINDOW.start], made])[newest]
-
-    ages = Ages(made, applied, WINDOW)
-    assert ages.mean == pytest.approx(seen.mean(), abs=0.01)
-    assert ages.share_above(1.0) == pytest.approx((seen > 1.0).mean(), abs=0.01)
-    for share in (0.05, 0.5, 0.95):
-        at = ages.quantile(share)
-        assert (seen < at - 0.002).mean() <= share + 0.01
-        assert (seen < at + 0.002).mean() >= share - 0.01
 
 
 def row(made, applied):

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 import shapely
@@ -23,9 +22,8 @@ from dva_sim.kernel.recorder import DriveLog, TrackPoint
 from dva_sim.protocol.messages import CODE_NAMES
 from dva_sim.simulation.full import Recording
 from dva_sim.simulation.full.stage import id_of
+from dva_sim.simulation.measures.commands import Floats, Row, mean
 
-Row = dict[str, Any]
-Floats = NDArray[np.float64]
 Span = tuple[float, float]  # from when to when [s]
 
 GAP = 0.1  # a smaller change of the turn rate is no reversal [rad/s]; assumed
@@ -357,8 +355,7 @@ def run_measures(recording: Recording) -> Row:
         return {}
     row: Row = {}
     for name in _OF_A_RUN:
-        values = [r[name] for r in rows if not math.isnan(r[name])]
-        row[name] = float(np.mean(values)) if values else math.nan
+        row[name] = mean([r[name] for r in rows if not math.isnan(r[name])])
     row |= steering(recording.recorder.drives, recording.duration) | path_error(recording)
     row["missed"] = sum(r["missed"] for r in rows)
     row["false_confirmations"] = sum(r["false_confirmations"] for r in rows)

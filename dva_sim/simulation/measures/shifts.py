@@ -28,7 +28,8 @@ from numpy.typing import NDArray
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Measure, names_of, text
-from dva_sim.simulation.timed.bounds import Floats, evenness, response_bounds
+from dva_sim.simulation.measures.commands import Floats, Row, mean
+from dva_sim.simulation.timed.bounds import evenness, response_bounds
 from dva_sim.simulation.timed.recording import OUTCOMES, TimedRecording, UnitRecord
 from dva_sim.simulation.timed.scenario import TimedScenario
 from dva_sim.statistics import Incidence, first_of, incidence
@@ -163,7 +164,6 @@ def measures_of(scenario: TimedScenario) -> tuple[str, ...]:
     return names_of(column for column in RUN_COLUMNS if column not in gone)
 
 
-Row = dict[str, Any]
 Columns = dict[str, NDArray[Any]]
 
 
@@ -296,7 +296,7 @@ def zone_ratio(events: Columns, follow: float) -> float:
 def run_row(recording: TimedRecording, events: Columns, follow: float) -> Row:
     """One row of all measures; see the head of this file."""
     row: Row = {"follow_s": follow, "events": len(events["event_id"])}
-    row["true_share"] = _mean(events["is_true"])
+    row["true_share"] = mean(events["is_true"])
     row |= _times(events, follow) | _fates(events, follow)
     if recording.scenario.dispatch.containment:
         row |= _containment(only(events, events["is_true"]), follow)
@@ -316,7 +316,7 @@ def _times(events: Columns, follow: float) -> Row:
     for q in PERCENTILES:
         row[f"response_p{q}_s"] = response.quantile(q / 100)
     arrived = np.isfinite(events["response_s"])
-    row["robot_share"] = _mean(events["responder_kind"][arrived] == "robot")
+    row["robot_share"] = mean(events["responder_kind"][arrived] == "robot")
     return row
 
 
@@ -326,7 +326,7 @@ def _fates(events: Columns, follow: float) -> Row:
     row: Row = {f"{fate}_share": share for fate, share in shares.items()}
     row["open_share"] = max(0.0, 1.0 - sum(shares.values()))
     later = (events["outcome"] == "escalated") & (events["confirmation_s"] <= follow)
-    row["escalated_later_share"] = _mean(later & (events["closing_s"] <= follow))
+    row["escalated_later_share"] = mean(later & (events["closing_s"] <= follow))
     true = only(events, events["is_true"])
     row["confirmed_of_true_share"] = float(reaching(true, "confirmation_s").at(follow))
     return row
@@ -345,8 +345,8 @@ def _bound(events: Columns, follow: float) -> Row:
     bounds = events["bound_s"]
     response = events["response_s"]
     return {
-        "bound_mean_s": _mean(np.minimum(bounds, follow)),
-        "beats_bound_share": _mean(response < bounds - SLACK),
+        "bound_mean_s": mean(np.minimum(bounds, follow)),
+        "beats_bound_share": mean(response < bounds - SLACK),
     }
 
 
@@ -359,10 +359,10 @@ def _team(recording: TimedRecording) -> Row:
     row: Row = {}
     for kind in ("guard", "robot"):
         busy = [unit.busy for unit in recording.units if unit.kind == kind]
-        row[f"use_of_{kind}s"] = _mean(busy) / recording.duration if busy else math.nan
+        row[f"use_of_{kind}s"] = mean(busy) / recording.duration if busy else math.nan
         row[f"evenness_of_{kind}s"] = evenness(busy)
     operators = recording.operators
-    row["use_of_operators"] = _mean(operators) / recording.duration if operators else math.nan
+    row["use_of_operators"] = mean(operators) / recording.duration if operators else math.nan
     people = (row["use_of_guards"], row["use_of_operators"])
     row["load"] = max((use for use in people if math.isfinite(use)), default=math.nan)
     return row
@@ -401,7 +401,3 @@ def _responder_row(recording: TimedRecording, unit: UnitRecord) -> Row:
         "distance_m": unit.distance,
         **{f"{task}s": unit.jobs[task] for task in ("confirm", "contain", "stand_by")},
     }
-
-
-def _mean(values: Any) -> float:
-    return float(np.mean(values)) if len(values) else math.nan

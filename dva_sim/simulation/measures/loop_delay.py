@@ -13,17 +13,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dva_sim.kernel.measure import Measure
 from dva_sim.kernel.recorder import Applied, DriveLog
+from dva_sim.network.age_in_force import AgeInForce
+from dva_sim.simulation.measures.commands import (
+    AGE_IN_FORCE,
+    COMMAND_AGE_MEAN,
+    COMMAND_AGE_P50,
+    COMMAND_AGE_P95,
+    NAN,
+    Floats,
+    Row,
+    mean,
+    percentiles,
+)
 
-Floats = NDArray[np.float64]
-Row = dict[str, Any]
-NAN = math.nan
 QUANTILES = (5, 25, 50, 75, 95)
 
 _MEANINGS = {
@@ -40,24 +48,13 @@ _MEANINGS = {
 }
 STAGES = tuple(_MEANINGS)
 COLUMNS = (
-    Measure(
-        "command_age_mean_s",
-        "mean age of commands at application, from making to effect",
-        title="mean command age at application",
-    ),
-    *(
-        Measure(
-            f"command_age_p{q:02}_s",
-            f"percentile {q} of this age",
-            title="median command age at application" if q == 50 else "",
-        )
-        for q in QUANTILES
-    ),
-    Measure(
-        "age_in_force_mean_s",
-        "age of the command in force, mean over time",
-        title="mean age of the command in force",
-    ),
+    COMMAND_AGE_MEAN,
+    Measure("command_age_p05_s", "percentile 5 of this age"),
+    Measure("command_age_p25_s", "percentile 25 of this age"),
+    COMMAND_AGE_P50,
+    Measure("command_age_p75_s", "percentile 75 of this age"),
+    COMMAND_AGE_P95,
+    AGE_IN_FORCE,
     *(Measure(f"delay_{stage}_s", meaning) for stage, meaning in _MEANINGS.items()),
     Measure("frame_age_mean_s", "age of the picture that the person reacts to: frame and downlink"),
     Measure(
@@ -109,11 +106,9 @@ def driven(log: DriveLog, end: float) -> Driven:
 def command_ages(drives: Sequence[Driven]) -> Row:
     """Age of commands at application (made to effect), and in force (averaged over time)."""
     ages = np.array([a.time - a.issued for drive in drives for a in drive.applied])
-    row: Row = {"command_age_mean_s": float(ages.mean()) if len(ages) else NAN}
-    for q in QUANTILES:
-        row[f"command_age_p{q:02}_s"] = float(np.percentile(ages, q)) if len(ages) else NAN
     hold = np.concatenate([drive.hold for drive in drives])
-    return row | {"age_in_force_mean_s": _mean(ages + hold / 2, hold)}
+    row = {"command_age_mean_s": mean(ages)} | percentiles("command_age", ages, QUANTILES)
+    return row | {"age_in_force_mean_s": AgeInForce(ages, hold).mean}
 
 
 def delay_budget(drives: Sequence[Driven], motor: float) -> Row:

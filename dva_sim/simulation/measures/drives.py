@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-
-import numpy as np
 
 from dva_sim.kernel.measure import Measure, text
 from dva_sim.kernel.recorder import DriveLog
-from dva_sim.simulation.full.loop_delay import NAN, Row, driven
 from dva_sim.simulation.full.recording import Recording
+from dva_sim.simulation.measures.commands import (
+    COMMAND_AGE_P50,
+    COMMAND_AGE_P95,
+    NAN,
+    ROUND_TRIP_P50,
+    ROUND_TRIP_P95,
+    Row,
+    percentiles,
+)
+from dva_sim.simulation.measures.loop_delay import driven
 
 _NUMBER = Measure("drive", "number of the drive in its run, from 1, as they were ordered")
 DRIVE_COLUMNS = (
@@ -34,10 +40,10 @@ DRIVE_COLUMNS = (
     Measure("commands_refused", "commands that the robot refused"),
     Measure("timeouts", "requests whose answer did not come in time"),
     Measure("alerts", "alerts that the link may be lost"),
-    Measure("command_age_p50_s", "median age of commands at application"),
-    Measure("command_age_p95_s", "percentile 95 of this age"),
-    Measure("round_trip_p50_s", "median time from a command's request to its answer"),
-    Measure("round_trip_p95_s", "percentile 95 of this time"),
+    COMMAND_AGE_P50,
+    COMMAND_AGE_P95,
+    ROUND_TRIP_P50,
+    ROUND_TRIP_P95,
     Measure("stop_share", "share of the driving time without a command in force"),
     Measure("tour_time_s", "time of the tour's leg that ended in this drive; empty: none did"),
 )
@@ -67,7 +73,6 @@ def _drive(recording: Recording, number: int, log: DriveLog) -> Row:
     end = recording.duration if log.ended is None else log.ended
     lasted = 0.0 if log.started is None else end - log.started
     done = driven(log, end)
-    ages = [a.time - a.issued for a in done.applied]
     by = log.by
     return {
         "drive": number,
@@ -90,17 +95,11 @@ def _drive(recording: Recording, number: int, log: DriveLog) -> Row:
         "commands_refused": sum(log.refused.values()),
         "timeouts": log.timeouts,
         "alerts": log.alerts,
-        "command_age_p50_s": _percentile(ages, 50),
-        "command_age_p95_s": _percentile(ages, 95),
-        "round_trip_p50_s": _percentile(list(log.round_trips), 50),
-        "round_trip_p95_s": _percentile(list(log.round_trips), 95),
+        **percentiles("command_age", [a.time - a.issued for a in done.applied], (50, 95)),
+        **percentiles("round_trip", log.round_trips, (50, 95)),
         "stop_share": 1.0 - float(done.hold.sum()) / lasted if lasted > 0.0 else NAN,
         "tour_time_s": by.tour_time,
     }
-
-
-def _percentile(values: list[float], q: int) -> float:
-    return float(np.percentile(values, q)) if values else math.nan
 
 
 def _commands(number: int, log: DriveLog) -> Iterator[Row]:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.simulation.timed import build, shift_measures, simulate_timed
+from dva_sim.simulation.measures import shifts
+from dva_sim.simulation.timed import build, simulate_timed
 from dva_sim.simulation.timed.bounds import response_bounds, share_of_the_way
 
 GUARD = {"name": "guard", "mobilisation": 5, "look": 10, "after": "return"}
@@ -23,12 +24,12 @@ def play(seed=1, **changes):
 
 
 def run_of(recording, follow=600.0):
-    return shift_measures.tables(recording, follow)["runs"][0]
+    return shifts.tables(recording, follow)["runs"][0]
 
 
 def test_the_cohort_leaves_out_the_warm_up_and_what_cannot_be_followed():
     # Alarms at 60, 120, ... 3000 s; from 600 to 2400 s there are 31.
-    rows = shift_measures.tables(play())["events"]
+    rows = shifts.tables(play())["events"]
     assert [row["t_detected_s"] for row in rows] == [60.0 * k for k in range(10, 41)]
     assert {row["watched_s"] for row in rows} == {600.0}
 
@@ -73,7 +74,7 @@ def test_with_containment_it_is_measured_until_somebody_has_dealt_with_it():
 
 def test_a_run_too_short_to_follow_anything_is_refused():
     with pytest.raises(ConfigError, match="600 s"):
-        shift_measures.tables(play(horizon_s=1200))
+        shifts.tables(play(horizon_s=1200))
 
 
 def test_a_run_that_drains_is_followed_to_the_end_of_its_last_event():
@@ -133,4 +134,4 @@ def test_a_zone_that_waits_twice_as_long_has_a_ratio_of_two():
         "closing_s": np.full(7, np.nan),
         "watched_s": np.full(7, 600.0),
     }
-    assert shift_measures.zone_ratio(events, 600) == pytest.approx(2.0)
+    assert shifts.zone_ratio(events, 600) == pytest.approx(2.0)

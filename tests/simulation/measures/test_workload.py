@@ -7,7 +7,8 @@ import pytest
 
 from dva_sim.kernel.recorder import DriveLog, TrackPoint
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full import Recording, episode_measures, simulate, workload
+from dva_sim.simulation.full import Recording, simulate
+from dva_sim.simulation.measures import episodes, workload
 
 
 def log(ordered: float = 0.0, ended: float | None = None, **more: object) -> DriveLog:
@@ -145,7 +146,7 @@ def test_an_operator_with_one_drive_is_busy_from_the_order_to_the_confirmation()
     assert row["utilisation"] == pytest.approx((made.ended - made.ordered) / recording.duration)
     assert (row["orders"], row["robots_max"], row["queue_max"], row["turns"]) == (1, 1, 0, 0)
     assert 0.0 < row["utilisation"] - row["attending_share"] < 5.0 / recording.duration * 1.5
-    whole = episode_measures.run_row(recording)
+    whole = episodes.run_row(recording)
     assert whole["utilisation"] == row["utilisation"]
     assert 0.0 < whole["path_error_rms_m"] < whole["path_error_max_m"] < 1.0
     assert (whole["missed"], whole["false_confirmations"]) == (0, 0)
@@ -156,8 +157,8 @@ def test_who_believes_in_a_false_alarm_is_counted():
     hasty = {"confirm_look_s": 0.1, "sensitivity": 0.5}
     events = [{"kind": "fire", "at_s": 0, "reported": True, "false_alarm": True}]
     recording = run(events=events, **{"operator.traits": hasty})
-    assert episode_measures.run_row(recording)["false_confirmations"] == 1
-    (event,) = episode_measures.event_rows(recording)
+    assert episodes.run_row(recording)["false_confirmations"] == 1
+    (event,) = episodes.event_rows(recording)
     assert (event["outcome"], event["false_confirmation"], event["missed"]) == (
         "confirmed",
         True,
@@ -169,7 +170,7 @@ def test_who_hardly_looks_misses_what_is_there():
     """Half a second of search, by a person who needs minutes to be sure."""
     blind = {"confirm_look_s": 200.0, "sensitivity": 0.5, "search_s": 0.5}
     recording = run(**{"operator.traits": blind})
-    assert episode_measures.run_row(recording)["missed"] == 1
-    (event,) = episode_measures.event_rows(recording)
+    assert episodes.run_row(recording)["missed"] == 1
+    (event,) = episodes.event_rows(recording)
     assert (event["outcome"], event["missed"]) == ("refuted", True)
     assert workload.operator_rows(recording)[0]["missed"] == 1

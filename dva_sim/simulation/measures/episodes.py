@@ -6,15 +6,24 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-import numpy as np
-
 from dva_sim.agents.people.bystander import DOWN
 from dva_sim.core.events import Event
 from dva_sim.kernel.measure import Measure, names_of, text
 from dva_sim.kernel.recorder import DriveLog
-from dva_sim.simulation.full import Recording, dispatch_measures, loop_delay, workload
-from dva_sim.simulation.full.loop_delay import NAN, Row, command_ages, delay_budget, driven
+from dva_sim.simulation.full import Recording
 from dva_sim.simulation.full.recording import RobotLog
+from dva_sim.simulation.measures import decisions, loop_delay, workload
+from dva_sim.simulation.measures.commands import (
+    COMMAND_RATE,
+    NAN,
+    ROUND_TRIP_P50,
+    ROUND_TRIP_P95,
+    Row,
+    percentiles,
+    ratio,
+    restricted_mean,
+)
+from dva_sim.simulation.measures.loop_delay import command_ages, delay_budget, driven
 from dva_sim.simulation.scenario import Scenario
 
 SETTLED = "confirmed", "contained", "refuted"  # outcomes of events that somebody has looked at
@@ -45,26 +54,13 @@ _OF_DRIVES = (
     *_BODY,
     text("cause", "why it was not confirmed; empty if it was"),
     *loop_delay.COLUMNS,
-    Measure(
-        "command_rate_hz",
-        "commands applied per second of driving",
-        title="applied command rate",
-        better="large",
-    ),
+    COMMAND_RATE,
     Measure("commands_sent", "commands that the phone sent"),
     Measure("commands_applied", "commands that took effect", better="large"),
     Measure("commands_stale", "commands that a robot refused as too old"),
     Measure("commands_superseded", "commands that a newer one replaced before they took effect"),
-    Measure(
-        "round_trip_p50_s",
-        "median time from a command's request to its answer",
-        title="median time from request to answer",
-    ),
-    Measure(
-        "round_trip_p95_s",
-        "percentile 95 of this time",
-        title="95th percentile of the time from request to answer",
-    ),
+    ROUND_TRIP_P50,
+    ROUND_TRIP_P95,
     Measure("round_trip_max_s", "longest such time", title="longest time from request to answer"),
     Measure(
         "samples_per_value",
@@ -144,7 +140,7 @@ RUN_COLUMNS = (
         "broken safety rules found, of S1 to S7; see docs/explanation/safety-rules.md",
     ),
     Measure("simulated_s", "virtual time simulated"),
-    *dispatch_measures.RUN_COLUMNS,
+    *decisions.RUN_COLUMNS,
 )
 """Columns of `run_row`; a study may ask for those that are numbers."""
 _STEPS = {
@@ -173,7 +169,7 @@ EVENT_COLUMNS = (
     Measure("watched_s", "detection until nobody looks any more: the end of the run"),
     Measure("missed", "whether it was refuted although it was there"),
     Measure("false_confirmation", "whether it was confirmed although nothing was there"),
-    *dispatch_measures.EVENT_COLUMNS,
+    *decisions.EVENT_COLUMNS,
 )
 PEOPLE_COLUMNS = (
     text("person_name", "guard or bystander"),
@@ -202,7 +198,7 @@ def measures_of(scenario: Scenario) -> tuple[str, ...]:
     there = {_OF_DRIVES: scenario.robot.count, workload.COLUMNS: scenario.operator.count}
     there[_OF_DISTURBANCES] = scenario.disturbance.kind != "none"
     there |= {_OF_PEOPLE: bystanders + guards, _OF_BYSTANDERS: bystanders}
-    there[dispatch_measures.RUN_COLUMNS] = scenario.dispatch.person is not None
+    there[decisions.RUN_COLUMNS] = scenario.dispatch.person is not None
     gone = {column for columns, count in there.items() if not count for column in columns}
     return names_of(column for column in RUN_COLUMNS if column not in gone)
 
@@ -225,7 +221,7 @@ def run_row(recording: Recording) -> Row:
     row["simulated_s"] = recording.duration
     row["network_depth"] = recording.depth
     if recording.people_decide:
-        row |= dispatch_measures.run_measures(recording)
+        row |= decisions.run_measures(recording)
     return row
 
 
@@ -253,17 +249,12 @@ def _event_measures(recording: Recording) -> Row:
     rows = [row for row in event_rows(recording) if row["t_detected_s"] < math.inf]
     real = [row for row in rows if row["is_true"]]
     settled = sum(row["outcome"] in SETTLED for row in rows)
+    horizon = recording.scenario.horizon_s
     return {
-        "response_mean_s": _mean_or(recording.scenario.horizon_s, rows, "response_s"),
-        "confirmation_mean_s": _mean_or(recording.scenario.horizon_s, real, "confirmation_s"),
+        "response_mean_s": restricted_mean([row["response_s"] for row in rows], horizon),
+        "confirmation_mean_s": restricted_mean([row["confirmation_s"] for row in real], horizon),
         "settled_per_min": 60.0 * settled / recording.duration,
     }
-
-
-def _mean_or(instead: float, rows: list[Row], column: str) -> float:
-    """Mean of a column, with something instead of what is missing; nan without rows."""
-    values = [instead if math.isnan(row[column]) else row[column] for row in rows]
-    return float(np.mean(values)) if values else NAN
 
 
 def plugin_failures(recording: Recording) -> int:
@@ -369,14 +360,15 @@ def _command_measures(attempts: list[DriveLog], recording: Recording) -> Row:
         command_ages(drives)
         | delay_budget(drives, motor)
         | {
-            "command_rate_hz": applied / driving if driving else NAN,
+            "command_rate_hz": ratio(applied, driving),
             "commands_sent": sum(d.sent for d in attempts),
             "commands_applied": applied,
             "commands_stale": recording.recorder.counters["robot refused: stale"],
             "commands_superseded": sum(d.superseded for d in attempts)
             + sum(robot.superseded for robot in robots),
-            **_round_trips(trips),
-            "samples_per_value": _ratio(
+            **percentiles("round_trip", trips, (50, 95)),
+            "round_trip_max_s": max(trips, default=NAN),
+            "samples_per_value": ratio(
                 sum(d.samples for d in attempts), sum(d.values for d in attempts)
             ),
             "queue_max": max((robot.longest_queue for robot in robots), default=NAN),
@@ -385,19 +377,6 @@ def _command_measures(attempts: list[DriveLog], recording: Recording) -> Row:
             "stop_share": 1.0 - float(in_force) / driving if driving else NAN,
         }
     )
-
-
-def _round_trips(trips: list[float]) -> Row:
-    """From a command's request to its reply."""
-    return {
-        "round_trip_p50_s": float(np.median(trips)) if trips else NAN,
-        "round_trip_p95_s": float(np.percentile(trips, 95)) if trips else NAN,
-        "round_trip_max_s": max(trips, default=NAN),
-    }
-
-
-def _ratio(amount: float, of: float) -> float:
-    return amount / of if of else NAN
 
 
 def _span(drive: DriveLog, recording: Recording) -> tuple[float, float]:
@@ -410,7 +389,7 @@ def event_rows(recording: Recording) -> list[Row]:
     """One row per event that happened, in order; none is left out (S6).
 
     The columns `outcome`, `confirmation_s`, `closing_s` and `watched_s` are what competing
-    outcomes are estimated from, as for the timed model: see `dispatch.measures.fates`.
+    outcomes are estimated from, as for the timed model: see `shifts.fates`.
     """
     return [_event_row(recording, number) for number in range(len(recording.incidents))]
 
@@ -448,7 +427,7 @@ def _event_row(recording: Recording, number: int) -> Row:
     )
     row["false_confirmation"] = incident.false_alarm and row["t_confirmed_s"] < math.inf
     if recording.people_decide:
-        row |= dispatch_measures.event_measures(event, recording)
+        row |= decisions.event_measures(event, recording)
     return row
 
 

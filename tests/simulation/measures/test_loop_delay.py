@@ -10,8 +10,15 @@ from dva_sim.agents.tilt import load_filter
 from dva_sim.agents.tilt.phone import Trail
 from dva_sim.kernel.recorder import Applied, DriveLog, Followed, Shown
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full import Recording, episode_measures, simulate
-from dva_sim.simulation.full.loop_delay import STAGES, Driven, command_ages, delay_budget, driven
+from dva_sim.simulation.full import Recording, simulate
+from dva_sim.simulation.measures import episodes
+from dva_sim.simulation.measures.loop_delay import (
+    STAGES,
+    Driven,
+    command_ages,
+    delay_budget,
+    driven,
+)
 
 MOTOR = 0.15
 RESOLUTION = 0.01  # of what is recorded: a tenth of the time from one frame to the next [s]
@@ -152,7 +159,7 @@ def test_a_frozen_filter_lets_no_picture_through_and_who_supervises_sends_no_com
     frozen = {"phone.profile": "dissertation", "phone.max_delay_s": 0.2, "horizon_s": 60}
     for changes in (frozen, {"control": "supervisory"}):
         scenario = scenarios.build(scenarios.load("drive-to-event"), changes)
-        row = episode_measures.run_row(simulate(scenario, 1))
+        row = episodes.run_row(simulate(scenario, 1))
         stages = [row[f"delay_{name}_s"] for name in STAGES]
         assert np.isnan([*stages, row["loop_delay_mean_s"], row["loop_delay_measured_s"]]).all()
 

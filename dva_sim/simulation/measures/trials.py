@@ -9,10 +9,9 @@ from dataclasses import replace
 from typing import Any
 
 from dva_sim.kernel.measure import Measure, names_of
+from dva_sim.simulation.measures.commands import Row
 from dva_sim.simulation.task.movement_laws import fit_line, throughput
 from dva_sim.simulation.task.scenario import TaskScenario
-
-Row = dict[str, Any]
 
 _DRIVEN = ("tunnel", "corner", "slalom", "course", "heading_step")
 _AIMED = ("pointing", *_DRIVEN)

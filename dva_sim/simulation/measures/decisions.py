@@ -12,8 +12,8 @@ from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event
 from dva_sim.kernel.measure import Measure, text
 from dva_sim.protocol.messages import BUSY, OK, OUT_OF_ORDER
-from dva_sim.simulation.full.loop_delay import NAN, Row
 from dva_sim.simulation.full.recording import Recording
+from dva_sim.simulation.measures.commands import NAN, Row, mean, restricted_mean
 
 RUN_COLUMNS = (
     Measure(
@@ -58,11 +58,11 @@ def run_measures(recording: Recording) -> Row:
     orders = [fact for fact in facts if _is_order(fact) and fact.role is not None]
     costs = [cost for fact in overrides if (cost := _cost(fact)) is not None]
     return {
-        "acknowledge_mean_s": _mean([_acknowledged(e) for e in recording.events], horizon),
-        "assign_mean_s": _mean([_assigned(e, facts) for e in recording.events], horizon),
+        "acknowledge_mean_s": restricted_mean(map(_acknowledged, recording.events), horizon),
+        "assign_mean_s": restricted_mean([_assigned(e, facts) for e in recording.events], horizon),
         "person_orders": len(orders),
         "overrides": len(overrides),
-        "override_delay_mean_s": _mean(costs, NAN),
+        "override_delay_mean_s": mean(costs),
         "unanswered": sum(_is_order(f) and f.role is None and bool(f.cause) for f in facts),
         "dismissed": sum(
             f.action in ("false_alarm", "escalate") and f.role is not None and f.code == OK
@@ -110,9 +110,3 @@ def _acknowledged(event: Event) -> float:
 def _assigned(event: Event, facts: Iterable[Fact]) -> float:
     given = (f.time for f in facts if f.event == event.number and _is_order(f))
     return next(given, NAN) - event.times["detected"]
-
-
-def _mean(values: list[float], instead: float) -> float:
-    """With something instead of what is missing; that, too, where there are none."""
-    known = [instead if math.isnan(value) else value for value in values]
-    return sum(known) / len(known) if known else instead
