@@ -103,7 +103,7 @@ budget: $(DEV)  ## whether the program costs more than it may: make budget REASO
 	@$(BIN)/python tests/benchmarks/budget.py --reason "$(REASON)"
 
 goals: $(DEV)  ## what performance work aims at by the clock: crowds, memory, floods, the console
-	@$(BIN)/python -m pytest tests/benchmarks --benchmark-disable-gc -p no:cacheprovider -s
+	@$(BIN)/python -m pytest tests/benchmarks -p no:cacheprovider -s
 
 clean:  ## remove the environment and all caches, keep results
 	@rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -9,17 +9,15 @@ that sample to the robot's set point, with all that lies between.
 from __future__ import annotations
 
 import json
-import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Thread
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import pytest
 from benchmarks.console_visits import Console, console
 from benchmarks.goals import goal
 from helpers.console.browser_phone import Hand
@@ -170,8 +168,9 @@ def swing(phone: Phone, steps: int) -> None:
         phone.hold(LEFT if number % 2 else RIGHT, STEP_S)
 
 
-def test_from_the_hand_to_the_robots_set_point(tmp_path):
-    with console(tmp_path, *WORDS) as at:
+def from_the_hand_to_the_set_point(folder: Path) -> None:
+    """Delay of a command, part by part."""
+    with console(folder, *WORDS) as at:
         phone = Phone(at, "my phone")
         phone.take(0)
         phone.start()
@@ -205,10 +204,19 @@ def in_threads(what: Callable[[Phone], object], phones: list[Phone]) -> None:
         thread.join()
 
 
-@pytest.mark.parametrize("many", [2, MANY])
-def test_what_phones_cost_and_what_they_lose(tmp_path, many):
-    """Two drive, as `hands-on` has two robots; what the others tell is shown on their screens."""
-    with console(tmp_path, *WORDS) as at:
+def two_phones(folder: Path) -> None:
+    """Both drive."""
+    phone_cost(folder, DRIVEN)
+
+
+def twenty_phones(folder: Path) -> None:
+    """Two of them drive."""
+    phone_cost(folder, MANY)
+
+
+def phone_cost(folder: Path, many: int) -> None:
+    """CPU time and lost samples; two drive, what the others tell is shown on their screens."""
+    with console(folder, *WORDS) as at:
         phones = [Phone(at, f"phone {n}") for n in range(many)]
         for number, phone in enumerate(phones[:DRIVEN]):
             phone.take(number)
@@ -246,11 +254,11 @@ WebSocket.prototype.send = function (text) { const line = JSON.parse(text);
 CAMERA, WATCHED_S = "robot-1", 20.0
 
 
-@pytest.fixture
-def hand(tmp_path: Path) -> Iterator[tuple[Hand, list[int]]]:
+@contextmanager
+def hand(folder: Path) -> Iterator[tuple[Hand, list[int]]]:
     """A phone's page in the system's Chromium that drives, and what its files weigh [B]."""
     weights: list[int] = []
-    with console(tmp_path, *WORDS) as at, chromium() as browser:
+    with console(folder, *WORDS) as at, chromium() as browser:
         context = browser.new_context(viewport={"width": 360, "height": 740}, has_touch=True)
 
         def weigh(answer: Response) -> None:
@@ -266,23 +274,19 @@ def hand(tmp_path: Path) -> Iterator[tuple[Hand, list[int]]]:
         yield Hand(visit, f"http://{at.place}/phone?token={at.phones}"), weights
 
 
-def test_what_the_browser_adds(hand):
+def from_sensor_and_camera_in_a_browser(folder: Path) -> None:
     """From the sensor to the socket, and from the robot's camera to the screen."""
-    phone, weights = hand
-    weight = sum(weights)
-    phone.register()
-    phone.take(CAMERA)
-    expect(phone.page.get_by_text("is in your hands")).to_be_visible()
-    phone.calibrate()
-    phone.go("Teleoperation")
-    phone.page.evaluate(NOTED)
-    phone.page.wait_for_timeout(1000 * WATCHED_S)
-    ages, waits = phone.page.evaluate("[window.ages, window.waits]")
+    with hand(folder) as (phone, weights):
+        weight = sum(weights)
+        phone.register()
+        phone.take(CAMERA)
+        expect(phone.page.get_by_text("is in your hands")).to_be_visible()
+        phone.calibrate()
+        phone.go("Teleoperation")
+        phone.page.evaluate(NOTED)
+        phone.page.wait_for_timeout(1000 * WATCHED_S)
+        ages, waits = phone.page.evaluate("[window.ages, window.waits]")
     print(f"\nthe page weighs {weight / 1000:.0f} kB in {len(weights)} files")
     for name, found in (("camera to screen", ages), ("sensor to socket", waits)):
         p50, p95 = np.percentile(found, [50, 95])
         print(f"  {name}, {len(found)}: p50 {p50:.1f} ms, p95 {p95:.1f} ms")
-
-
-if __name__ == "__main__":
-    sys.exit(pytest.main([__file__, "-s", "-p", "no:cacheprovider"]))

@@ -7,12 +7,11 @@ from the command to the map; what 10 and 200 robots cost the browser; CPU of eac
 from __future__ import annotations
 
 import resource
-import sys
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from benchmarks.console_visits import FAKE, Console, console, load, visit
 from benchmarks.goals import goal
 from helpers.console.chromium import chromium
@@ -55,8 +54,9 @@ def turn_by_keys(page: Page) -> np.ndarray[Any, Any]:
     return np.array(page.evaluate("probe.delays"))
 
 
-def test_from_a_key_to_the_set_point(tmp_path):
-    with console(tmp_path) as running, chromium() as browser:
+def from_a_key_to_the_set_point(folder: Path) -> None:
+    """Without delay and with 250 ms."""
+    with console(folder) as running, chromium() as browser:
         page = visit(browser, f"{running.address}#/drive")
         page.get_by_role("button", name="Take control").click()
         expect(page.get_by_role("button", name="Release control")).to_be_enabled()
@@ -73,11 +73,12 @@ def test_from_a_key_to_the_set_point(tmp_path):
             goal(f"p95 at {delay_ms} ms [ms]", high, most=MOST_MS[delay_ms])
 
 
-def test_from_the_command_to_the_drawn_map(tmp_path):
+def from_the_command_to_the_drawn_map(folder: Path) -> None:
+    """Time, page weight and first paint."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with chromium() as browser:
         begun = time.monotonic()
-        with console(tmp_path) as running:
+        with console(folder) as running:
             serves = time.monotonic() - begun
             page = visit(browser, f"{running.address}#/map")
             drawn_ms = page.wait_for_function(DRAWN).json_value()
@@ -93,10 +94,20 @@ def test_from_the_command_to_the_drawn_map(tmp_path):
     goal("first paint [s]", paint_ms / 1000, most=1.0)
 
 
-@pytest.mark.parametrize(("robots", "people", "site"), [(10, 10, "caparica"), (200, 100, "campus")])
-def test_what_a_page_costs(tmp_path, robots, people, site):
+def a_page_of_ten_robots(folder: Path) -> None:
+    """What the map costs the browser."""
+    page_cost(folder, 10, 10, "caparica")
+
+
+def a_page_of_two_hundred_robots(folder: Path) -> None:
+    """The same of a crowd."""
+    page_cost(folder, 200, 100, "campus")
+
+
+def page_cost(folder: Path, robots: int, people: int, site: str) -> None:
+    """Share of the main thread, frames and bytes while somebody looks at the map."""
     words = ("--robots", str(robots), "--people", str(people), "--site", site)
-    with console(tmp_path, *words, program=FAKE) as running, chromium() as browser:
+    with console(folder, *words, program=FAKE) as running, chromium() as browser:
         page = visit(browser, f"{running.address}#/map")
         page.wait_for_function(DRAWN)
         page.wait_for_timeout(WARM_UP_MS)
@@ -134,9 +145,10 @@ def shares(running: Console, page: Page) -> str:
     return ", ".join(f"{name} {(now[name] - first[name]) / took:.1%}" for name in now)
 
 
-def test_what_each_process_costs(tmp_path):
+def cpu_of_each_process(folder: Path) -> None:
+    """While somebody looks at the map, and while two robots are driven."""
     words = ("--set", "camera.rate_hz=10")
-    with console(tmp_path, *words) as running, chromium() as browser:
+    with console(folder, *words) as running, chromium() as browser:
         page = visit(browser, f"{running.address}#/map")
         page.wait_for_function(DRAWN)
         page.wait_for_timeout(WARM_UP_MS)
@@ -149,7 +161,3 @@ def test_what_each_process_costs(tmp_path):
         page.wait_for_timeout(WARM_UP_MS)
         page.keyboard.down("ArrowLeft")
         print(f"with two robots driven, 10 pictures a second each: {shares(running, page)}")
-
-
-if __name__ == "__main__":
-    sys.exit(pytest.main([__file__, "-s", "-p", "no:cacheprovider"]))

@@ -5,7 +5,7 @@ one in twenty is an operator who takes a robot of that wave along. Meanwhile hon
 for the device list once a second, and one operator drives a robot. Then the DVA is killed and
 started again with what it kept. Run by hand it shows more, and another version too:
 
-    python tests/benchmarks/test_forgetting.py --waves 10 --size 1000 --python OTHER/bin/python
+    python tests/benchmarks/vanishing_devices.py --waves 10 --size 1000 --python OTHER/bin/python
 """
 
 from __future__ import annotations
@@ -163,6 +163,9 @@ class Honest(threading.Thread):
                     poller.unregister(old)
                     old.close(0)
                 device.old.clear()
+        if driver.thread is not None:
+            driver.thread.join()
+        self._context.destroy(0)
 
 
 class _Device:
@@ -234,6 +237,7 @@ class _Driver(_Device):
 
     robot, session, driving = "", 0, False
     _drives: zmq.Socket[bytes] | None = None
+    thread: threading.Thread | None = None
     sent = 0.0
 
     def go_on(self, now: float) -> None:
@@ -242,7 +246,8 @@ class _Driver(_Device):
             self._drives = self.all._context.socket(zmq.REQ)
             self._drives.linger = 0
             self._drives.connect(f"tcp://{self.robot}")
-            threading.Thread(target=self._drive, daemon=True).start()
+            self.thread = threading.Thread(target=self._drive, daemon=True)
+            self.thread.start()
 
     def ask_next(self) -> None:
         if self.session:
@@ -263,9 +268,10 @@ class _Driver(_Device):
         while not self.all.over:
             began = time.monotonic()
             drives.send(voice.says(f"<TeleOp>{content}</TeleOp>", ROBOT, self.session))
-            if not drives.poll(30_000):
-                self.all.lost += 1
-                return
+            while not drives.poll(500):
+                if self.all.over or time.monotonic() - began > 30:
+                    self.all.lost += 1
+                    return
             code = field("Code", drives.recv())
             if content != "<StartTeleOp/>":
                 self.all.trips["drive"].append(time.monotonic() - began)
@@ -414,6 +420,7 @@ class Scene:
 
     def close(self) -> None:
         self.honest.over = True
+        self.honest.join()
         for process in (self._world, self.process):
             process.kill()
             process.wait()
@@ -458,11 +465,12 @@ def main(words: list[str] | None = None) -> list[Figures]:
     return found
 
 
-def test_waves_of_devices_that_vanish(benchmark):
+def waves_of_devices_that_vanish(_: Path) -> None:
+    """Open files, memory and answers of the DVA, before, during and after."""
     from benchmarks.goals import goal  # which is not there for the waves, programs of their own
 
     words = ["--waves=4", "--waves-after=1", "--size=250", "--period=15", "--quiet=10"]
-    found = benchmark.pedantic(main, args=(words,), rounds=1)
+    found = main(words)
     quiet, first, *later, _, after = found
     goal("files after the last wave over the first", later[-1].files / first.files, most=1.2)
     goal(

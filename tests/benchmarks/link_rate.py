@@ -4,10 +4,11 @@ Datagrams of 200 bytes cross it at a steady rate, one way; the rate grows until 
 of the forwarder's lateness is above the bound, or the kernel drops what it does not read in time.
 Then the rate is sought in between, to a tenth. This figure alone, on a quiet machine:
 
-    .venv/bin/pytest tests/benchmarks/test_link_speed.py -p no:cacheprovider -s
+    .venv/bin/pytest tests/benchmarks -k packets_in_time -p no:cacheprovider -s
 """
 
 import sys
+from pathlib import Path
 
 import pytest
 from benchmarks.goals import goal
@@ -63,7 +64,8 @@ def is_late(rate: int) -> bool:
     return report.is_disturbed
 
 
-def test_packets_a_second_until_the_emulated_link_is_late():
+def packets_in_time(_: Path) -> None:
+    """The most packets a second that the link passes in time."""
     need_link()
     late = next((rate for rate in RATES_HZ if is_late(rate)), None)
     assert late is not None, f"the link is in time at {RATES_HZ[-1]} packets/s: try more"

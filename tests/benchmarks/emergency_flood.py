@@ -19,11 +19,11 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from threading import Thread
 from typing import Any
 
 import numpy as np
-import pytest
 from benchmarks.goals import goal
 from helpers.console.served_console import Served, serving_phones
 from helpers.paths import TESTS
@@ -114,9 +114,19 @@ def measure(what: str, press: Callable[[str], object]) -> list[float]:
     return took
 
 
-@pytest.mark.parametrize("tls", [False, True], ids=["the console's port", "the phones' port"])
-def test_an_emergency_stop_under_a_flood_of_connections(tmp_path, tls):
-    with serving_phones(tmp_path) as served, ExitStack() as stack:
+def stop_at_the_console(folder: Path) -> None:
+    """On the console's port."""
+    stop_under_a_flood(folder, tls=False)
+
+
+def stop_at_a_phone(folder: Path) -> None:
+    """On the phones' port, which speaks TLS."""
+    stop_under_a_flood(folder, tls=True)
+
+
+def stop_under_a_flood(folder: Path, tls: bool) -> None:
+    """Stops of a button while connections come and stay."""
+    with serving_phones(folder) as served, ExitStack() as stack:
         port = served.phones_port if tls else served.port
         page = Supervisor(served, port, tls, stack)
         Thread(target=_simulate, args=(served,), daemon=True).start()

@@ -29,7 +29,7 @@ def cpu_used_s() -> float:
     return sum(map(int, (user, nice, system, *interrupts))) / os.sysconf("SC_CLK_TCK")
 
 
-def test_two_processes_are_nearly_twice_as_fast_as_one(tmp_path, benchmark):
+def two_processes(folder: Path) -> None:
     """By the wall clock, so it is judged only if the cores had little else to do meanwhile.
 
     What else they did is all CPU time that the machine has spent but for that of the runs
@@ -37,21 +37,19 @@ def test_two_processes_are_nearly_twice_as_fast_as_one(tmp_path, benchmark):
     """
     if executors.cores() < 2:
         pytest.skip("needs two cores")
-    study, took, beside = kit.study_in(tmp_path, "persons=30"), {}, {}
+    study, took, beside = kit.study_in(folder, "persons=30"), {}, {}
     for jobs in (1, 2):
         begun, used = time.perf_counter(), cpu_used_s()
-        out = run_study(study, tmp_path / f"{jobs}", jobs=jobs, episode=kit.busy)
+        out = run_study(study, folder / f"{jobs}", jobs=jobs, episode=kit.busy)
         took[jobs], runs = time.perf_counter() - begun, len(kit.rows(out))
         others = cpu_used_s() - used - runs * kit.BUSY_S
         beside[jobs] = others / (took[jobs] * (os.cpu_count() or 1))
     ratio, is_idle = took[1] / took[2], max(beside.values()) < 0.1
     judged = "judged" if is_idle else "not judged: the cores were not idle"
-    benchmark.extra_info.update(two_over_one=round(ratio, 2), is_idle=is_idle, machine=load())
     print(
         f"\ntwo processes: {ratio:.2f} times as fast as one, {judged} ({runs} runs of "
-        f"{kit.BUSY_S} s of CPU: {took[1]:.1f} s, then {took[2]:.1f} s; all else took "
+        f"{kit.BUSY_S} s of CPU: {took[1]:.1f} s, then {took[2]:.1f} s; {load()}; all else took "
         f"{100 * beside[1]:.0f} %, then {100 * beside[2]:.0f} % of {os.cpu_count()} cores)"
     )
     if is_idle:
         goal("two processes over one", ratio, least=1.7)
-    benchmark(lambda: None)
