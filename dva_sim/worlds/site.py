@@ -182,6 +182,22 @@ class Site(FloorPlan):
         x, y = self.grid.to_xy(cell // columns + jitter[0], cell % columns + jitter[1]).tolist()
         return x, y
 
+    def place_in(self, room: str) -> tuple[float, float] | None:
+        """The place nearest to a room's middle [m] that a robot can reach; None if it has none.
+
+        Raises:
+            ConfigError: no such room.
+        """
+        cells = self._free_cells(FOOTPRINT, room)
+        if not len(cells):
+            return None
+        columns = self.grid.cells.shape[1]
+        places = self.grid.to_xy(cells // columns + 0.5, cells % columns + 0.5)
+        middle = self.ground_of(self.room(room)).centroid
+        offsets = places - np.array([middle.x, middle.y])
+        x, y = places[np.argmin(np.hypot(*offsets.T))].tolist()
+        return x, y
+
     def free_middles(self, clearance: float) -> Floats:
         """Middles `(n, 2)` [m] of all cells that `sample_free` chooses from."""
         columns = self.grid.cells.shape[1]

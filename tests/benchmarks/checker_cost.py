@@ -76,10 +76,10 @@ def ratio_of(act: Callable[[int], None], most: float) -> None:
 
 
 def runs(_: Path) -> None:
-    """A run with its checkers beside one without."""
+    """Measure a run with its checkers beside one without."""
     ratio_of(run, most=1.5)
 
 
 def storms(_: Path) -> None:
-    """The same of a storm."""
+    """Measure a storm with its checkers beside one without."""
     ratio_of(storm, most=1.6)

@@ -95,12 +95,12 @@ def from_the_command_to_the_drawn_map(folder: Path) -> None:
 
 
 def a_page_of_ten_robots(folder: Path) -> None:
-    """What the map costs the browser."""
+    """Measure the cost of a map of ten robots in the browser."""
     page_cost(folder, 10, 10, "caparica")
 
 
 def a_page_of_two_hundred_robots(folder: Path) -> None:
-    """The same of a crowd."""
+    """Measure the cost of a map of 200 robots in the browser."""
     page_cost(folder, 200, 100, "campus")
 
 

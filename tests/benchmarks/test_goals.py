@@ -40,5 +40,5 @@ MEASURES = (
 
 @pytest.mark.parametrize("measure", MEASURES, ids=lambda measure: measure.__name__)
 def test_goals_are_measured(measure: Callable[[Path], None], tmp_path: Path) -> None:
-    """A goal that is missed is told; only a measurement that cannot be made fails."""
+    """Print missed goals; only a measurement that cannot be made fails."""
     measure(tmp_path)

@@ -22,6 +22,25 @@ def test_every_room_of_caparica_is_reached_from_every_base_by_a_robot():
             assert math.isfinite(planner.distance((base.x, base.y), goal))
 
 
+@pytest.mark.parametrize("name", ["caparica", "hall"])
+def test_a_robot_gets_to_the_place_that_stands_for_a_room(name):
+    site = load_site(name)
+    planner = Planner(site, 0.30)
+    base = site.robot_bases[0]
+    for room in site.rooms:
+        place = site.place_in(room.name)
+        assert place is not None
+        assert site.room_at(*place) == room.name
+        assert math.isfinite(planner.distance((base.x, base.y), place))
+
+
+def test_a_room_behind_a_wall_has_no_place(tmp_path):
+    closed = feature("room", "Polygon", square(20, 20, 3), name="vault")
+    site = load_site(write_site(tmp_path, [*TWO_ROOMS, closed]))
+    assert site.place_in("east") is not None
+    assert site.place_in("vault") is None
+
+
 def test_bases_posts_and_desks_of_caparica_stand_free():
     site = load_site("caparica")
     for pose in (*site.robot_bases, *site.guard_posts, *site.operator_desks):

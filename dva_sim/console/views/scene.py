@@ -16,6 +16,7 @@ from dva_sim.console.wire.scenes import (
     LegendEntry,
     LinkShown,
     PatternShown,
+    Point,
     RasterShown,
     SceneLine,
     SiteShown,
@@ -111,6 +112,7 @@ def site_of(site: Site) -> SiteShown:
                 "holes_m": [_rounded(hole) for hole in room.holes],
                 "floor": floor_tint(room, tints),
                 "outdoor": room.outdoor,
+                "place_m": _place_in(site, room.name),
             }
             for room in site.rooms
         ],
@@ -122,6 +124,11 @@ def site_of(site: Site) -> SiteShown:
     if not site.rooms:
         shown["raster"] = raster_of(site)
     return shown
+
+
+def _place_in(site: Site, room: str) -> Point | None:
+    place = site.place_in(room)
+    return None if place is None else [round(place[0], 2), round(place[1], 2)]
 
 
 def raster_of(site: Site) -> RasterShown:

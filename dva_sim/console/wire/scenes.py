@@ -49,6 +49,7 @@ class RoomShown(TypedDict):
     holes_m: list[list[Point]]
     floor: str
     outdoor: bool
+    place_m: Point | None
 
 
 class RasterShown(TypedDict):

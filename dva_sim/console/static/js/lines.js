@@ -6,7 +6,7 @@
 /**
  * A room of a site.
  * @typedef {{name: string, polygon_m: number[][], holes_m: number[][][], floor: string,
- *   outdoor: boolean}} Room
+ *   outdoor: boolean, place_m: number[] | null}} Room
  */
 /**
  * A grid whose row 0 lies to the south; its cells as base64.

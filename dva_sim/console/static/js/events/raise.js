@@ -29,22 +29,17 @@ const goals = () => {
   return at ? [{ x: at[0], y: at[1], radius: 0.6, name: 'here' }] : [];
 };
 
-/** Place of the new event [m]: the chosen one, else the middle of the first room. */
+/** Place of the new event [m]: the chosen one, else where robots get in the first room, else the middle. */
 function where() {
-  return place.value ?? middle(rooms()[0]?.polygon_m ?? [extent()]);
+  return place.value ?? rooms().find((room) => room.place_m)?.place_m ?? middle();
 }
 
 const rooms = () => (scene.value?.site.rooms ?? []).filter((room) => !room.outdoor);
 
-function extent() {
+/** @returns {[number, number]} */
+function middle() {
   const [left, low, right, high] = scene.value?.site.extent_m ?? [0, 0, 0, 0];
   return [(left + right) / 2, (low + high) / 2];
-}
-
-/** @param {number[][]} points @returns {[number, number]} */
-function middle(points) {
-  const sum = points.reduce(([x, y], [px, py]) => [x + px, y + py], [0, 0]);
-  return [sum[0] / points.length, sum[1] / points.length];
 }
 
 function Form() {
@@ -64,7 +59,7 @@ function Form() {
   return html`<div class="report">
     <${Choice} name="Kind" value=${kind} options=${KINDS} onInput=${setKind} />
     <${Choice} name="Severity" value=${severity} options=${SEVERITIES} onInput=${setSeverity} />
-    <${Rooms} />
+    <${Rooms} refuse=${setResult} />
     <${Field} name="x, m" mode="decimal" value=${shown(x)} wrong=${wrong[0]} onInput=${set(0)} />
     <${Field} name="y, m" mode="decimal" value=${shown(y)} wrong=${wrong[1]} onInput=${set(1)} />
     <button type="button" class="wide" disabled=${!maySteer.value || Boolean(wrong[0] || wrong[1])}
@@ -83,12 +78,14 @@ const set = (axis) => (/** @type {string} */ text) => {
   place.value = at;
 };
 
-function Rooms() {
+/** @param {{refuse: (text: string) => void}} props */
+function Rooms({ refuse }) {
   const names = [...new Set(rooms().map((room) => room.name))];
   if (!names.length) return null;
   const go = (/** @type {string} */ name) => {
     const room = rooms().find((each) => each.name === name);
-    if (room) place.value = middle(room.polygon_m);
+    if (room?.place_m) place.value = room.place_m;
+    refuse(room && !room.place_m ? `No robot gets into ${name}: click on the map where it is.` : '');
   };
   const options = /** @type {[string, string][]} */ ([['', 'choose a room'], ...names.map((n) => [n, n])]);
   return html`<${Choice} name="Room" value="" options=${options} onInput=${go} />`;
