@@ -81,7 +81,25 @@ class RequestTap(Protocol):
         """A publication has reached the node."""
 
 
-class Transport(Protocol):
+class RequestTransport(Protocol):
+    """Transport of requests from one node to another."""
+
+    @property
+    def clock(self) -> Clock:
+        """The clock that all who use this transport share."""
+
+    def connect(self, node: str, peer: str, on_reply: OnReply, pipelined: bool) -> Wire:
+        """Open a connection from `node` to the service of `peer`."""
+
+
+class CommandSockets(RequestTransport, Protocol):
+    """Transport of commands under any pattern."""
+
+    def publish(self, node: str, topic: str, payload: Any, size: int) -> None:
+        """Send a payload, which counts as `size` bytes [B], to the subscribers of a topic."""
+
+
+class Transport(CommandSockets, Protocol):
     """Transport of messages between nodes; a node is named by the id of its device.
 
     Attributes:
@@ -89,10 +107,6 @@ class Transport(Protocol):
     """
 
     taps: dict[str, RequestTap]
-
-    @property
-    def clock(self) -> Clock:
-        """The clock that all who use this transport share."""
 
     def introduce(self, node: str, address: str) -> None:
         """Say where a node is found, as in its registration."""
@@ -102,12 +116,6 @@ class Transport(Protocol):
 
     def serve(self, node: str, service: Service) -> None:
         """Let `service` take the requests to `node`."""
-
-    def connect(self, node: str, peer: str, on_reply: OnReply, pipelined: bool) -> Wire:
-        """Open a connection from `node` to the service of `peer`."""
-
-    def publish(self, node: str, topic: str, payload: Any, size: int) -> None:
-        """Send a payload, which counts as `size` bytes [B], to the subscribers of a topic."""
 
     def ready(self, node: str, topic: str, size: int) -> bool:
         """Return True if a topic has a subscriber, and `size` more bytes [B] need not wait."""
@@ -155,7 +163,7 @@ class Requester:
 
     def __init__(
         self,
-        transport: Transport,
+        transport: RequestTransport,
         node: str,
         peer: str,
         timeout: float,

@@ -12,7 +12,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, get_type_hints
 
@@ -21,8 +21,21 @@ from numpy.typing import NDArray
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
+from dva_sim.network.age_in_force import AgeInForce, Floats
 from dva_sim.network.link import LinkConfig
 from dva_sim.network.link.losses import Bursts
+from dva_sim.network.messaging import CommandSockets
+from dva_sim.network.workload import (
+    UNBOUNDED,
+    MessageForm,
+    Note,
+    NoteKind,
+    NoteTaker,
+    OperatorEnd,
+    OperatorWorkload,
+    PublishEnd,
+    RequestEnd,
+)
 
 UNLIMITED_BPS = 1e12
 COMMAND_BYTES = 400
@@ -179,6 +192,30 @@ class Condition:
         return cls(**{name: _read(name, str(row[name])) for name in CONDITION if name in row})
 
 
+def operator_of(
+    condition: Condition, transport: CommandSockets, form: MessageForm, note: NoteTaker
+) -> OperatorWorkload:
+    """Return the operator's program of a condition, over any transport.
+
+    Args:
+        transport: Carries the commands.
+        form: Their bytes.
+        note: Adds notes.
+    """
+    in_step = condition.pattern == "req-rep"
+    end: OperatorEnd
+    if in_step:
+        assert condition.timeout_ms is not None
+        assert condition.attempts is not None
+        timeout = condition.timeout_ms / 1000.0
+        end = RequestEnd(transport, form, timeout=timeout, attempts=condition.attempts)
+    elif condition.pattern == "pipelined":
+        end = RequestEnd(transport, form, window=UNBOUNDED)
+    else:
+        end = PublishEnd(transport, form)
+    return OperatorWorkload(transport.clock, end, note, condition.hz, in_step)
+
+
 CONDITION = tuple(field.name for field in dataclasses.fields(Condition))
 """The columns of a condition, in their order."""
 
@@ -251,13 +288,11 @@ def _read(name: str, text: str) -> Any:
         raise ConfigError(f"{name} {text!r} is not a number that {name} can have") from None
 
 
-Floats = NDArray[np.float64]
 Measures = dict[str, float]
 """Name to value; nan where it is not defined."""
 
 MS = 1000.0
 PERCENTILES = (50, 95, 99)
-_TIE_S = 1e-6
 
 
 @dataclass
@@ -266,9 +301,9 @@ class RunLog:
 
     Attributes:
         start: Time at which the first command was due.
-        issued: Time at which each command was first sent; its index is its number.
-        applied: Number of each command whose processing ended, and when; repetitions count.
-        replied: Number of each command whose reply arrived, and when.
+        issued: Time at which each command was first sent.
+        applied: Index of each command whose processing ended, and when; repetitions count.
+        replied: Index of each command whose reply arrived, and when.
         timeouts: Times at which the operator gave up waiting for a reply.
         alerts: Times at which the operator gave up a command after the last attempt.
         connected_s: Time from opening the first socket to TCP's connection [s].
@@ -284,6 +319,34 @@ class RunLog:
     connected_s: float = math.nan
     handshake_s: float = math.nan
 
+    @classmethod
+    def of(cls, notes: Iterable[Note]) -> RunLog:
+        """The log that both programs' notes come to."""
+        times: dict[NoteKind, list[tuple[int, float]]] = {kind: [] for kind in NoteKind}
+        for kind, number, at in notes:
+            times[kind].append((number - 1, at))
+        opened, connected, ready, started = (
+            times[kind][0][1] if times[kind] else math.nan
+            for kind in (NoteKind.OPENED, NoteKind.CONNECTED, NoteKind.READY, NoteKind.STARTED)
+        )
+        return cls(
+            start=started,
+            issued=list(dict(times[NoteKind.SENT]).values()),
+            applied=times[NoteKind.APPLIED],
+            replied=times[NoteKind.REPLIED],
+            timeouts=[at for _, at in times[NoteKind.TIMEOUT]],
+            alerts=[at for _, at in times[NoteKind.ALERT]],
+            connected_s=connected - opened,
+            handshake_s=ready - opened,
+        )
+
+    def arrivals(self) -> tuple[Floats, Floats]:
+        """Return the times of sending and application of the applied commands [s], `(n,)` each."""
+        return (
+            np.array([self.issued[index] for index, _ in self.applied]),
+            np.array([at for _, at in self.applied]),
+        )
+
 
 def measure_log(log: RunLog, warm_s: float, dur_s: float) -> Measures:
     """Every measure of a run, times in [ms], rates in [1/s].
@@ -296,8 +359,7 @@ def measure_log(log: RunLog, warm_s: float, dur_s: float) -> Measures:
     - `first_seq`: lowest number of a command that was ever applied;
     - `age_*`: application minus first sending, of the applications within the window;
     - `rtt_*`: reply minus first sending, of the commands sent within the window;
-    - `stale_*`: age of the command applied last, looked at every 5 ms; time since the start
-      before there is one;
+    - `stale_*`: age of the command in force (`AgeInForce`), looked at every 5 ms;
     - `gap_*`: between applications; the window's ends count as such;
     - `timeouts`, `alerts`: within the window; what a publisher does not have counts as 0;
     - `t_conn_ms`, `t_hs_ms`: connecting, and the whole handshake.
@@ -320,7 +382,8 @@ def measure_log(log: RunLog, warm_s: float, dur_s: float) -> Measures:
     found["first_seq"] = float(numbers.min()) if len(numbers) else math.nan
     found |= summary("age", applied[inside] - issued[numbers[inside]])
     found |= summary("rtt", _round_trips(log, issued, sent, end))
-    found |= summary("stale", _stale(issued, numbers, applied, warm_s, dur_s))
+    looks = np.asarray(warm_s + STALE_STEP_S * np.arange(round(dur_s / STALE_STEP_S)))
+    found |= summary("stale", AgeInForce(issued[numbers], applied, 0.0).at(looks))
     gaps = np.diff(np.concatenate([[warm_s], applied[inside], [end]])) * MS
     found |= {"gap_p95": float(np.percentile(gaps, 95)), "gap_max": float(gaps.max())}
     for name, times in (("timeouts", log.timeouts), ("alerts", log.alerts)):
@@ -356,20 +419,3 @@ def _round_trips(log: RunLog, issued: Floats, sent: NDArray[np.bool_], end: floa
         if sent[number] and when - log.start < end
     ]
     return np.array(trips)
-
-
-def _stale(
-    issued: Floats,
-    numbers: NDArray[np.intp],
-    applied: Floats,
-    warm_s: float,
-    dur_s: float,
-) -> Floats:
-    """Age of what is in force at each look; from the start on before anything is.
-
-    A command applied at the very moment of a look is not seen by it: real programs are never
-    early, and where commands keep step with the looks a tie would be worth a whole step.
-    """
-    looks = warm_s + STALE_STEP_S * np.arange(round(dur_s / STALE_STEP_S))
-    origins = np.concatenate([[0.0], issued[numbers]])
-    return np.asarray(looks - origins[np.searchsorted(applied + _TIE_S, looks)])

@@ -221,6 +221,40 @@ class LiveClock(Clock):
         return time.monotonic_ns() // 1000 - self._origin
 
 
+class ProgramClock(LiveClock):
+    """Real time by `time.monotonic`, for programs whose times are measured.
+
+    What is late happens when it does happen, not when it was due. The kernel's waits end before the
+    next event: they count whole milliseconds.
+
+    Args:
+        serve: Does what is pending until a time [s], or for a shorter while; by default it waits
+            for the sockets that are watched.
+    """
+
+    def __init__(self, serve: Callable[[float], object] | None = None) -> None:
+        super().__init__(epoch=0.0)
+        self._serve = serve or self._poll
+
+    @override
+    def step(self) -> None:
+        self._set(max(self._now_us, self._real()))
+        self.env.step()
+
+    @override
+    def _wait(self, end: float) -> None:
+        self._serve(min(self.env.peek(), end) / US)
+        self._catch_up(end)
+
+    def _poll(self, until: float) -> None:
+        ready = self._poller.poll(max(0.0, until - time.monotonic() - 0.001))
+        self._set(max(self._now_us, self._real()))
+        for source in ready:
+            handler = self._handlers.get(source)
+            if handler is not None:
+                handler()
+
+
 MOST_BEHIND = 1.0  # so far a paced clock runs after the wall clock; what is more is given up [s]
 HEEDED = 0.02  # what is less late is in time [s]
 FASTEST = 20.0  # that a paced clock goes, as a multiple of real time

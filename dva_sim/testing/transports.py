@@ -19,7 +19,7 @@ from dva_sim.network.middleware import (
     TransportError,
     load_transport,
 )
-from dva_sim.network.middleware.programs import command
+from dva_sim.network.middleware.programs import TELE_OP
 from dva_sim.testing.promises import Case, Outcome, broken_in, kept, part_by_part
 
 COMMANDS: Final = 20
@@ -95,8 +95,8 @@ class _Trial:
     def _commands(self, near: TransportEnd, robot: _Robot) -> Iterator[Case]:
         taken: list[bytes] = []
         for number in range(1, COMMANDS + 1):
-            if near.send(command(number)):
-                taken.append(command(number))
+            if near.send(TELE_OP.command(number)):
+                taken.append(TELE_OP.command(number))
             if late := list(_served(near)):
                 yield from late
                 return
@@ -130,7 +130,7 @@ class _Trial:
             robot.pause()
             start = time.monotonic()
             for number in range(1, AWAY + 1):
-                near.send(command(number))
+                near.send(TELE_OP.command(number))
             took = time.monotonic() - start
             robot.go_on()
             near.close()

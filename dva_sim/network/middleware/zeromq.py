@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import math
 import time
+from collections import deque
+from contextlib import suppress
 from typing import Final, Literal
 
 import zmq
 from typing_extensions import override
 
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.network.messaging import OnReply, Requester, Wire
 from dva_sim.network.middleware.ends import (
     CommandTransport,
     Receive,
@@ -18,6 +20,8 @@ from dva_sim.network.middleware.ends import (
     TransportError,
     connected,
 )
+from dva_sim.network.realtime import LiveClock, ProgramClock, Socket
+from dva_sim.network.workload import OPERATOR, ROBOT, UNBOUNDED
 
 HIGH_WATER_MARK: Final = 1000  # ZeroMQ's own [messages]
 Pattern = Literal["req-rep", "pub-sub", "conflate"]
@@ -26,7 +30,38 @@ _SOCKETS: Final = {
     "pub-sub": (zmq.PUB, zmq.SUB),
     "conflate": (zmq.PUB, zmq.SUB),
 }
-_Socket = zmq.Socket[bytes]
+
+
+class PlainWire(Wire):
+    """A connected REQ or DEALER socket, whose replies come in the order of its requests.
+
+    Args:
+        clock: Waits for the replies.
+        socket: The socket.
+        on_reply: Callback for the tag and the bytes of each reply.
+    """
+
+    def __init__(self, clock: LiveClock, socket: Socket, on_reply: OnReply) -> None:
+        self._clock = clock
+        self._socket = socket
+        self._on_reply = on_reply
+        self._tags: deque[int] = deque()
+        clock.watch(socket, self._hear)
+
+    @override
+    def send(self, tag: int, data: bytes) -> None:
+        with suppress(zmq.Again):  # without room the request is gone
+            self._socket.send(data, zmq.NOBLOCK)
+            self._tags.append(tag)
+        self._clock.look(self._socket)
+
+    @override
+    def close(self) -> None:
+        self._clock.unwatch(self._socket)
+        self._socket.close(0)
+
+    def _hear(self) -> None:
+        self._on_reply(self._tags.popleft(), self._socket.recv())
 
 
 class ZeroMqTransport(CommandTransport):
@@ -57,13 +92,13 @@ class ZeroMqTransport(CommandTransport):
     def near(self, place: Rendezvous, receive: Receive) -> TransportEnd:
         kind = _Requests if self.pattern == "req-rep" else _Sockets
         end = kind(self, place, receive, is_near=True)
-        return connected(end, lambda: end.connect(place.ready_by))
+        return connected(end, lambda: end.await_robot(place.ready_by))
 
     @override
     def far(self, place: Rendezvous, receive: Receive) -> TransportEnd:
         return _Sockets(self, place, receive, is_near=False)
 
-    def opened(self, context: zmq.Context[_Socket], kind: int) -> _Socket:
+    def opened(self, context: zmq.Context[Socket], kind: int) -> Socket:
         """A socket with these options."""
         socket = context.socket(kind)
         socket.linger = 0
@@ -81,27 +116,28 @@ class _Sockets(TransportEnd):
     def __init__(
         self, options: ZeroMqTransport, place: Rendezvous, receive: Receive, is_near: bool
     ) -> None:
-        self._options = options
+        self.options = options
         self._receive = receive
-        self._context = zmq.Context[_Socket]()
-        self._commands_at = f"tcp://{place.far}:{place.port}"
+        self.clock = ProgramClock()
+        self.context = zmq.Context[Socket]()
+        self.commands_at = f"tcp://{place.far}:{place.port}"
         pictures_at = f"tcp://{place.far}:{place.port + 1}"
         near, far = _SOCKETS[options.pattern]
-        self._poller = zmq.Poller()
-        self.commands = options.opened(self._context, near if is_near else far)
-        self.pictures = options.opened(self._context, zmq.SUB if is_near else zmq.PUB)
+        self.commands = options.opened(self.context, near if is_near else far)
+        self.pictures = options.opened(self.context, zmq.SUB if is_near else zmq.PUB)
         if is_near:
             self.pictures.connect(pictures_at)
         else:
-            self.commands.bind(self._commands_at)
+            self.commands.bind(self.commands_at)
             self.pictures.bind(pictures_at)
-        self._poller.register(self.pictures if is_near else self.commands, zmq.POLLIN)
-        self._is_near = is_near
+        heard = self.pictures if is_near else self.commands
+        self.clock.watch(heard, lambda: self._hear(heard))
+        self._sends = self.commands if is_near else self.pictures
 
-    def connect(self, ready_by: float) -> None:
+    def await_robot(self, ready_by: float) -> None:
         """Wait until the connection stands; a subscription takes a moment longer."""
         events = self.commands.get_monitor_socket(zmq.EVENT_HANDSHAKE_SUCCEEDED)
-        self.commands.connect(self._commands_at)
+        self.commands.connect(self.commands_at)
         is_open = events.poll(max(0, int(1000 * (ready_by - time.monotonic()))))
         self.commands.disable_monitor()
         events.close(0)  # the context waits for it
@@ -111,33 +147,23 @@ class _Sockets(TransportEnd):
     @override
     def send(self, data: bytes) -> bool:
         try:
-            (self.commands if self._is_near else self.pictures).send(data, zmq.NOBLOCK)
+            self._sends.send(data, zmq.NOBLOCK)
         except zmq.Again:
             return False
         return True
 
     @override
     def serve(self, until: float) -> None:
-        while (left := until - time.monotonic()) > 0:
-            if left < 0.001:
-                time.sleep(left)  # polling counts whole milliseconds
-                return
-            heard = [self._hear(socket) for socket, _ in self._poller.poll(int(1000 * left))]
-            if any(heard):
-                return
+        self.clock.run(until)
 
-    def _hear(self, socket: _Socket) -> bool:
-        """Read a message; whether it was the answer to a command."""
+    def _hear(self, socket: Socket) -> None:
         reply = self._receive(socket.recv())
         if socket.type == zmq.REP:
             socket.send(reply or b"")
-        return False
 
     @override
     def close(self) -> None:
-        for socket in (self.commands, self.pictures):
-            socket.close(0)
-        self._context.term()
+        self.context.destroy(0)
 
 
 class _Requests(_Sockets):
@@ -147,45 +173,19 @@ class _Requests(_Sockets):
         self, options: ZeroMqTransport, place: Rendezvous, receive: Receive, is_near: bool
     ) -> None:
         super().__init__(options, place, receive, is_near)
-        self._poller.register(self.commands, zmq.POLLIN)
-        self._sent_at = -math.inf  # of the command that is under way [s]
-        self._data = b""
+        self._requester = Requester(self, OPERATOR, ROBOT, options.timeout_s, UNBOUNDED)
+
+    def connect(self, node: str, peer: str, on_reply: OnReply, pipelined: bool) -> PlainWire:
+        """Open a connection; after a time-out over a new socket, as REQ cannot otherwise."""
+        if self.commands.closed:
+            self.commands = self.options.opened(self.context, zmq.REQ)
+            self.commands.connect(self.commands_at)
+        return PlainWire(self.clock, self.commands, on_reply)
 
     @override
     def send(self, data: bytes) -> bool:
-        if self._is_busy() or not super().send(data):
+        self.clock.run(time.monotonic())
+        if self._requester.busy:
             return False
-        self._sent_at = time.monotonic()
-        self._data = data
+        self._requester.request(data, lambda _: self.clock.stop())  # it can send again
         return True
-
-    @override
-    def serve(self, until: float) -> None:
-        while self._is_busy() and (now := time.monotonic()) < until:
-            late = self._sent_at + self._options.timeout_s
-            if now >= late:
-                self._ask_again()
-            super().serve(min(until, late))
-            if not self._is_busy():
-                return
-        super().serve(until)
-
-    def _is_busy(self) -> bool:
-        return self._sent_at > -math.inf
-
-    def _hear(self, socket: _Socket) -> bool:
-        if socket is not self.commands:
-            return super()._hear(socket)
-        socket.recv()
-        self._sent_at = -math.inf
-        return True
-
-    def _ask_again(self) -> None:
-        """Send the same command over a new connection, as a REQ socket cannot otherwise."""
-        self._poller.unregister(self.commands)
-        self.commands.close(0)
-        self.commands = self._options.opened(self._context, zmq.REQ)
-        self.commands.connect(self._commands_at)
-        self._poller.register(self.commands, zmq.POLLIN)
-        self.commands.send(self._data)
-        self._sent_at = time.monotonic()

@@ -1,8 +1,8 @@
 """Measures over a table of commands or pictures, whatever carried them: one definition each.
 
-**Applied** is a command that arrived before any newer one: a robot drops older ones. Its **age** is
-from when it was made until then; for the age in force see `network.age_in_force`. The same holds
-of pictures that are shown. Columns that several models have are described here once.
+Which commands are applied, and how old the one in force is, `network.age_in_force` defines. The age
+of an applied command is from when it was made until it arrived; the same holds of pictures that are
+shown. Columns that several models have are described here once.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.kernel.measure import Measure
+from dva_sim.network.age_in_force import is_applied
 
 Row = dict[str, Any]
 Floats = NDArray[np.float64]
@@ -88,9 +89,10 @@ def applied(arrived: Floats) -> Bools:
     Args:
         arrived: Arrival times [s], shape `(n,)`; infinity if never.
     """
-    newer = np.minimum.accumulate(arrived[::-1])[::-1]
-    first_newer = np.append(newer[1:], math.inf)
-    return np.isfinite(arrived) & (arrived <= first_newer)
+    order = np.argsort(arrived, kind="stable")
+    found = np.empty(len(arrived), dtype=bool)
+    found[order] = is_applied(order)
+    return found & np.isfinite(arrived)
 
 
 def round_trips(made: Floats, arrived: Floats, taken: Floats, shown: Floats) -> Floats:

@@ -19,7 +19,7 @@ import numpy as np
 
 from dva_sim.kernel.measure import Measure
 from dva_sim.kernel.recorder import Applied, DriveLog
-from dva_sim.network.age_in_force import AgeInForce
+from dva_sim.network.age_in_force import AgesOverTime
 from dva_sim.simulation.measures.commands import (
     AGE_IN_FORCE,
     COMMAND_AGE_MEAN,
@@ -108,7 +108,7 @@ def command_ages(drives: Sequence[Driven]) -> Row:
     ages = np.array([a.time - a.issued for drive in drives for a in drive.applied])
     hold = np.concatenate([drive.hold for drive in drives])
     row = {"command_age_mean_s": mean(ages)} | percentiles("command_age", ages, QUANTILES)
-    return row | {"age_in_force_mean_s": AgeInForce(ages, hold).mean}
+    return row | {"age_in_force_mean_s": AgesOverTime(ages, hold).mean}
 
 
 def delay_budget(drives: Sequence[Driven], motor: float) -> Row:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from itertools import compress
 
 import numpy as np
 
 from dva_sim.kernel.measure import Measure
-from dva_sim.network.age_in_force import AgeInForce
-from dva_sim.network.middleware.programs import ProgramNote, ProgramNoteKind
+from dva_sim.network.age_in_force import AgeInForce, is_applied
+from dva_sim.network.workload import Note, NoteKind
 from dva_sim.simulation.measures.commands import (
     AGE_IN_FORCE,
     COMMAND_AGE_P50,
@@ -20,7 +21,6 @@ from dva_sim.simulation.measures.commands import (
     Floats,
     Row,
     percentiles,
-    ratio,
 )
 from dva_sim.simulation.middleware.run import MiddlewareRun, Window
 
@@ -70,22 +70,25 @@ def gaps(applied: Floats, window: Window) -> Floats:
 
 
 def command_row(
-    made: Floats, applied: Floats, window: Window, *, max_age_s: float, watchdog_s: float
+    made: Floats, arrived: Floats, window: Window, *, max_age_s: float, watchdog_s: float
 ) -> Row:
-    """Return the measures of the applied commands.
+    """Return the measures of the commands that arrived.
 
     Args:
-        made: Creation time of each command [s], shape `(n,)`, in the order of application.
-        applied: Time of application [s], shape `(n,)`.
+        made: Creation time of each command [s], in the order of arrival; shape `(n,)`.
+        arrived: Time of arrival [s], shape `(n,)`.
         window: The time looked at.
         max_age_s: The robot's limit.
         watchdog_s: The robot stops after so long without a newer command.
     """
-    force = AgeInForce.of_newest(made, applied, **window._asdict())
+    force = AgeInForce(made, arrived, window.start).over(window.since, window.until)
+    used = is_applied(made)
+    applied = arrived[used]
     pauses = gaps(applied, window)
     inside = (applied >= window.since) & (applied < window.until)
-    ages = (applied - made)[inside]
+    ages = (applied - made[used])[inside]
     return {
+        "outdated_share": 1.0 - float(used.mean()) if len(used) else math.nan,
         "command_rate_hz": float(inside.sum()) / window.length,
         **percentiles("command_age", ages, (50, 95)),
         "age_in_force_mean_s": force.mean,
@@ -117,43 +120,40 @@ def tables(run: MiddlewareRun) -> dict[str, list[Row]]:
     """A row of the run, and one of each command and picture."""
     scenario = run.scenario
     window = run.window
-    sent = _times(run.near, ProgramNoteKind.SENT)
-    refused = {note.number for note in run.near if note.kind is ProgramNoteKind.REFUSED}
-    applied = [note for note in run.far if note.kind is ProgramNoteKind.APPLIED]
-    outdated = [note for note in run.far if note.kind is ProgramNoteKind.OUTDATED]
-    arrived = _floats(note.time for note in applied)
-    made = _floats(sent[note.number] for note in applied)
-    taken = _times(run.far, ProgramNoteKind.PICTURE_TAKEN)
-    shown = run.near
-    pictures = [note for note in shown if note.kind is ProgramNoteKind.PICTURE_SHOWN]
+    sent = _times(run.near, NoteKind.SENT)
+    refused = {note.number for note in run.near if note.kind is NoteKind.REFUSED}
+    heard = [note for note in run.far if note.kind is NoteKind.APPLIED]
+    taken = _times(run.far, NoteKind.PICTURE_TAKEN)
+    shown = [note for note in run.near if note.kind is NoteKind.PICTURE_SHOWN]
     row = {
         **_connection(run),
         "commands": sum(window.since <= time < window.until for time in sent.values()),
         "not_taken": len(refused),
-        "outdated_share": ratio(len(outdated), len(outdated) + len(applied)),
         **command_row(
-            made,
-            applied=arrived,
-            window=window,
+            _floats(sent[note.number] for note in heard),
+            _floats(note.time for note in heard),
+            window,
             max_age_s=scenario.robot.max_age_s,
             watchdog_s=scenario.robot.watchdog_s,
         ),
         **picture_row(
-            _floats(taken[note.number] for note in pictures),
-            _floats(note.time for note in pictures),
+            _floats(taken[note.number] for note in shown),
+            _floats(note.time for note in shown),
             window,
         ),
         **_link_row(run),
     }
     return {
         "runs": [row],
-        "commands": _fates(sent, applied, window),
-        "pictures": _fates(taken, pictures, window),
+        "commands": _fates(
+            sent, compress(heard, is_applied([note.number for note in heard])), window
+        ),
+        "pictures": _fates(taken, shown, window),
     }
 
 
 def _connection(run: MiddlewareRun) -> Row:
-    ready = [note.time for note in run.near if note.kind is ProgramNoteKind.READY]
+    ready = [note.time for note in run.near if note.kind is NoteKind.READY]
     return {
         "connected": int(bool(ready)),
         "connected_after_s": ready[0] - run.window.start if ready else math.nan,
@@ -173,12 +173,12 @@ def _link_row(run: MiddlewareRun) -> Row:
     }
 
 
-def _times(notes: list[ProgramNote], kind: ProgramNoteKind) -> dict[int, float]:
+def _times(notes: list[Note], kind: NoteKind) -> dict[int, float]:
     """Return when each command or picture of some notes was made [s], by number."""
     return {note.number: note.time for note in notes if note.kind is kind}
 
 
-def _fates(made: dict[int, float], arrived: list[ProgramNote], window: Window) -> list[Row]:
+def _fates(made: dict[int, float], arrived: Iterable[Note], window: Window) -> list[Row]:
     """Return when each was made and arrived, in the run's time; nan for what never arrived."""
     found = {note.number: note.time - window.start for note in arrived}
     return [

@@ -145,8 +145,10 @@ def _counted(contest: Contest, fates: Fates) -> tuple[Floats, Floats, NDArray[np
 def _command_row(contest: Contest, made: Floats, arrived: Floats, counts: NDArray[np.bool_]) -> Row:
     crucial = counts & np.array(contest.commands.crucial)
     late = (arrived - made)[crucial & np.isfinite(arrived)]
-    ages = (arrived - made)[counts & applied(arrived)]
+    used = applied(arrived)
+    ages = (arrived - made)[counts & used]
     seconds = contest.until - contest.since
+    force = AgeInForce(made[used], arrived[used], start=0.0)
     return {
         "commands": int(counts.sum()),
         "delivered_share": mean(np.isfinite(arrived[counts])),
@@ -155,7 +157,7 @@ def _command_row(contest: Contest, made: Floats, arrived: Floats, counts: NDArra
         "command_rate_hz": len(ages) / seconds,
         "command_age_mean_s": mean(ages),
         **percentiles("command_age", ages, (50, 95)),
-        "age_in_force_mean_s": _in_force(contest, made, arrived).mean,
+        "age_in_force_mean_s": force.over(contest.since, contest.until).mean,
     }
 
 
@@ -167,12 +169,6 @@ def _picture_row(contest: Contest, made: Floats, arrived: Floats, counts: NDArra
         "picture_age_mean_s": mean(ages),
         "picture_age_p95_s": percentile(ages, 95),
     }
-
-
-def _in_force(contest: Contest, made: Floats, arrived: Floats) -> AgeInForce:
-    used = applied(arrived)
-    looked_at = {"start": 0.0, "since": contest.since, "until": contest.until}
-    return AgeInForce.of_newest(made[used], arrived[used], **looked_at)
 
 
 # --- rates -------------------------------------------------------------------------------

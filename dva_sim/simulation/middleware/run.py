@@ -17,12 +17,8 @@ from dva_sim.network.emulator.process import ADDRESSES, LinkProcess
 from dva_sim.network.emulator.report import LinkReport
 from dva_sim.network.link import LinkConfig
 from dva_sim.network.middleware import SIDES, Side, load_transport, programs
-from dva_sim.network.middleware.programs import (
-    NOT_CONNECTED,
-    Plan,
-    ProgramNote,
-    ProgramNotes,
-)
+from dva_sim.network.middleware.programs import NOT_CONNECTED, Plan
+from dva_sim.network.workload import FileNotes, Note
 from dva_sim.serving.processes import Child, end_all
 from dva_sim.simulation.middleware.scenario import MiddlewareScenario
 
@@ -47,8 +43,8 @@ class MiddlewareRun(NamedTuple):
     """Results of a run.
 
     Attributes:
-        near: ProgramNotes of the operator's program.
-        far: ProgramNotes of the robot's program.
+        near: Notes of the operator's program.
+        far: Notes of the robot's program.
         window: The time that was measured.
         link: Report of the link: packets, and its own lateness.
         attempts: Runs made until one was undisturbed; this is the last.
@@ -56,8 +52,8 @@ class MiddlewareRun(NamedTuple):
     """
 
     scenario: MiddlewareScenario
-    near: list[ProgramNote]
-    far: list[ProgramNote]
+    near: list[Note]
+    far: list[Note]
     window: Window
     link: LinkReport
     attempts: int
@@ -117,7 +113,7 @@ def _attempt(scenario: MiddlewareScenario, seed: int, attempt: int) -> Middlewar
         problem = _problem(near) or _problem(far)
         end_all([near, far], 0.0)
         report = link.report()
-        notes = [ProgramNotes.read(plan.folder / f"{side}.notes") for side in SIDES]
+        notes = [FileNotes.read(plan.notes(side).read_bytes()) for side in SIDES]
     if problem:
         raise RunsFailed(f"{scenario.transport.name}: {problem}")
     return MiddlewareRun(

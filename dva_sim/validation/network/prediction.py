@@ -1,19 +1,15 @@
 """The model plays a condition with what every run is made of: its network, requester and queue.
 
-Only the operator's program stands here, as the measured one has none of a phone's app. It sends on
-a fixed grid, or asks and waits for the reply. It ends with its last command: as soon as the next
-one would lie beyond the window, and a requester whose reply is still missing when the window ends.
-The robot's takes one command at a time, works on it, and answers.
+Both programs are those that are measured (`dva_sim.network.workload`); the robot's takes one
+command at a time from its queue. A run ends with the last command: as soon as the next one would
+lie beyond the window, and a requester whose reply is still missing when the window ends.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Literal
-
-from typing_extensions import override
 
 from dva_sim.agents.robot.command_queue import CommandQueue, Letter
 from dva_sim.kernel.clock import Clock
@@ -22,7 +18,6 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.network.connections import Connector, Load, ZeromqConfig, is_calm
 from dva_sim.network.link import Link, make_link
-from dva_sim.network.messaging import Requester
 from dva_sim.network.pattern_runs import (
     COMMAND_BYTES,
     REPLY_BYTES,
@@ -30,165 +25,33 @@ from dva_sim.network.pattern_runs import (
     Measures,
     RunLog,
     measure_log,
+    operator_of,
 )
 from dva_sim.network.tcp import TcpOptions
 from dva_sim.network.virtual_network import FRAMING, VirtualNetwork
+from dva_sim.network.workload import (
+    OPERATOR,
+    ROBOT,
+    UNBOUNDED,
+    Note,
+    NoteKind,
+    NumberedBytes,
+    RobotWorkload,
+)
 from dva_sim.network.zmtp import framed
 from dva_sim.validation.network.verdicts import OVERLOAD, PACKET_BYTES, is_bounded, load
 
-OPERATOR = "operator"
-ROBOT = "robot"
-TOPIC = ""  # the measured programs subscribe to everything, and publish one frame
-PAYLOAD_BYTES = framed(COMMAND_BYTES) - FRAMING - 2
-"""Size of a published command, with which it is as long on the wire as the measured one."""
-NUMBER_BYTES = 8
-UNBOUNDED = 1 << 30  # a queue, buffer or time that nothing here fills
-
-
-def message(number: int, size: int) -> bytes:
-    """Bytes of a request, or a reply, that are as long on the wire as the measured ones.
-
-    Those have an empty frame before them.
-    """
-    wire = framed(0) + framed(size)
-    return number.to_bytes(NUMBER_BYTES, "little").ljust(wire - FRAMING, b".")
-
-
-def number_in(data: bytes) -> int:
-    """Number of the command of a message."""
-    return int.from_bytes(data[:NUMBER_BYTES], "little")
-
-
-class ModelProgram:
-    """Base of the operator's programs.
-
-    Args:
-        network: Carries the commands.
-        condition: Rate, time-out, window.
-        log: Log of the run.
-
-    Attributes:
-        ended: End of the program [s]; None while it runs.
-    """
-
-    def __init__(self, network: VirtualNetwork, condition: Condition, log: RunLog) -> None:
-        self._network = network
-        self._condition = condition
-        self._log = log
-        self._clock = network.clock
-        self._period = 1.0 / condition.hz
-        self._end = 0.0
-        self.ended: float | None = None
-
-    def connect(self) -> None:
-        """Connect to the robot, as far as a program does that before its first command."""
-
-    def start(self) -> None:
-        """The first command is due now."""
-        now = self._log.start = self._clock.now
-        self._end = now + self._condition.warm_s + self._condition.dur_s
-        self._clock.call_at(self._end, self._stop)
-        self._next()
-
-    def _next(self) -> None:
-        """Send a command."""
-        raise NotImplementedError
-
-    def _issue(self) -> int:
-        """Note that a command is issued now; its number."""
-        self._log.issued.append(self._clock.now)
-        return len(self._log.issued) - 1
-
-    def _schedule(self, due: float, action: Callable[[], object]) -> None:
-        """Go on at `due` [s], or end now if that is too late."""
-        if due >= self._end - 1e-9:
-            self._stop()
-        elif self.ended is None:
-            self._clock.call_at(due, action)
-
-    def _stop(self) -> None:
-        if self.ended is None:
-            self.ended = self._clock.now
-
-    def _replied(self, reply: bytes) -> None:
-        self._log.replied.append((number_in(reply), self._clock.now))
-
-
-class Publishing(ModelProgram):
-    """Publishes: command k is sent at start + k / hz."""
-
-    @override
-    def _next(self) -> None:
-        self._send(self._issue())
-        due = self._log.start + len(self._log.issued) * self._period
-        self._schedule(due, self._next)
-
-    def _send(self, number: int) -> None:
-        data = number.to_bytes(NUMBER_BYTES, "little")
-        self._network.publish(OPERATOR, TOPIC, data, PAYLOAD_BYTES)
-
-
-class Dealing(Publishing):
-    """Asks on the same grid, without waiting for replies."""
-
-    @override
-    def connect(self) -> None:
-        self._requests = Requester(
-            self._network, OPERATOR, ROBOT, float(UNBOUNDED), attempts=1, window=UNBOUNDED
-        )
-        self._requests.open()
-
-    @override
-    def _send(self, number: int) -> None:
-        self._requests.request(message(number, COMMAND_BYTES), self._replied)
-
-
-class Asking(ModelProgram):
-    """Requests: the next command goes at the later of the reply and the last issue + 1 / hz.
-
-    After a time-out the same command goes over a new socket; after the last attempt it is
-    given up, and the next command follows.
-    """
-
-    @override
-    def connect(self) -> None:
-        condition = self._condition
-        assert condition.timeout_ms is not None
-        assert condition.attempts is not None
-        self._requests = Requester(
-            self._network, OPERATOR, ROBOT, condition.timeout_ms / 1000.0, condition.attempts
-        )
-        self._requests.on_timeout = lambda: self._log.timeouts.append(self._clock.now)
-        self._requests.open()
-
-    @override
-    def _next(self) -> None:
-        if self.ended is None:
-            data = message(self._issue(), COMMAND_BYTES)
-            self._requests.request(data, self._answered, self._failed)
-
-    def _answered(self, reply: bytes) -> None:
-        self._replied(reply)
-        self._go_on()
-
-    def _failed(self) -> None:
-        self._log.alerts.append(self._clock.now)
-        self._go_on()
-
-    def _go_on(self) -> None:
-        self._schedule(max(self._clock.now, self._log.issued[-1] + self._period), self._next)
-
+PUBLISHED = NumberedBytes(framed(COMMAND_BYTES) - FRAMING - 2, 0)
+REQUESTED = NumberedBytes(
+    *(framed(0) + framed(size) - FRAMING for size in (COMMAND_BYTES, REPLY_BYTES))
+)
+"""Messages that are as long on the wire as the measured ones; requests have an empty frame."""
 
 CONFLATES: dict[str, Literal["none", "publisher", "subscriber", "both"]] = {
     "none": "none",
     "op": "publisher",
     "rob": "subscriber",
     "both": "both",
-}
-PROGRAMS: dict[str, type[ModelProgram]] = {
-    "req-rep": Asking,
-    "pub-sub": Publishing,
-    "pipelined": Dealing,
 }
 NEVER_EARLY_S = 1e-6
 """Work takes at least what it should: this decides which comes first, where its end and the
@@ -232,8 +95,7 @@ def predict(
         ConfigError: there is no such mechanism.
     """
     run = PredictedRun(condition, Streams(seed), depth_for(condition, depth), without)
-    run.play()
-    return measure_log(run.log, condition.warm_s, condition.dur_s)
+    return measure_log(run.play(), condition.warm_s, condition.dur_s)
 
 
 def depth_for(condition: Condition, depth: Depth = "auto") -> Played:
@@ -280,16 +142,14 @@ class PredictedRun:
         streams: Random streams of the link.
         depth: Depth of the simulated connections.
         without: Mechanisms of TCP to leave out.
-
-    Attributes:
-        log: Log of the run.
     """
 
     def __init__(
         self, condition: Condition, streams: Streams, depth: Played, without: Sequence[str]
     ) -> None:
         self._condition = condition
-        self.log = RunLog()
+        self._notes: list[Note] = []
+        self._is_open = self._is_begun = False
         self._clock = Clock()
         up, down = make_links(condition, streams)
         self._network = VirtualNetwork(
@@ -298,13 +158,14 @@ class PredictedRun:
             connector=_connector(condition, depth, without),
         )
         self._network.on_open = self._opened
-        self._program = PROGRAMS[condition.pattern](self._network, condition, self.log)
         service = condition.proc_ms / 1000.0 + NEVER_EARLY_S
         published = condition.pattern == "pub-sub"
+        form = PUBLISHED if published else REQUESTED
+        self._robot = RobotWorkload(form, self._note)
         self._queue = CommandQueue(
             self._clock,
             lambda: service,
-            self._applied,
+            self._serve,
             latest_wins=condition.conflate in ("rob", "both"),
             limit=condition.hwm if published else UNBOUNDED,
         )
@@ -312,39 +173,44 @@ class PredictedRun:
         if published:
             # The operator connects: who answers is there when its first packet has arrived.
             self._clock.call_at(condition.delay_ms / 1000.0, self._subscribe)
-        self._program.connect()
+        self._note(NoteKind.OPENED, 0)
+        self._operator = operator_of(condition, self._network, form, self._note)
 
-    def play(self) -> None:
-        """Let time pass until the operator's program has ended."""
+    def play(self) -> RunLog:
+        """Let time pass until the operator's program has ended; the log up to then."""
         if not self._condition.wait_hs:
-            self._program.start()
-        while self._program.ended is None and (self.log.issued or self._clock.now < _PATIENCE_S):
+            self._begin()
+        while self._operator.ended is None and (self._is_begun or self._clock.now < _PATIENCE_S):
             self._clock.run(self._clock.now + 1.0)
-        ended = self._program.ended or 0.0
-        self.log.applied = [item for item in self.log.applied if item[1] <= ended]
-        self.log.replied = [item for item in self.log.replied if item[1] <= ended]
+        ended = self._operator.ended or 0.0
+        return RunLog.of(note for note in self._notes if note.time <= ended)
+
+    def _note(self, kind: NoteKind, number: int, at: float | None = None) -> None:
+        self._notes.append(Note(kind, number, self._clock.now if at is None else at))
 
     def _opened(self, node: str, peer: str) -> None:
         """A connection stands: after the first the operator's program starts, a publisher later."""
-        if not math.isnan(self.log.handshake_s):
+        if self._is_open:
             return
+        self._is_open = True
         condition = self._condition
-        now = self._clock.now
-        self.log.handshake_s = now - (condition.delay_ms / 1000.0 if node == ROBOT else 0.0)
+        late = condition.delay_ms / 1000.0 if node == ROBOT else 0.0
+        ready = self._clock.now - late
+        self._note(NoteKind.READY, 0, ready)
         if condition.wait_hs:
-            due = self.log.handshake_s + condition.subscription_wait_s
-            self._clock.call_at(due, self._program.start)
+            self._clock.call_at(ready + condition.subscription_wait_s, self._begin)
 
-    # --- the robot ---------------------------------------------------------------------------
+    def _begin(self) -> None:
+        self._is_begun = True
+        self._operator.start(self._clock.now + self._condition.warm_s + self._condition.dur_s)
 
     def _subscribe(self) -> None:
-        self._queue.flow = self._network.subscribe(ROBOT, OPERATOR, TOPIC, self._queue.published)
+        self._queue.flow = self._network.subscribe(ROBOT, OPERATOR, "", self._queue.published)
 
-    def _applied(self, letter: Letter) -> None:
-        number = number_in(letter.data)
-        self.log.applied.append((number, self._clock.now))
-        if letter.answer is not None:
-            letter.answer(message(number, REPLY_BYTES))
+    def _serve(self, letter: Letter) -> None:
+        reply = self._robot.obey(letter.data)
+        if letter.answer is not None and reply is not None:
+            letter.answer(reply)
 
 
 def _connector(condition: Condition, depth: Played, without: Sequence[str]) -> Connector:

@@ -1,5 +1,6 @@
 """Both programs: what the robot obeys and notes, what the operator sends when it may."""
 
+import os
 import subprocess
 import sys
 import time
@@ -10,13 +11,12 @@ from helpers.network.free_ports import free_port
 from dva_sim.network.middleware import CommandTransport, TransportEnd
 from dva_sim.network.middleware.programs import (
     NOT_CONNECTED,
-    OperatorProgram,
+    TELE_OP,
     Plan,
-    ProgramNoteKind,
-    ProgramNotes,
-    RobotProgram,
-    command,
+    run_operator,
+    run_robot,
 )
+from dva_sim.network.workload import FileNotes, NoteKind
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.messages import OK, Heartbeat, make_message
 
@@ -57,67 +57,57 @@ def plan(tmp_path, **changed):
     return Plan(near="127.0.0.1", far="127.0.0.1", folder=tmp_path, **usual | changed)
 
 
-def kinds(path):
-    return [(note.kind, note.number) for note in ProgramNotes.read(path)]
+@pytest.fixture
+def notes(tmp_path):
+    return FileNotes(os.open(tmp_path / "notes", os.O_RDWR | os.O_CREAT))
 
 
-def test_the_robot_obeys_what_is_newer_and_notes_what_is_not(tmp_path):
-    transport, path = Scripted(), tmp_path / "notes"
-    RobotProgram(transport, plan(tmp_path), ProgramNotes(path))
+def kinds(tmp_path):
+    return [(note.kind, note.number) for note in FileNotes.read((tmp_path / "notes").read_bytes())]
+
+
+def test_the_robot_answers_commands_and_notes_what_it_cannot_read(tmp_path, notes):
+    transport = Scripted()
+    run_robot(transport, plan(tmp_path, until=time.monotonic() - 60.0), notes)
     heartbeat = encode(
         make_message("02:00:00:00:00:02", 9, "02:00:00:00:00:01", "12:00:00", None, Heartbeat())
     )
-    replies = [
-        transport.deliver(data)
-        for data in (command(1), command(3), command(2), command(3), b"<", heartbeat, command(4))
-    ]
-    assert kinds(path) == [
-        (ProgramNoteKind.APPLIED, 1),
-        (ProgramNoteKind.APPLIED, 3),
-        (ProgramNoteKind.OUTDATED, 2),
-        (ProgramNoteKind.OUTDATED, 3),
-        (ProgramNoteKind.UNREADABLE, 0),
-        (ProgramNoteKind.UNREADABLE, 9),
-        (ProgramNoteKind.APPLIED, 4),
+    sent = TELE_OP.command(1), TELE_OP.command(3), b"<", heartbeat, TELE_OP.command(2)
+    replies = [transport.deliver(data) for data in sent]
+    assert kinds(tmp_path) == [
+        (NoteKind.APPLIED, 1),
+        (NoteKind.APPLIED, 3),
+        (NoteKind.UNREADABLE, 0),
+        (NoteKind.UNREADABLE, 0),
+        (NoteKind.APPLIED, 2),
     ]
     answered = [decode(reply).body for reply in replies if reply is not None]
-    assert [(reply.answers, reply.code) for reply in answered] == [
-        (number, OK) for number in (1, 3, 2, 3, 4)
-    ]
+    assert [(reply.answers, reply.code) for reply in answered] == [(1, OK), (3, OK), (2, OK)]
 
 
-def test_what_is_not_taken_is_offered_again_as_a_newer_command(tmp_path):
-    transport, path = Scripted(takes=lambda count: count % 3 == 0), tmp_path / "notes"
-    OperatorProgram(transport, plan(tmp_path), ProgramNotes(path)).run()
+def test_what_is_not_taken_is_offered_again_as_a_newer_command(tmp_path, notes):
+    transport = Scripted(takes=lambda count: count % 3 == 0)
+    run_operator(transport, plan(tmp_path), notes)
     assert [decode(data).message_id for data in transport.sent] == list(
         range(1, len(transport.sent) + 1)
     )
-    noted = kinds(path)
-    assert noted[0] == (ProgramNoteKind.READY, 0)
+    noted = kinds(tmp_path)
+    assert noted[:2] == [(NoteKind.READY, 0), (NoteKind.STARTED, 0)]
     assert [kind for kind, number in noted if number == 1] == [
-        *(ProgramNoteKind.SENT, ProgramNoteKind.REFUSED) * 2,
-        ProgramNoteKind.SENT,
+        *(NoteKind.SENT, NoteKind.REFUSED) * 2,
+        NoteKind.SENT,
     ]
 
 
 @pytest.mark.parametrize("hz", [50.0, 0.0])
-def test_the_robot_sends_pictures_of_the_planned_size_if_there_are_to_be_any(tmp_path, hz):
-    transport, path = Scripted(), tmp_path / "notes"
+def test_the_robot_sends_pictures_of_the_planned_size_if_there_are_to_be_any(tmp_path, notes, hz):
+    transport = Scripted()
     ends = plan(tmp_path, until=time.monotonic() - 59.7, picture_hz=hz, picture_bytes=1_000)
-    RobotProgram(transport, ends, ProgramNotes(path)).run()
+    run_robot(transport, ends, notes)
     assert {len(picture) for picture in transport.sent} == ({1_000} if hz else set())
-    assert kinds(path) == [
-        (ProgramNoteKind.PICTURE_TAKEN, number) for number in range(1, len(transport.sent) + 1)
+    assert kinds(tmp_path) == [
+        (NoteKind.PICTURE_TAKEN, number) for number in range(1, len(transport.sent) + 1)
     ]
-
-
-def test_notes_of_a_killed_program_are_read_as_far_as_they_are_whole(tmp_path):
-    notes = ProgramNotes(tmp_path / "notes")
-    for number in range(3):
-        notes.add(ProgramNoteKind.SENT, number)
-    whole = (tmp_path / "notes").read_bytes()
-    (tmp_path / "notes").write_bytes(whole[:-5])
-    assert [note.number for note in ProgramNotes.read(tmp_path / "notes")] == [0, 1]
 
 
 @pytest.mark.system
@@ -129,4 +119,4 @@ def test_an_operator_whom_nobody_answers_says_so_and_ends(tmp_path):
     )
     assert ended.returncode == NOT_CONNECTED
     assert len(ended.stderr.splitlines()) == 1
-    assert [note.kind for note in ProgramNotes.read(tmp_path / "near.notes")] == []
+    assert (tmp_path / "near.notes").read_bytes() == b""

@@ -28,6 +28,12 @@ def test_commands_in_step_are_as_old_as_the_link_and_half_a_period():
     assert (found["false_stops"], found["too_old_share"]) == (0, 0.0)
 
 
+def test_what_arrives_after_a_newer_one_is_outdated():
+    found = row([1.0, 3.0, 2.0, 4.0], [3.0, 3.5, 3.6, 4.5])
+    assert found["outdated_share"] == 0.25
+    assert found["command_rate_hz"] == 0.75
+
+
 def test_silence_counts_from_the_edges_of_the_window_and_stops_the_robot_each_time():
     found = row([1.0, 4.0], [1.5, 4.5])
     assert found["longest_gap_s"] == pytest.approx(2.5)

@@ -169,7 +169,7 @@ def test_a_killed_robot_ends_the_run_and_is_named(run):
 def test_a_run_that_takes_too_long_is_ended():
     need_link()
     job = job_of(LONG, 1)
-    short = EmulatedJob("commands", bound_s=0.1, arguments=job.arguments, room=job.room)
+    short = EmulatedJob("commands", bound_s=0.1, arguments=job.arguments)
     with pytest.raises(EmulatorError, match=r"within 0\.1 s"):
         run_job(short)
 

@@ -11,10 +11,11 @@ References:
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, cast
 
 from typing_extensions import override
@@ -22,9 +23,10 @@ from typing_extensions import override
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import Link, LinkConfig, make_link
+from dva_sim.network.messaging import OnReply, Wire
 from dva_sim.network.middleware import CommandTransport
 from dva_sim.network.middleware.mqtt import COMMANDS, PICTURES, MqttTransport
-from dva_sim.network.middleware.programs import command, reply_to
+from dva_sim.network.middleware.programs import TELE_OP
 from dva_sim.network.middleware.udp import UdpTransport
 from dva_sim.network.middleware.websocket import MOST_WAITING, WebSocketTransport
 from dva_sim.network.middleware.zenoh import ZenohTransport
@@ -32,6 +34,7 @@ from dva_sim.network.middleware.zeromq import ZeroMqTransport
 from dva_sim.network.tcp import OrderedMessages, TcpConnection, TcpOptions
 from dva_sim.network.transports.interface import TransportMessage
 from dva_sim.network.transports.message_parts import IP_UDP, Assembly, parts_of
+from dva_sim.network.workload import UNBOUNDED, OperatorEnd, RequestEnd
 from dva_sim.network.zmtp import ZmtpConnection, ZmtpOptions, framed
 
 Act = Callable[[], object]
@@ -63,14 +66,8 @@ class BetweenPrograms:
     on_picture: Callable[[int], object]
 
 
-class Carrier(ABC):
-    """One transport between an operator and a robot.
-
-    Attributes:
-        on_free: Called when a command can be sent after one was refused.
-    """
-
-    on_free: Act = staticmethod(_nothing)
+class Carrier(OperatorEnd):
+    """One transport between an operator and a robot."""
 
     def __init__(self, between: BetweenPrograms) -> None:
         self.between = between
@@ -79,10 +76,6 @@ class Carrier(ABC):
     @abstractmethod
     def open(self, ready: Act) -> None:
         """Connect; `ready()` when the operator's program goes on."""
-
-    @abstractmethod
-    def command(self, number: int) -> bool:
-        """Hand over a command; False if nothing is taken now."""
 
     @abstractmethod
     def picture(self, number: int) -> None:
@@ -117,8 +110,10 @@ class DatagramCarrier(Carrier):
         greet()
 
     @override
-    def command(self, number: int) -> bool:
-        self._send(self.between.up, self._up, TransportMessage(number, len(command(number))))
+    def send(self, number: int) -> bool:
+        self._send(
+            self.between.up, self._up, TransportMessage(number, len(TELE_OP.command(number)))
+        )
         return True
 
     @override
@@ -196,8 +191,8 @@ class StreamCarrier(Carrier):
             self._ready()
 
     @override
-    def command(self, number: int) -> bool:
-        return self._send(self._up, number, len(command(number)), True)
+    def send(self, number: int) -> bool:
+        return self._send(self._up, number, len(TELE_OP.command(number)), True)
 
     @override
     def picture(self, number: int) -> None:
@@ -356,8 +351,8 @@ class MqttCarrier(Carrier):
         self._robot.open(lambda: self._operator.open(ready))
 
     @override
-    def command(self, number: int) -> bool:
-        self._operator.publish(number, self._size(COMMANDS, len(command(number))))
+    def send(self, number: int) -> bool:
+        self._operator.publish(number, self._size(COMMANDS, len(TELE_OP.command(number))))
         return True
 
     @override
@@ -365,7 +360,7 @@ class MqttCarrier(Carrier):
         self._robot.publish(number, self._size(PICTURES, self.between.picture_bytes))
 
     def _to_robot(self, number: int) -> None:
-        self._robot.forward(number, self._size(COMMANDS, len(command(number))))
+        self._robot.forward(number, self._size(COMMANDS, len(TELE_OP.command(number))))
 
     def _to_operator(self, number: int) -> None:
         self._operator.forward(number, self._size(PICTURES, self.between.picture_bytes))
@@ -427,9 +422,9 @@ class PublishCarrier(ZeroMqCarrier):
         connection.open(ready, lambda: connection.peer.send(None, framed(1)))
 
     @override
-    def command(self, number: int) -> bool:
+    def send(self, number: int) -> bool:
         if self._is_joined:
-            self._commands.opener.send(number, framed(len(command(number))))
+            self._commands.opener.send(number, framed(len(TELE_OP.command(number))))
         return True  # PUB drops what nobody takes
 
 
@@ -439,51 +434,50 @@ class RequestCarrier(ZeroMqCarrier):
     def __init__(self, between: BetweenPrograms, options: ZeroMqTransport) -> None:
         super().__init__(between, options)
         self._timeout_s = options.timeout_s
-        self._under_way: int | None = None
-        self._attempts = self._replies = 0
+        self._ready: Act = _nothing
+        self._replies = 0
 
     @override
     def open(self, ready: Act) -> None:
         super().open(_nothing)
-        self._connect(ready)
+        self._ready = ready
+        self._end = RequestEnd(self, TELE_OP, timeout=self._timeout_s, attempts=UNBOUNDED)
+        self._end.on_free = self.on_free
 
-    def _connect(self, ready: Act) -> None:
-        def heard(number: int) -> None:
-            self.between.on_command(number, lambda: answer(number))
+    def connect(self, node: str, peer: str, on_reply: OnReply, pipelined: bool) -> Wire:
+        """Open a connection of a REQ socket."""
 
-        def answer(number: int) -> None:
+        def answer(tag: int) -> None:
             self._replies += 1
-            size = len(reply_to(number, self._replies))
-            connection.peer.send(number, framed(0) + framed(size))
+            size = len(TELE_OP.reply(tag, self._replies))
+            connection.peer.send(tag, framed(0) + framed(size))
 
-        def replied(number: int) -> None:
-            if connection is self._commands and number == self._under_way:
-                self._under_way = None
-                self.on_free()
-
-        connection = self._commands = self._connection(heard, replied)
-        connection.open(ready)
+        connection = self._connection(
+            lambda tag: self.between.on_command(tag, partial(answer, tag)),
+            lambda tag: on_reply(tag, b""),
+        )
+        connection.open(self._ready)
+        self._ready = _nothing  # only the first connection is waited for
+        return RequestWire(connection)
 
     @override
-    def command(self, number: int) -> bool:
-        if self._under_way is not None:
-            return False
-        self._under_way = number
-        self._ask()
-        return True
+    def send(self, number: int) -> bool:
+        return self._end.send(number)
 
-    def _ask(self) -> None:
-        number = self._under_way
-        self._attempts += 1
-        assert number is not None
-        self._commands.opener.send(number, framed(0) + framed(len(command(number))))
-        self.clock.call_after(self._timeout_s, self._late, number, self._attempts)
 
-    def _late(self, number: int, attempt: int) -> None:
-        if (number, attempt) == (self._under_way, self._attempts):
-            self._commands.close()
-            self._connect(_nothing)
-            self._ask()
+@dataclass(frozen=True)
+class RequestWire(Wire):
+    """Connection of a REQ socket; the tag of a request is the number of its command."""
+
+    connection: ZmtpConnection
+
+    @override
+    def send(self, tag: int, data: bytes) -> None:
+        self.connection.opener.send(tag, framed(0) + framed(len(data)))
+
+    @override
+    def close(self) -> None:
+        self.connection.close()
 
 
 def why_not(transport: CommandTransport) -> str:

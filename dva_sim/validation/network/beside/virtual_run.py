@@ -1,9 +1,8 @@
 """A run of a middleware scenario in virtual time, measured as the real one is.
 
-The operator's program offers a command at every step of its grid, and the newest as soon as one is
-taken after a refusal; the robot's obeys what is newer than all before. The link has the seed of the
-real run: outages, bursts in time and the moment of a recorded link are the same ones. Losses packet
-by packet are not, since a packet more or less would shift them all.
+The operator's program is that of the real run, the robot's needs the same time for every message.
+The link has the seed of the real run: outages, bursts in time and the moment of a recorded link are
+the same ones. Losses packet by packet are not, since a packet more or less would shift them all.
 """
 
 from __future__ import annotations
@@ -17,6 +16,8 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.network.emulator.forwarder import links_of
 from dva_sim.network.link import Link, PartedLink
 from dva_sim.network.middleware import CommandTransport, load_transport
+from dva_sim.network.pattern_runs import RunLog
+from dva_sim.network.workload import Note, NoteKind, OperatorWorkload
 from dva_sim.simulation.measures.commands import Row
 from dva_sim.simulation.measures.middleware import command_row
 from dva_sim.simulation.middleware import MiddlewareScenario
@@ -87,12 +88,11 @@ class VirtualRun:
             load_transport(scenario.transport.name, scenario.transport.options)(),
             0 if pictures is None else pictures.bytes,
         )
-        self._carrier.on_free = self._freed
-        self._made: dict[int, float] = {}
-        self._applied: list[tuple[int, float]] = []
-        self._newest = self._sent = self._steps = self._pictures = 0
-        self._waits = False
-        self._begun = 0.0
+        self._operator = OperatorWorkload(
+            self._clock, self._carrier, self._note, scenario.command_rate_hz
+        )
+        self._notes: list[Note] = []
+        self._pictures = 0
 
     def _carried_by(self, transport: CommandTransport, picture_bytes: int) -> Carrier:
         between = BetweenPrograms(
@@ -110,12 +110,10 @@ class VirtualRun:
         if self._scenario.pictures is not None:
             clock.call_at(times.far, self._take_picture, 1.0 / self._scenario.pictures.rate_hz)
         clock.run(end)
-        made = np.array([self._made[number] for number, _ in self._applied])
         robot = self._scenario.robot
         return {
             **command_row(
-                made,
-                np.array([time for _, time in self._applied]),
+                *RunLog.of(self._notes).arrivals(),
                 window,
                 max_age_s=robot.max_age_s,
                 watchdog_s=robot.watchdog_s,
@@ -124,42 +122,19 @@ class VirtualRun:
             "down_bytes": self._down.passed_bytes(end),
         }
 
-    # --- the operator ----------------------------------------------------------------------
+    def _note(self, kind: NoteKind, number: int, at: float | None = None) -> None:
+        self._notes.append(Note(kind, number, self._clock.now))
 
     def _begin(self) -> None:
         """The connection stands; if that took too long, the program has given up."""
-        self._begun = self._clock.now
-        if self._begun < self._window.since:
-            self._step()
-
-    def _step(self) -> None:
-        if self._clock.now >= self._window.until:
-            return
-        self._offer()
-        self._steps += 1
-        due = self._begun + self._steps / self._scenario.command_rate_hz
-        self._clock.call_at(due, self._step)
-
-    def _freed(self) -> None:
-        if self._waits and self._clock.now < self._window.until:
-            self._offer()
-
-    def _offer(self) -> None:
-        number = self._sent + 1
-        self._made[number] = self._clock.now
-        taken = self._carrier.command(number)
-        self._sent += taken
-        self._waits = not taken
-
-    # --- the robot ---------------------------------------------------------------------------
+        if self._clock.now < self._window.since:
+            self._operator.start(self._window.until)
 
     def _hear(self, number: int, answer: Act) -> None:
         self._clock.call_after(PROGRAM_S, self._obey, number, answer)
 
     def _obey(self, number: int, answer: Act) -> None:
-        if number > self._newest:
-            self._newest = number
-            self._applied.append((number, self._clock.now))
+        self._note(NoteKind.APPLIED, number)
         answer()
 
     def _take_picture(self, period: float) -> None:

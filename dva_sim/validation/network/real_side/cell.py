@@ -38,9 +38,8 @@ from dva_sim.network.emulator.relay import Proxy
 from dva_sim.network.emulator.report import LinkReport
 from dva_sim.network.link import LinkConfig
 from dva_sim.network.pattern_runs import Condition
+from dva_sim.network.workload import FileNotes, Note
 from dva_sim.validation.network.real_side.programs import (
-    Note,
-    Notes,
     await_nothing,
     begin_nothing,
     run_counter,
@@ -52,7 +51,7 @@ from dva_sim.validation.network.real_side.programs import (
 PROGRAM_PRIORITY = 10  # real-time, below the forwarder's
 _PATIENCE_S = 20.0  # for a node to be ready
 
-Program = Callable[[socket.socket, Notes], None]
+Program = Callable[[socket.socket, FileNotes], None]
 """Function that runs in a node, with a connection to its starter and a place for its notes."""
 
 
@@ -65,14 +64,14 @@ class Node:
         pid: Process.
         ended: File descriptor that becomes readable when the process ends.
         channel: Connection to it.
-        notes: Notes of the process.
+        file: Descriptor of the file of its notes.
     """
 
     name: str
     pid: int
     ended: int
     channel: socket.socket
-    notes: Notes
+    file: int
 
     def hear(self) -> tuple[bytes, list[int]]:
         """Wait for the next word of the node: what it says, and file descriptors it hands over.
@@ -86,6 +85,10 @@ class Node:
                 return data, handed
         raise ChildProcessError(f"the {self.name} did not become ready")
 
+    def notes(self) -> list[Note]:
+        """Return all notes of the process so far, in their order."""
+        return FileNotes.read(os.pread(self.file, os.fstat(self.file).st_size, 0))
+
     def end(self) -> int:
         """Kill the process and wait for it; its exit code, negative if it was killed."""
         with contextlib.suppress(ProcessLookupError):
@@ -96,27 +99,26 @@ class Node:
         return os.waitstatus_to_exitcode(status)
 
 
-def start_node(name: str, program: Program, room: int) -> Node:
+def start_node(name: str, program: Program) -> Node:
     """A process that runs a program and then ends.
 
     Args:
         name: Name of the process.
         program: Program to run.
-        room: Notes that find room.
     """
     here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     here.settimeout(_PATIENCE_S)
-    notes = Notes(room)
+    file = os.memfd_create("notes")
     parent = os.getpid()
     pid = os.fork()
     if pid == 0:
         here.close()
-        _live(parent, program, there, notes)
+        _live(parent, program, there, FileNotes(file))
     there.close()
-    return Node(name, pid, os.pidfd_open(pid), here, notes)
+    return Node(name, pid, os.pidfd_open(pid), here, file)
 
 
-def _live(parent: int, program: Program, channel: socket.socket, notes: Notes) -> None:
+def _live(parent: int, program: Program, channel: socket.socket, notes: FileNotes) -> None:
     """All that a node's process does; it never returns."""
     code = 1
     try:
@@ -152,7 +154,6 @@ class EmulatedJob:
         arguments: Arguments of the program.
         congestion: Congestion control of all TCP.
         link: `packets` or `proxy`.
-        room: Notes that find room at each end.
         rootless: Take a user namespace also where root could do without.
     """
 
@@ -163,7 +164,6 @@ class EmulatedJob:
     arguments: dict[str, Any] = field(default_factory=dict)
     congestion: str = "cubic"
     link: str = PACKETS
-    room: int = 10_000
     rootless: bool = False
 
     def to_json(self) -> str:
@@ -207,7 +207,7 @@ class EmulatedOutcome:
         """The outcome of a line that the process printed."""
         data = json.loads(text)
         for end in ("operator", "robot"):
-            data[end] = [tuple(note) for note in data[end]]
+            data[end] = [Note(*note) for note in data[end]]
         return cls(**data)
 
 
@@ -241,7 +241,7 @@ class EmulatedCell:
             problem = error.strerror or str(error)
         finally:
             codes = [node.end() for node in self._nodes]
-            notes = [node.notes.read() for node in self._nodes] or [[], []]
+            notes = [node.notes() for node in self._nodes] or [[], []]
         if not problem and codes[0] != 0:
             problem = "the operator failed"
         return EmulatedOutcome(notes[0], notes[-1], columns, self._way, realtime, problem)
@@ -260,7 +260,7 @@ class EmulatedCell:
         return Forwarder(tuns, self._links), b.hear()[0]
 
     def _start(self, name: str, program: Program) -> Node:
-        self._nodes.append(start_node(name, program, self._job.room))
+        self._nodes.append(start_node(name, program))
         return self._nodes[-1]
 
     def _run(self, link: EmulatedLink[Any]) -> str:
@@ -290,7 +290,7 @@ def columns_of(report: LinkReport) -> LinkColumns:
 def _networked(program: Program, end: End, congestion: str) -> Program:
     """Return the program in its own network namespace; its TUN device goes to the caller."""
 
-    def run(channel: socket.socket, notes: Notes) -> None:
+    def run(channel: socket.socket, notes: FileNotes) -> None:
         linux_calls.enter_network_namespace()
         tun = open_tun(end, congestion)
         socket.send_fds(channel, [b"device"], [tun])

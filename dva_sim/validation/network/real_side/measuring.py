@@ -33,11 +33,10 @@ from dva_sim.network.pattern_runs import EMULATOR_RESULTS, RESULTS, Condition, R
 from dva_sim.validation.network.real_side.cell import (
     PACKETS,
     EmulatedJob,
-    EmulatedOutcome,
     refuse_for_proxy,
     run_job,
 )
-from dva_sim.validation.network.real_side.programs import HANDSHAKE_LIMIT_S, Note, NoteKind
+from dva_sim.validation.network.real_side.programs import HANDSHAKE_LIMIT_S
 from dva_sim.validation.network.reference import (
     BlockConfig,
     SocketRun,
@@ -96,7 +95,6 @@ def _processor() -> str | None:
 
 
 Row = dict[str, str]
-_NOTES_PER_TURN = 8  # a command or an attempt
 _DECIMALS = 4
 COLUMNS = (*Condition("pub", 1).to_row(), *RESULTS, *EMULATOR_RESULTS, "realtime")
 """Contents of a measurement: condition, results, emulator, real-time priority."""
@@ -119,7 +117,8 @@ def measure(condition: Condition, seed: int, link: str = PACKETS) -> Row:
     job = job_of(condition, seed, link)
     refuse_for_proxy(job)
     outcome = run_job(job)
-    results = measure_log(log_of(outcome), condition.warm_s, condition.dur_s) | outcome.link
+    log = RunLog.of([*outcome.operator, *outcome.robot])
+    results = measure_log(log, condition.warm_s, condition.dur_s) | outcome.link
     if condition.pattern != "req-rep":
         results |= {"timeouts": math.nan, "alerts": math.nan}
     row = condition.to_row() | _written(results) | {"realtime": str(int(outcome.realtime))}
@@ -129,7 +128,6 @@ def measure(condition: Condition, seed: int, link: str = PACKETS) -> Row:
 def job_of(condition: Condition, seed: int, link: str = PACKETS) -> EmulatedJob:
     """Job for the process of one run."""
     played_s = condition.warm_s + condition.dur_s
-    patience_ms = condition.timeout_ms or math.inf
     return EmulatedJob(
         "commands",
         condition.link(),
@@ -138,34 +136,7 @@ def job_of(condition: Condition, seed: int, link: str = PACKETS) -> EmulatedJob:
         arguments=dataclasses.asdict(condition),
         congestion=condition.cc,
         link=link,
-        room=1000 + int(_NOTES_PER_TURN * played_s * max(condition.hz, 1e3 / patience_ms)),
     )
-
-
-def log_of(outcome: EmulatedOutcome) -> RunLog:
-    """Convert the notes of both programs to the log that results are computed from."""
-    log = RunLog(start=_time(outcome.operator, NoteKind.STARTED))
-    opened = _time(outcome.operator, NoteKind.OPENED)
-    log.connected_s = _time(outcome.operator, NoteKind.CONNECTED) - opened
-    log.handshake_s = _time(outcome.operator, NoteKind.HANDSHAKE) - opened
-    for kind, number, at in [*outcome.operator, *outcome.robot]:
-        match kind:
-            case NoteKind.ISSUED:
-                log.issued.append(at)
-            case NoteKind.REPLIED:
-                log.replied.append((number, at))
-            case NoteKind.TIMEOUT:
-                log.timeouts.append(at)
-            case NoteKind.ALERT:
-                log.alerts.append(at)
-            case NoteKind.APPLIED:
-                log.applied.append((number, at))
-    return log
-
-
-def _time(notes: list[Note], kind: NoteKind) -> float:
-    """Time of the first note of a kind [s]; nan if absent."""
-    return next((at for noted, _, at in notes if noted == kind), math.nan)
 
 
 def _written(results: Mapping[str, float]) -> Row:

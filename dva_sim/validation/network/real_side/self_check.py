@@ -81,7 +81,7 @@ class Probe:
         bound_s = self.count * self.interval_s + linger_s + 10.0
         return EmulatedJob(
             "probe", wire, bound_s=bound_s, arguments=values | {"linger_s": linger_s},
-            room=self.count + 1, rootless=rootless,
+            rootless=rootless,
         )  # fmt: skip
 
 
