@@ -31,7 +31,6 @@ from dva_sim.network.workload import (
     Note,
     NoteKind,
     NoteTaker,
-    OperatorEnd,
     OperatorWorkload,
     PublishEnd,
     RequestEnd,
@@ -203,16 +202,17 @@ def operator_of(
         note: Adds notes.
     """
     in_step = condition.pattern == "req-rep"
-    end: OperatorEnd
-    if in_step:
-        assert condition.timeout_ms is not None
-        assert condition.attempts is not None
-        timeout = condition.timeout_ms / 1000.0
-        end = RequestEnd(transport, form, timeout=timeout, attempts=condition.attempts)
-    elif condition.pattern == "pipelined":
-        end = RequestEnd(transport, form, window=UNBOUNDED)
-    else:
-        end = PublishEnd(transport, form)
+    end = (
+        PublishEnd(transport, form)
+        if condition.pattern == "pub-sub"
+        else RequestEnd(
+            transport,
+            form,
+            timeout=UNBOUNDED if condition.timeout_ms is None else condition.timeout_ms / 1000.0,
+            attempts=condition.attempts or 1,
+            window=1 if in_step else UNBOUNDED,
+        )
+    )
     return OperatorWorkload(transport.clock, end, note, condition.hz, in_step)
 
 

@@ -112,8 +112,7 @@ def pool_variant(own: Pooled, variants: Sequence[ComparedCell]) -> Pooled:
     for each in own.scored:
         cell = known.get((each.cell.group.condition, each.cell.measure))
         if cell is not None:
-            z = (cell.model - cell.real) / each.error
-            scored.append(Scored(cell, z, each.error, float(two_sided(np.array([z]))[0])))
+            scored.append(score(cell, each.error))
     return _judged(scored, own.expected, own.false_alarms)
 
 
@@ -129,7 +128,7 @@ def pool(judged: Sequence[ComparedCell], rng: np.random.Generator) -> Pooled:
         judged: Cells to judge; see `to_be_pooled`.
         rng: Random generator of the runs that replace the sockets.
     """
-    scored = [score(cell) for cell in judged]
+    scored = [score(cell, standard_error(cell)) for cell in judged]
     null = null_scores(judged, rng)
     rms = np.sqrt((null**2).mean(axis=1)) if judged else np.zeros(1)
     low, high = np.percentile(rms, (2.5, 97.5))
@@ -166,9 +165,12 @@ def is_steady(cell: ComparedCell) -> bool:
     return tells(cell) and chance(cell) < resolution(cell)
 
 
-def score(cell: ComparedCell) -> Scored:
-    """z of one cell."""
-    error = standard_error(cell)
+def score(cell: ComparedCell, error: float) -> Scored:
+    """z of one cell.
+
+    Args:
+        error: Standard error of the difference of means.
+    """
     z = (cell.model - cell.real) / error
     return Scored(cell, z, error, float(two_sided(np.array([z]))[0]))
 

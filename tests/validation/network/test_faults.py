@@ -7,6 +7,7 @@ import pytest
 from dva_sim.agents.robot.command_queue import CommandQueue
 from dva_sim.network.messaging import Requester
 from dva_sim.network.virtual_network import VirtualNetwork
+from dva_sim.validation.network import comparison
 from dva_sim.validation.network.comparison import NetworkSetting, compare
 from dva_sim.validation.network.reference import load_plan, load_runs
 from dva_sim.validation.network.verdicts import grouped
@@ -14,6 +15,7 @@ from dva_sim.validation.network.verdicts import grouped
 ASKS, ASKS_SLOW = "req10_d100_j0_l0_r0_p5_T2500", "req10_d0_j0_l0_r0_p3000_T2500"
 PUBLISHES = "pub50_d100_j0_l0_r0_p100"
 KEEPS_ASKING = "dealer20_d150_j0_l0_r0_p20"
+LOSES = "req10_d100_j0_l10_r0_p5_T1000"
 LABELS = ASKS, ASKS_SLOW, PUBLISHES, KEEPS_ASKING
 
 
@@ -101,3 +103,18 @@ def test_a_planted_fault_is_found_where_it_acts(plant, where, monkeypatch):
     plant(monkeypatch)
     found = misses()
     assert [label for label in LABELS if found[label]] == list(where)
+
+
+def test_a_requester_that_never_retries_misses_what_was_measured_under_loss(monkeypatch):
+    """One packet in ten is lost, and a second's patience is five round trips."""
+    monkeypatch.setattr(comparison, "QUICK_RUNS", 12)
+    monkeypatch.setattr(comparison, "QUICK_CONTROL_RUNS", 2)
+    runs = [r for r in load_runs(load_plan().sources) if r.condition.label == LOSES]
+
+    def significant() -> set[str]:
+        found = compare(grouped(runs), NetworkSetting(quick=True))
+        return {scored.cell.measure.name for scored in found.pooled.significant}
+
+    assert significant() == set()
+    gives_up_after_one_attempt(monkeypatch)
+    assert significant() >= {"alerts", "delivered"}

@@ -5,7 +5,14 @@ import pytest
 
 from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network import pooling
-from dva_sim.validation.network.pooling import is_steady, pool, score, tells, to_be_pooled
+from dva_sim.validation.network.pooling import (
+    is_steady,
+    pool,
+    score,
+    standard_error,
+    tells,
+    to_be_pooled,
+)
 from dva_sim.validation.network.reference import SocketRun
 from dva_sim.validation.network.verdicts import BY_NAME, ComparedCell, ConditionGroup
 
@@ -30,7 +37,8 @@ def cells(factor, seed):
 
 def test_z_is_the_difference_over_the_spread_scaled_to_both_numbers_of_runs():
     model = np.tile([90.0, 110.0], 100)
-    scored = score(cell([120.0] * 6, model))
+    pooled = cell([120.0] * 6, model)
+    scored = score(pooled, standard_error(pooled))
     spread = model.std(ddof=1) * np.sqrt(1 / 6 + 1 / 200)
     assert scored.z == pytest.approx(-20 / np.hypot(spread, 0.5))
 

@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final, cast
+from typing import Any, Final
 
 from typing_extensions import override
 
@@ -40,7 +40,7 @@ from dva_sim.network.zmtp import ZmtpConnection, ZmtpOptions, framed
 Act = Callable[[], object]
 
 
-def _nothing() -> None:
+def _nothing(*_: object) -> None:
     return None
 
 
@@ -136,6 +136,65 @@ HELLO: Final = "hello"
 Exchanges = Sequence[tuple[int, int]]  # what is said, and answered, before messages [B]
 
 
+class ClientConnection:
+    """A TCP connection that a client opens, both ends of it, and what is said before messages.
+
+    Args:
+        clock: Virtual time.
+        links: From the client, and back.
+        tcp: TCP options of both ends.
+        exchanges: Sizes of what is said, and answered, before messages.
+
+    Attributes:
+        up: Messages of the client.
+        down: Messages of the server.
+        at_server: Callback for each message of the client.
+        at_client: Callback for each message of the server.
+        is_ready: True once all has been said.
+    """
+
+    def __init__(
+        self, clock: Clock, links: tuple[Link, Link], tcp: TcpOptions, exchanges: Exchanges
+    ) -> None:
+        self._tcp = TcpConnection(clock, *links, tcp, tcp)
+        client = self._tcp.opener
+        server = self._tcp.peer
+        self.up = OrderedMessages(client, server, self._heard_by_server)
+        self.down = OrderedMessages(server, client, self._heard_by_client)
+        self.at_server: Callable[[Any], object] = _nothing
+        self.at_client: Callable[[Any], object] = _nothing
+        self._exchanges = deque(exchanges)
+        self._ready: Act = _nothing
+        self.is_ready = False
+
+    def open(self, ready: Act) -> None:
+        """Connect; `ready()` when all has been said."""
+
+        def opened() -> None:
+            self.up.open()
+            self.up.send(HELLO, self._exchanges[0][0])
+
+        self._ready = ready
+        self._tcp.open(opened, self.down.open)
+
+    def _heard_by_server(self, what: Any) -> None:
+        if what == HELLO:
+            self.down.send(HELLO, self._exchanges[0][1])
+        else:
+            self.at_server(what)
+
+    def _heard_by_client(self, what: Any) -> None:
+        if what != HELLO:
+            self.at_client(what)
+            return
+        self._exchanges.popleft()
+        if self._exchanges:
+            self.up.send(HELLO, self._exchanges[0][0])
+        else:
+            self.is_ready = True
+            self._ready()
+
+
 class StreamCarrier(Carrier):
     """Messages in frames over one TCP connection that the operator opens.
 
@@ -155,49 +214,22 @@ class StreamCarrier(Carrier):
     ) -> None:
         super().__init__(between)
         self._header = header
-        self._exchanges = deque(exchanges)
-        self._tcp = TcpConnection(self.clock, between.up, between.down, tcp, tcp)
-        operator = self._tcp.opener
-        robot = self._tcp.peer
-        self._up = OrderedMessages(operator, robot, self._at_robot)
-        self._down = OrderedMessages(robot, operator, self._at_operator)
-        self._ready: Act = _nothing
-        self._is_ready = False
+        self._connection = ClientConnection(self.clock, (between.up, between.down), tcp, exchanges)
+        self._connection.at_server = lambda number: between.on_command(number, _nothing)
+        self._connection.at_client = between.on_picture
 
     @override
     def open(self, ready: Act) -> None:
-        def opened() -> None:
-            self._up.open()
-            self._up.send(HELLO, self._exchanges[0][0])
-
-        self._ready = ready
-        self._tcp.open(opened, self._down.open)
-
-    def _at_robot(self, what: Any) -> None:
-        if what == HELLO:
-            self._down.send(HELLO, self._exchanges[0][1])
-        else:
-            self.between.on_command(what, _nothing)
-
-    def _at_operator(self, what: Any) -> None:
-        if what != HELLO:
-            self.between.on_picture(what)
-            return
-        self._exchanges.popleft()
-        if self._exchanges:
-            self._up.send(HELLO, self._exchanges[0][0])
-        else:
-            self._is_ready = True
-            self._ready()
+        self._connection.open(ready)
 
     @override
     def send(self, number: int) -> bool:
-        return self._send(self._up, number, len(TELE_OP.command(number)), True)
+        return self._send(self._connection.up, number, len(TELE_OP.command(number)), True)
 
     @override
     def picture(self, number: int) -> None:
-        if self._is_ready:
-            self._send(self._down, number, self.between.picture_bytes, False)
+        if self._connection.is_ready:
+            self._send(self._connection.down, number, self.between.picture_bytes, False)
 
     def _send(self, stream: OrderedMessages, number: int, size: int, up: bool) -> bool:
         if stream.waiting > MOST_WAITING:
@@ -252,14 +284,14 @@ class MqttLeg:
             self.publish(*self._waiting.popleft())
 
 
-class MqttClient:
+class MqttClient(ClientConnection):
     """A client's connection to the broker, both ends of it.
 
     Args:
         clock: Virtual time.
         links: From the client, and back.
         options: Options of the transport.
-        at_client: Callback for messages from the broker.
+        take: Callback for messages from the broker.
         at_broker: Callback for messages from the client.
     """
 
@@ -268,59 +300,27 @@ class MqttClient:
         clock: Clock,
         links: tuple[Link, Link],
         options: MqttTransport,
-        at_client: Callable[[int], object],
+        take: Callable[[int], object],
         at_broker: Callable[[int], object],
     ) -> None:
-        tcp = TcpOptions(nodelay=options.nodelay)
-        self._tcp = TcpConnection(clock, *links, tcp, tcp)
-        client = self._tcp.opener
-        broker = self._tcp.peer
+        super().__init__(clock, links, TcpOptions(nodelay=options.nodelay), MQTT_OPENING)
+        publish, forward = (MqttLeg(stream, options.qos) for stream in (self.up, self.down))
+        self.publish = publish.publish
+        self.forward = forward.publish
+        self.at_server = partial(self._heard, forward, self.down, at_broker)
+        self.at_client = partial(self._heard, publish, self.up, take)
         self._qos = options.qos
-        self._takes = (at_broker, at_client)
-        self._out = OrderedMessages(client, broker, lambda what: self._heard(0, what))
-        self._back = OrderedMessages(broker, client, lambda what: self._heard(1, what))
-        self._streams = self._out, self._back
-        self._legs = MqttLeg(self._out, options.qos), MqttLeg(self._back, options.qos)
-        self._exchanges = deque(MQTT_OPENING)
-        self._ready = cast(Act, _nothing)
 
-    def open(self, ready: Act) -> None:
-        """Connect and subscribe."""
-
-        def opened() -> None:
-            self._out.open()
-            self._out.send(HELLO, self._exchanges[0][0])
-
-        self._ready = ready
-        self._tcp.open(opened, self._back.open)
-
-    def publish(self, number: int, size: int) -> None:
-        """From the client."""
-        self._legs[0].publish(number, size)
-
-    def forward(self, number: int, size: int) -> None:
-        """From the broker."""
-        self._legs[1].publish(number, size)
-
-    def _heard(self, at: int, what: Any) -> None:
-        if what == HELLO:
-            self._greeted(at)
-        elif what == ACKNOWLEDGEMENT:
-            self._legs[1 - at].acknowledged()
-        else:
-            self._takes[at](what)
-            if self._qos:
-                self._streams[1 - at].send(ACKNOWLEDGEMENT, PUBACK)
-
-    def _greeted(self, at: int) -> None:
-        if at == 0:
-            self._back.send(HELLO, self._exchanges[0][1])
+    def _heard(
+        self, back: MqttLeg, stream: OrderedMessages, take: Callable[[int], object], what: Any
+    ) -> None:
+        """Take a message and acknowledge it, or an acknowledgement of what went back."""
+        if what == ACKNOWLEDGEMENT:
+            back.acknowledged()
             return
-        self._exchanges.popleft()
-        if self._exchanges:
-            self._out.send(HELLO, self._exchanges[0][0])
-        else:
-            self._ready()
+        take(what)
+        if self._qos:
+            stream.send(ACKNOWLEDGEMENT, PUBACK)
 
 
 class MqttCarrier(Carrier):
