@@ -132,19 +132,13 @@ def run(options: RunOptions) -> Results:
             kept as recordings and could not.
         KeyboardInterrupt: the finished runs are kept, and the same call goes on.
     """
-    from dva_sim.experiments.execution.dry_run import rehearse_all  # late: start-up
-    from dva_sim.experiments.execution.runner import RunRequest  # late: start-up
-    from dva_sim.experiments.report.report import write_report  # late: start-up
+    from dva_sim.experiments.runner import run_study  # late: start-up
 
-    request = RunRequest(options)
-    plan = rehearse_all(request.open())
-    request.run(plan, options.progress)
-    problems = request.record(plan)
-    results = load(request.folder)
-    if options.report:
-        write_report(request.folder)
-    if problems:
-        raise RunsFailed(f"{request.folder}: {'; '.join(problems)}; the results are complete")
+    outcome = run_study(options)
+    results = load(outcome.results.folder)
+    if outcome.unrecorded:
+        problems = "; ".join(outcome.unrecorded)
+        raise RunsFailed(f"{results.folder}: {problems}; the results are complete")
     return results
 
 
@@ -155,12 +149,13 @@ def dry_run(options: RunOptions) -> DryRun:
     Raises:
         DvaSimError: a mistake in what was asked for.
     """
-    from dva_sim.experiments.execution.dry_run import rehearse_all  # late: start-up
-    from dva_sim.experiments.execution.runner import RunRequest  # late: start-up
+    from dva_sim.experiments.execution.dry_run import dry_run as preview  # late: start-up
     from dva_sim.experiments.execution.scheduling import run_job  # late: start-up
+    from dva_sim.experiments.runner import StudyListener, planned_study  # late: start-up
 
-    request = RunRequest(options)
-    return request.dry_run(rehearse_all(request.open()), run_job)
+    plan = planned_study(options, StudyListener())
+    jobs = options.jobs if options.scheduler is None else 1  # nobody knows how many are free there
+    return preview(plan, options.results_folder, jobs=jobs, probe=run_job)
 
 
 @_with(NewOptions)
@@ -199,13 +194,13 @@ def tune(options: TuneOptions) -> TunedValues:
     Raises:
         DvaSimError: the study tunes nothing, or runs failed.
     """
-    from dva_sim.experiments.analysis import tuning  # late: start-up
+    from dva_sim.experiments import trials  # late: start-up
     from dva_sim.experiments.study.file_kinds import open_study  # late: start-up
     from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned  # late: start-up
 
     asked = open_study(options.study)
     folder = Path(options.out or folder_of_tuning(str(options.study)))
-    tuned = tuning.tune(asked, folder, jobs=options.jobs, progress=options.progress)
+    tuned = trials.tune(asked, folder, jobs=options.jobs, progress=options.progress)
     save_tuned(asked, tuned)
     return tuned
 

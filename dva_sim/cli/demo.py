@@ -15,7 +15,6 @@ from typing import Final
 from dva_sim.cli import study_runs
 from dva_sim.cli.console import say
 from dva_sim.cli.stories import episode
-from dva_sim.experiments.execution.runner import RunRequest
 from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.kernel.errors import DvaSimError, ExitCode
 from dva_sim.options.runs import EpisodeOptions
@@ -58,7 +57,7 @@ def demo(out: Path, jobs: int | None) -> ExitCode:
     episode(EpisodeRequest(drive))
     say("")
     with _film_under_way(out / FILM):
-        code = study_runs.run(RunRequest(RunOptions(STUDY, out, quick=True, jobs=jobs)))
+        code = study_runs.run(RunOptions(STUDY, out, quick=True, jobs=jobs))
     if code in (ExitCode.OK, ExitCode.RUNS_FAILED):
         _tell(out, time.monotonic() - began)
     return code

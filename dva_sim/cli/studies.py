@@ -55,14 +55,12 @@ def run(
         dva-sim run mine.yaml --set 'link.delay_s=[0, 0.5]'  # other levels of a factor
     """
     from dva_sim.cli import study_runs  # late: start-up
-    from dva_sim.experiments.execution.runner import RunRequest  # late: start-up
 
-    request = RunRequest(options)
     with loudness(quiet, verbose):
         if dry_run:
-            study_runs.plan(request)
+            study_runs.plan(options)
             return
-        code = study_runs.run(request)
+        code = study_runs.run(options)
     raise typer.Exit(code)
 
 

@@ -11,26 +11,28 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import BarColumn, TextColumn
+from rich.progress import Progress as Bars
+from typing_extensions import override
 
 from dva_sim.cli.console import console, say, warn
 from dva_sim.cli.verbosity import WRITTEN, detail, is_verbose, tell_cells, tell_files
-from dva_sim.experiments.execution.dry_run import DryRun, contradictions_in, dry_run, rehearse_all
-from dva_sim.experiments.execution.runner import RunRequest
+from dva_sim.experiments.execution.dry_run import DryRun, contradictions_in, dry_run
 from dva_sim.experiments.execution.scheduling import Simulate, run_job
 from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.runner import StudyListener, planned_study, run_study
 from dva_sim.experiments.study import coverage
 from dva_sim.experiments.study.answerable import why_unanswered
-from dva_sim.experiments.study.factor_levels import cells_of_repeats, runs_of, size
+from dva_sim.experiments.study.factor_levels import runs_of
 from dva_sim.experiments.study.file_kinds import open_study
-from dva_sim.experiments.study.plan import StudyPlan
+from dva_sim.experiments.study.plan import Progress, StudyPlan
 from dva_sim.experiments.study.screening import file_of as file_of_screening
 from dva_sim.experiments.study.screening import folder_of_screening, screened, screening_study
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned, tuning_study
 from dva_sim.kernel.errors import ExitCode, error_line
 from dva_sim.kernel.wording import capital
-from dva_sim.options.studies import TuneOptions
+from dva_sim.options.studies import RunOptions, TuneOptions
 
 _FEW = 5  # failures that are told one by one
 _MANY = 500  # configurations, which take some seconds to check
@@ -41,35 +43,26 @@ _HOUR_S = 3600
 _SURE_AFTER_S, _SURE_SHARE = 10.0, 0.05  # before both, the first runs say little of the others
 
 
-def run(request: RunRequest) -> ExitCode:
+def run(options: RunOptions) -> ExitCode:
     """Run a study and show how far it is, then write its report; the exit code."""
-    from dva_sim.experiments.report.report import write_report  # late: start-up
-
     try:
-        plan = _loaded(request)
-        before = _planned(request, plan)
-        folder = request.folder
-        with _shown("running", before.runs) as show:
-            request.run(plan, show)
-        results = Results.load(folder)
-        failures = _report_failures(results) + _recorded(request, plan)
-        with console.status("Writing the report ..."):
-            report = write_report(folder)
-            distrusted = results.distrusted
-        for part, entry in distrusted.items():
-            problem = f"in part {part} {entry}: no contrast of it is shown"
-            print(error_line(problem), file=sys.stderr)
-        tell_files(folder, *WRITTEN)
-        detail(f"{results.machine.get('cpu_s', 0):.1f} s of CPU time in all runs")
+        results, unrecorded, report = run_study(options, _Shown(options))
     except KeyboardInterrupt as stopped:
         return _stopped(stopped)
+    distrusted = results.distrusted
+    for part, entry in distrusted.items():
+        problem = f"in part {part} {entry}: no contrast of it is shown"
+        print(error_line(problem), file=sys.stderr)
+    tell_files(results.folder, *WRITTEN)
+    detail(f"{results.machine.get('cpu_s', 0):.1f} s of CPU time in all runs")
     say(f"Report: {report}")
-    return ExitCode.RUNS_FAILED if failures or distrusted else ExitCode.OK
+    failed = results.failures or unrecorded or distrusted
+    return ExitCode.RUNS_FAILED if failed else ExitCode.OK
 
 
 def tune(options: TuneOptions) -> ExitCode:
     """Choose what a study has tuned, and write it beside the study; the exit code."""
-    from dva_sim.experiments.analysis.tuning import tune as try_all  # late: start-up
+    from dva_sim.experiments.trials import tune as try_all  # late: start-up
 
     asked = open_study(options.study)
     jobs = options.jobs
@@ -79,7 +72,7 @@ def tune(options: TuneOptions) -> ExitCode:
     before = dry_run(trials, folder, jobs=jobs)
     say(_plan(before, folder))
     try:
-        with _shown("trying", before.runs) as show:
+        with _bar("trying", before.runs) as show:
             tuned = try_all(asked, folder, jobs=jobs, progress=show)
     except KeyboardInterrupt as stopped:
         return _stopped(stopped)
@@ -96,8 +89,8 @@ def tune(options: TuneOptions) -> ExitCode:
 def screen(study: str, out: str | None, jobs: int | None, only_plan: bool) -> ExitCode:
     """Vary the assumed numbers behind a study's answer, and draw what moves it; the exit code."""
     from dva_sim.experiments.analysis.screening import TABLE  # late: start-up
-    from dva_sim.experiments.analysis.screening import screen as run_all  # late: start-up
     from dva_sim.experiments.report.figures.screening import draw_screening  # late: start-up
+    from dva_sim.experiments.trials import screen as run_all  # late: start-up
 
     asked = open_study(study)
     trials = screening_study(asked)
@@ -110,7 +103,7 @@ def screen(study: str, out: str | None, jobs: int | None, only_plan: bool) -> Ex
         say(escape(_time(before)))
         return ExitCode.OK
     try:
-        with _shown("screening", before.runs) as show:
+        with _bar("screening", before.runs) as show:
             found = run_all(asked, folder, jobs=jobs, progress=show)
     except KeyboardInterrupt as stopped:
         return _stopped(stopped)
@@ -121,44 +114,85 @@ def screen(study: str, out: str | None, jobs: int | None, only_plan: bool) -> Ex
     return ExitCode.OK
 
 
-def plan(request: RunRequest) -> None:
+def plan(options: RunOptions) -> None:
     """Say what `run` would do."""
-    say(escape(_time(_planned(request, _loaded(request), run_job))))
+    shown = _Shown(options, run_job)
+    planned_study(options, shown)
+    say(escape(_time(shown.preview)))
 
 
-def _loaded(request: RunRequest) -> StudyPlan:
-    """The plan of a study without mistakes."""
-    study = request.open()
-    say(f"[bold]{escape(study.question)}[/bold]")
-    plan = _checked(study)
-    tell_cells(study, plan.cells)
-    return plan
+class _Shown(StudyListener):
+    """Prints what happens to a study on its way.
 
+    Args:
+        options: Options that it is run with.
+        probe: Function that makes the tables of a run that is tried for the estimate of the time.
 
-def _checked(study: Study) -> StudyPlan:
-    """Find mistakes before the first run; print a note if that takes a while."""
-    count = size(study) * len(study.parts) + cells_of_repeats(study)
-    if count < _MANY:
-        plan = rehearse_all(study)
-    else:
-        say("Checking every configuration before the first run ...")
-        with _shown("checking", count, "configurations") as show:
-            plan = rehearse_all(study, show)
-    warn([*study.lost, *why_unanswered(study), *contradictions_in(plan.cells)])
-    return plan
+    Attributes:
+        preview: Number and cost of the runs, once they are planned.
+    """
 
+    preview: DryRun
 
-def _planned(request: RunRequest, plan: StudyPlan, probe: Simulate | None = None) -> DryRun:
-    """Say what will run."""
-    if (most := runs_of(plan.study)) > _MANY_RUNS:
-        say(f"Making the list of up to {most:,} runs ...")
-    found = request.dry_run(plan, probe)
-    if found.remark:
-        say(f"[yellow]{escape(found.remark)}[/yellow]")
-    say(escape(_plan(found, request.folder)))
-    for remark in coverage.remarks(plan.study):
-        say(escape(capital(remark)))
-    return found
+    def __init__(self, options: RunOptions, probe: Simulate | None = None) -> None:
+        self._options = options
+        self._probe = probe
+
+    @override
+    def opened(self, study: Study) -> None:
+        say(f"[bold]{escape(study.question)}[/bold]")
+
+    @override
+    def planned(self, plan: StudyPlan) -> None:
+        study = plan.study
+        warn([*study.lost, *why_unanswered(study), *contradictions_in(plan.cells)])
+        tell_cells(study, plan.cells)
+        if (most := runs_of(study)) > _MANY_RUNS:
+            say(f"Making the list of up to {most:,} runs ...")
+        folder = self._options.results_folder
+        # With a scheduler nobody knows how many processes are free there.
+        jobs = self._options.jobs if self._options.scheduler is None else 1
+        self.preview = dry_run(plan, folder, jobs=jobs, probe=self._probe)
+        if self.preview.remark:
+            say(f"[yellow]{escape(self.preview.remark)}[/yellow]")
+        say(escape(_plan(self.preview, folder)))
+        for remark in coverage.remarks(study):
+            say(escape(capital(remark)))
+
+    @override
+    def ran(self, results: Results) -> None:
+        failures = results.failures
+        for f in failures if is_verbose() else failures[:_FEW]:
+            where = f"{f['part']}, cell {f['cell']}, person {f['person']}, trial {f['trial']}"
+            say(f"[red]failed:[/red] {where}: {escape(str(f['error']).splitlines()[-1])}")
+        if failures:
+            failed = _counted(len(failures), "run")
+            problem = f"{failed} failed; repeat the same command to retry"
+            print(error_line(problem), file=sys.stderr)
+
+    @override
+    def recorded(self, problems: list[str]) -> None:
+        for problem in problems if is_verbose() else problems[:_FEW]:
+            say(f"[red]not recorded:[/red] {escape(problem)}")
+        if problems:
+            failed = _counted(len(problems), "run")
+            print(error_line(f"{failed} could not be recorded"), file=sys.stderr)
+
+    @override
+    @contextmanager
+    def progress(self, step: str, total: int) -> Iterator[Progress]:
+        if step == "reporting":
+            with console.status("Writing the report ..."):
+                yield lambda *_: None
+        elif step == "checking" and total < _MANY:
+            yield lambda *_: None
+        else:
+            if step == "checking":
+                say("Checking every configuration before the first run ...")
+            if step == "recording" and self._options.scheduler is not None:
+                say("Recordings are made on this machine, from the same seeds")
+            with _bar(step, total, "configurations" if step == "checking" else "runs") as show:
+                yield show
 
 
 def _plan(found: DryRun, folder: Path) -> str:
@@ -188,34 +222,6 @@ def _counted(number: int, one: str, many: str | None = None) -> str:
     return f"{number} {one if number == 1 else many or f'{one}s'}"
 
 
-def _report_failures(results: Results) -> int:
-    failures = results.failures
-    for f in failures if is_verbose() else failures[:_FEW]:
-        where = f"{f['part']}, cell {f['cell']}, person {f['person']}, trial {f['trial']}"
-        say(f"[red]failed:[/red] {where}: {escape(str(f['error']).splitlines()[-1])}")
-    if failures:
-        failed = _counted(len(failures), "run")
-        problem = f"{failed} failed; repeat the same command to retry"
-        print(error_line(problem), file=sys.stderr)
-    return len(failures)
-
-
-def _recorded(request: RunRequest, plan: StudyPlan) -> int:
-    """Make the recordings that the study asks for; how many could not be made."""
-    if plan.study.record is None:
-        return 0
-    if request.options.scheduler is not None:
-        say("Recordings are made on this machine, from the same seeds")
-    with _shown("recording", 0) as show:
-        problems = request.record(plan, show)
-    for problem in problems if is_verbose() else problems[:_FEW]:
-        say(f"[red]not recorded:[/red] {escape(problem)}")
-    if problems:
-        failed = _counted(len(problems), "run")
-        print(error_line(f"{failed} could not be recorded"), file=sys.stderr)
-    return len(problems)
-
-
 def _stopped(how: KeyboardInterrupt) -> ExitCode:
     """Say what was done, and the command that goes on."""
     say(f"Stopped: {how}" if str(how) else "Stopped.")
@@ -225,14 +231,14 @@ def _stopped(how: KeyboardInterrupt) -> ExitCode:
 
 # --- progress --------------------------------------------------------------------------
 @contextmanager
-def _shown(what: str, total: int, things: str = "runs") -> Iterator[Callable[[int, int], None]]:
+def _bar(what: str, total: int, things: str = "runs") -> Iterator[Progress]:
     """A bar on a terminal; elsewhere a line now and then."""
     pace = RunPace(time.monotonic, things)
     if not console.is_terminal:
         yield _Lines(console, pace).show
         return
     columns = (TextColumn(what), BarColumn(), TextColumn("{task.fields[pace]}"))
-    with Progress(*columns, console=console) as bar:
+    with Bars(*columns, console=console) as bar:
         task = bar.add_task(what, total=total, pace="")
 
         def show(done: int, total: int) -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import Annotated, Protocol
+from typing import Annotated, Literal, Protocol
 
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.options.forms import AnyPath, Jobs, OptionForm, Overwrite, Settings, argument, out_form
 
 
@@ -72,6 +73,23 @@ class RunOptions:
         OptionForm(also="Called with the number of runs done and of all runs, as they finish."),
     ] = None
     report: Annotated[bool, OptionForm(also="True to write the report.")] = True
+
+    @property
+    def version(self) -> Literal["quick", "full"] | None:
+        """The small or the larger version; None for the study as its file says.
+
+        Raises:
+            ConfigError: both are asked for.
+        """
+        if self.quick and self.full:
+            raise ConfigError("--quick and --full are two versions of a study; give one of them")
+        return "quick" if self.quick else "full" if self.full else None
+
+    @property
+    def results_folder(self) -> Path:
+        """Folder of the results; by default one for each variant of a study."""
+        marks = [Path(self.study).stem, self.version, None if self.pilot is None else "pilot"]
+        return Path(self.out or Path("results") / "-".join(filter(None, marks)))
 
 
 @dataclass(frozen=True, eq=False, match_args=False)

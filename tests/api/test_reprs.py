@@ -1,11 +1,10 @@
 """Prompt display of results: fits a screen, and names the available queries."""
 
 import pytest
-from helpers.studies.small_study import cheap, study_in
+from helpers.studies.small_study import cheap, run_study, study_in
 from helpers.wording import unnamed
 
 import dva_sim
-from dva_sim.experiments.execution.runner import run_study
 
 LINES, CHARACTERS = 8, 800  # a screen of 80 x 24 has room for more than twice as many
 

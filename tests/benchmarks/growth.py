@@ -251,8 +251,9 @@ def like(rows: dict[str, list[dict[str, Any]]], job: Any) -> dict[str, list[dict
 
 def a_study(kind: str, size: int, folder: Path) -> Costs:
     """A study with so many runs, none of which is simulated: what everything else costs."""
+    from helpers.studies.small_study import run_study
+
     from dva_sim import api
-    from dva_sim.experiments.execution.runner import run_study
     from dva_sim.experiments.study.cell_grid import cells, jobs
     from dva_sim.experiments.study.file_kinds import open_study
     from dva_sim.simulation.models import model_for

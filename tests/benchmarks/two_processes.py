@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from benchmarks.goals import goal
 from helpers.studies import small_study as kit
+from helpers.studies.small_study import run_study
 
 from dva_sim.experiments.execution import executors
-from dva_sim.experiments.execution.runner import run_study
 
 STAT = Path("/proc/stat")
 

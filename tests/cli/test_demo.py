@@ -5,8 +5,8 @@ from helpers.wording import unnamed
 
 from dva_sim.cli import demo as module
 from dva_sim.cli.demo import FILM, PICTURE, STUDY, demo
-from dva_sim.experiments.execution.runner import RunRequest
 from dva_sim.kernel.errors import DvaSimError, ExitCode
+from dva_sim.options.studies import RunOptions
 
 pytestmark = pytest.mark.system
 
@@ -18,8 +18,8 @@ def played(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, bool]]:
     """Steps of the demo, in order, each with whether the picture existed; nothing is run."""
     done: list[tuple[str, bool]] = []
 
-    def study(request: RunRequest) -> ExitCode:
-        done.append((request.options.study, (request.folder / PICTURE).exists()))
+    def study(options: RunOptions) -> ExitCode:
+        done.append((options.study, (options.results_folder / PICTURE).exists()))
         return ExitCode.INTERRUPTED
 
     monkeypatch.setattr(module.study_runs, "run", study)

@@ -7,12 +7,11 @@ import pytest
 from generators import json_output
 from helpers.processes.command_line import ended as say
 from helpers.studies.report_text import blank_pictures
-from helpers.studies.small_study import cheap, study_in, unlucky
+from helpers.studies.small_study import cheap, run_study, study_in, unlucky
 from helpers.wording import unnamed
 
 from dva_sim.cli import call, names
 from dva_sim.experiments.execution.dry_run import _Tried
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.kernel.errors import ExitCode
 from dva_sim.testing.promises import plural
 
@@ -187,7 +186,7 @@ def test_a_dry_run_tells_every_configuration_if_asked_to(tmp_path, monkeypatch):
 
 
 def test_runs_that_failed_are_told_on_standard_error_however_quiet(tmp_path, monkeypatch):
-    monkeypatch.setattr("dva_sim.experiments.execution.runner.run_job", one_fails)
+    monkeypatch.setattr("dva_sim.experiments.execution.session.run_job", one_fails)
     path = study_in(tmp_path).file
     with blank_pictures():
         code, out, err = say("run", path, "-q", "-j", 1, "-o", tmp_path / "out")

@@ -8,11 +8,10 @@ import shutil
 import pytest
 from helpers.processes.command_line import ended as command
 from helpers.studies import synthetic_results as synthetic
-from helpers.studies.small_study import cheap, study_in, unlucky
+from helpers.studies.small_study import cheap, run_study, study_in, unlucky
 from helpers.wording import unnamed
 from rich.console import Console
 
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.report import terminal
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.results import Results

@@ -13,7 +13,7 @@ from dva_sim.cli import study_runs
 from dva_sim.cli.study_runs import RunPace, duration
 from dva_sim.experiments.execution.checkpoint import Checkpoint, RunOutcome
 from dva_sim.experiments.execution.dry_run import DryRun, _spread, dry_run
-from dva_sim.experiments.execution.runner import RunRequest, run_study
+from dva_sim.experiments.execution.session import StudySession
 from dva_sim.experiments.results.manifest import manifest_of
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.plan import StudyPlan
@@ -142,14 +142,14 @@ def test_what_is_stopped_names_the_command_that_goes_on(tmp_path, monkeypatch, c
     study = kit.write_study(tmp_path)
     monkeypatch.setattr(sys, "argv", ["dva-sim", "run", "my study.yaml", "--set", "seed=3"])
 
-    def stop(*_: object, progress: object, **__: object) -> None:
-        raise KeyboardInterrupt("interrupted after 7 of 42 runs")
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
 
-    monkeypatch.setattr("dva_sim.experiments.execution.runner.run_study", stop)
-    code = study_runs.run(RunRequest(RunOptions(study, tmp_path / "out", jobs=1)))
+    monkeypatch.setattr(StudySession, "run", stop)
+    code = study_runs.run(RunOptions(study, tmp_path / "out", jobs=1))
     assert code == 130
     *_, what, how = capsys.readouterr().out.splitlines()
-    assert "7 of 42 runs" in what
+    assert "0 of 42 runs" in what
     assert unnamed(how, "dva-sim run 'my study.yaml'", "--set seed=3") == []
 
 
@@ -157,6 +157,6 @@ def test_ctrl_c_while_tables_are_written_says_that_all_runs_are_done(tmp_path, m
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("dva_sim.experiments.execution.runner.write_tables", stop)
+    monkeypatch.setattr("dva_sim.experiments.execution.session.write_tables", stop)
     with pytest.raises(KeyboardInterrupt, match="42 of 42 runs"):
-        run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=1, episode=kit.cheap)
+        kit.run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=1, episode=kit.cheap)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 from helpers.studies import small_study as kit
+from helpers.studies.small_study import run_study
 
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from helpers.studies.small_study import run_study
 from helpers.wording import unnamed
 
 from dva_sim.experiments.execution.kept_recordings import (
@@ -15,12 +16,10 @@ from dva_sim.experiments.execution.kept_recordings import (
     name_of,
     position_of,
     record_study,
-    refuse_what_cannot_be_recorded,
 )
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.loading import load_study
-from dva_sim.experiments.study.plan import StudyPlan
+from dva_sim.experiments.study.plan import StudyPlan, checked_plan
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.reading import read_recording
 
@@ -102,7 +101,7 @@ def kept(tmp_path_factory):
     """A study with its recordings, made in this process."""
     folder = tmp_path_factory.mktemp("study")
     study = study_in(folder, "worst")
-    out = run_study(study, folder / "out", jobs=1)
+    out = run_study(study.model_copy(update={"record": None}), folder / "out", jobs=1)
     counts = []
     assert record_study(study, out, jobs=1, progress=lambda *n: counts.append(n)) == []
     assert counts == [(0, 3), (1, 3), (2, 3), (3, 3)]
@@ -201,7 +200,7 @@ def test_what_cannot_be_recorded_is_told_with_its_place(tmp_path):
     )
     timed = load_study(tmp_path / "timed.yaml")
     with pytest.raises(ConfigError, match=r"timed\.yaml:5:1: record: all"):
-        refuse_what_cannot_be_recorded(StudyPlan.of(timed))
+        checked_plan(timed)
 
 
 def test_a_full_disk_costs_recordings_and_not_the_study(emptied):

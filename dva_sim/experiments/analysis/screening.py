@@ -1,4 +1,4 @@
-"""Screening: run every point, or go on with it, and say which assumed numbers move the answer."""
+"""Screening: the assumed numbers that move an answer, from the runs of every point."""
 
 from __future__ import annotations
 
@@ -10,14 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
-from dva_sim.experiments.execution.runner import Progress, run_study
-from dva_sim.experiments.execution.scheduling import LIMIT_S, Simulate
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.parts import POINT
-from dva_sim.experiments.study.screening import rule_of, screened, screening_study, walks_of
+from dva_sim.experiments.study.screening import rule_of, screened, walks_of
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.assumed import Assumption
-from dva_sim.kernel.errors import RunsFailed
 from dva_sim.statistics.morris import ElementaryEffects, elementary_effects
 
 MOST_MOVING = 5  # that figures and texts show
@@ -59,37 +56,6 @@ class Screening:
                 effects = [f"{value:.6g}" for value in (found.size, *ends, found.spread)]
                 table.writerow([*about, *effects])
         return path
-
-
-def screen(
-    study: Study,
-    out: str | Path,
-    *,
-    jobs: int | None = None,
-    episode: Simulate | None = None,
-    progress: Progress | None = None,
-    limit_s: float = LIMIT_S,
-) -> Screening:
-    """Run what the folder does not hold yet, and judge all of it.
-
-    Args:
-        out: Results folder.
-        jobs: Processes; by default one for each core.
-        episode: Function that makes the tables of one run; by default a simulation.
-        progress: Called with the number of runs done and of all runs, as they finish.
-        limit_s: A run that takes longer, by the wall clock, has failed.
-
-    Raises:
-        ConfigError: the study is not screened.
-        RunsFailed: some did, so that points would be judged by different persons.
-    """
-    trials = screening_study(study)
-    run_study(trials, out, jobs=jobs, episode=episode, progress=progress, limit_s=limit_s)
-    results = Results.load(out)
-    if results.failures:
-        error = str(results.failures[0]["error"])
-        raise RunsFailed(f"{len(results.failures)} runs failed, so nothing is judged: {error}")
-    return judged(study, results)
 
 
 def judged(study: Study, results: Results) -> Screening:

@@ -6,23 +6,21 @@ import math
 import re
 import time
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 from dva_sim.experiments.execution import executors
 from dva_sim.experiments.execution.checkpoint import Checkpoint
-from dva_sim.experiments.execution.kept_recordings import refuse_what_cannot_be_recorded
 from dva_sim.experiments.execution.scheduling import Simulate, clock_of, limited
 from dva_sim.experiments.results.manifest import manifest_of
 from dva_sim.experiments.results.results import JOURNAL
-from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.cell_grid import DesignCell, RunKey, StudyJob
 from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.experiments.study.stopping import rounds
 from dva_sim.experiments.study.study import Study
-from dva_sim.kernel.errors import ConfigError, RunTooLong
+from dva_sim.kernel.errors import RunTooLong
 from dva_sim.simulation.models import model_for
 
 PROBE_S = 5.0  # after so long no further run is tried,
@@ -79,7 +77,7 @@ def dry_run(
     jobs: int | None = None,
     probe: Simulate | None = None,
 ) -> DryRun:
-    """Return what `run_study` would do, without doing it.
+    """Return what running a study would do, without doing it.
 
     Args:
         asked: From `load_study`, or its plan if that has been made.
@@ -202,29 +200,3 @@ def contradictions_in(cells: Sequence[DesignCell]) -> list[str]:
     return [
         f"{alike[0]} (in {len(alike)} of {len(cells)} configurations)" for alike in found.values()
     ]
-
-
-def rehearse_all(
-    study: Study, progress: Callable[[int, int], object] = lambda *_: None
-) -> StudyPlan:
-    """Build one run of every configuration, so that a mistake is found before the first run.
-
-    Args:
-        study: From `load_study`.
-        progress: Called with the number of configurations that were built, and of all.
-
-    Returns:
-        The study's plan, to be run.
-
-    Raises:
-        ConfigError: what cannot be read, placed or recorded, or what this machine lacks.
-    """
-    plan = StudyPlan.of(study)
-    refuse_what_cannot_be_recorded(plan)
-    missing = {model_for(cell.scenario).lacks(cell.scenario): None for cell in plan.rehearsed}
-    if problems := list(filter(None, missing)):
-        raise ConfigError("; ".join(problems))
-    for done, cell in enumerate(plan.rehearsed, 1):
-        cell_grid.rehearse(study, cell)
-        progress(done, len(plan.rehearsed))
-    return plan

@@ -9,7 +9,7 @@ from __future__ import annotations
 import errno
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from itertools import groupby
@@ -22,7 +22,7 @@ from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.results.tables import DESIGN_COLUMNS
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.hashing import stable_hash
-from dva_sim.experiments.study.plan import StudyPlan
+from dva_sim.experiments.study.plan import Progress, StudyPlan
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.simulation.full import simulate
@@ -34,28 +34,8 @@ from dva_sim.simulation.scenario import Scenario
 FOLDER = "recordings"
 _FULL = os.strerror(errno.ENOSPC)
 
-Progress = Callable[[int, int], object]
 Row = Mapping[str, Any]
 RunPosition = tuple[str, int, int, int]  # part, cell, person, trial
-
-
-def refuse_what_cannot_be_recorded(plan: StudyPlan) -> None:
-    """Better told before anything is run.
-
-    Raises:
-        ConfigError: no part has runs that can be recorded, or the worst is asked for where no
-            answer says by which measure.
-    """
-    study = plan.study
-    scenarios = plan.scenarios.values()
-    if study.record is None:
-        return
-    if not any(model_for(scenario).is_recorded for scenario in scenarios):
-        models = ", ".join(sorted({scenario.model for scenario in scenarios}))
-        problem = f"record: {study.record} needs runs of the full model; this study's are {models}"
-        raise study.error(problem, ("record",))
-    if study.record == "worst" and study.answer is None:
-        raise study.error("record: worst needs an answer: it says by which measure", ("record",))
 
 
 def record_study(
@@ -80,13 +60,12 @@ def record_study(
         line for all of them.
 
     Raises:
-        ConfigError: what `refuse_what_cannot_be_recorded` says, or no results there.
+        ConfigError: no results there.
         FolderInUse: another process writes into the folder.
         DvaSimError: the folder cannot be written.
         KeyboardInterrupt: after tidying up; its message says what has been done.
     """
     plan = StudyPlan.of(asked)
-    refuse_what_cannot_be_recorded(plan)
     if plan.study.record is None:
         return []
     with FolderLock(out):

@@ -56,7 +56,7 @@ def manifest_of(plan: StudyPlan) -> dict[str, Any]:
         "parameter_sets": list(plan.parameter_sets),
         "tuned": None if plan.tuned is None else plan.tuned.model_dump(mode="json"),
         "basis": None if plan.basis is None else plan.basis.model_dump(mode="json"),
-        "runs": len({job.key for job in plan.jobs}),
+        "runs": plan.runs,
         "seeds": {
             "study": study.seed,
             "population": study.seed,

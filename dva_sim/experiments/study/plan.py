@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,8 +13,12 @@ from dva_sim.experiments.study.hashing import input_names
 from dva_sim.experiments.study.inputs import StudyInputs
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import TunedValues, TuningBasis
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.models import AnyScenario, model_for
 from dva_sim.simulation.run_measures import RunMeasure
+
+Progress = Callable[[int, int], object]
+"""Called with a number of things that are done, and of all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,3 +81,37 @@ class StudyPlan:
     def jobs(self) -> list[StudyJob]:
         """All runs in a fixed order: part, cell, person, trial; the repeats last."""
         return cell_grid.jobs(self.study, self.cells)
+
+    @cached_property
+    def runs(self) -> int:
+        """Number of different runs; jobs with equal keys are one."""
+        return len({job.key for job in self.jobs})
+
+
+def checked_plan(study: Study, progress: Progress = lambda *_: None) -> StudyPlan:
+    """Plan a study, and build one run of every cell, so that a mistake is found before the first.
+
+    Args:
+        study: From `load_study`.
+        progress: Called with the number of cells that were built, and of all.
+
+    Raises:
+        ConfigError: what cannot be read, placed or recorded, or what this machine lacks.
+    """
+    plan = StudyPlan.of(study)
+    if study.record is not None:
+        scenarios = plan.scenarios.values()
+        if not any(model_for(scenario).is_recorded for scenario in scenarios):
+            models = ", ".join(sorted({scenario.model for scenario in scenarios}))
+            problem = "needs runs of the full model; this study's are"
+            raise study.error(f"record: {study.record} {problem} {models}", ("record",))
+        if study.record == "worst" and study.answer is None:
+            problem = "record: worst needs an answer: it says by which measure"
+            raise study.error(problem, ("record",))
+    missing = {model_for(cell.scenario).lacks(cell.scenario): None for cell in plan.rehearsed}
+    if problems := list(filter(None, missing)):
+        raise ConfigError("; ".join(problems))
+    for done, cell in enumerate(plan.rehearsed, 1):
+        cell_grid.rehearse(study, cell)
+        progress(done, len(plan.rehearsed))
+    return plan

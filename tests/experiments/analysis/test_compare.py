@@ -5,11 +5,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from helpers.studies.small_study import STUDY, cheap, study_in
+from helpers.studies.small_study import STUDY, cheap, run_study, study_in
 from scipy import stats
 
 from dva_sim.experiments.analysis.compare import Comparison
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError
 

@@ -4,13 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from helpers.studies.small_study import cheap, study_in
+from helpers.studies.small_study import cheap, run_study, study_in
 from helpers.wording import unnamed
 
 from dva_sim.experiments.analysis.compare import Comparison
 from dva_sim.experiments.analysis.fail_conditions import Bound, parse
 from dva_sim.experiments.analysis.gate_verdicts import judge
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError
 

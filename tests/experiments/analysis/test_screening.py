@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from helpers.wording import unnamed
 
-from dva_sim.experiments.analysis.screening import TABLE, screen
+from dva_sim.experiments.analysis.screening import TABLE
 from dva_sim.experiments.execution.scheduling import run_job
 from dva_sim.experiments.report.figures.screening import FIGURE, draw_screening
 from dva_sim.experiments.study.factor_levels import runs_of
@@ -21,6 +21,7 @@ from dva_sim.experiments.study.screening import (
     screened,
     screening_study,
 )
+from dva_sim.experiments.trials import screen
 from dva_sim.kernel.errors import ConfigError
 
 STUDY = """

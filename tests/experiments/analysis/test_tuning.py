@@ -5,11 +5,11 @@ from helpers.studies import small_study as kit
 from helpers.wording import unnamed
 
 from dva_sim.cli import study_runs
-from dva_sim.experiments.analysis.tuning import tune
 from dva_sim.experiments.execution.dry_run import dry_run
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.tuning import choose, file_of, load_tuned, save_tuned, tuning_study
+from dva_sim.experiments.trials import tune
 from dva_sim.kernel import resources
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.options.studies import TuneOptions

@@ -11,11 +11,11 @@ import pytest
 from helpers.paths import PYTHON_PATH
 from helpers.processes import patience
 from helpers.studies import small_study as kit
+from helpers.studies.small_study import run_study
 from helpers.wording import unnamed
 
 from dva_sim.experiments.execution import scheduling
 from dva_sim.experiments.execution.dry_run import dry_run
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.report.report import write_report
 from dva_sim.experiments.results.results import JOURNAL, Results
 from dva_sim.experiments.results.tables import write_tables
@@ -47,7 +47,7 @@ def test_tables_that_are_written_are_left_alone_unless_the_program_is_being_chan
     study = kit.study_in(tmp_path)
     whole, written = kit.files(run_study(study, out, jobs=1, episode=never)), []
     monkeypatch.setattr(
-        "dva_sim.experiments.execution.runner.write_tables",
+        "dva_sim.experiments.execution.session.write_tables",
         lambda *words: written.append(write_tables(*words)),
     )
 
@@ -89,7 +89,7 @@ def test_a_disk_that_fills_up_at_the_manifest_is_told(tmp_path, out, monkeypatch
         (folder / f".manifest.{os.getpid()}.json").symlink_to("/dev/full")
 
     with monkeypatch.context() as patch:
-        patch.setattr("dva_sim.experiments.execution.runner._tidy", instead)
+        patch.setattr("dva_sim.experiments.execution.session._tidy", instead)
         with pytest.raises(DvaSimError, match=r"manifest\.json .* No space"):
             run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)
     assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)) == whole
@@ -182,7 +182,7 @@ def test_the_tables_lock_ends_with_the_runner_that_holds_it(tmp_path, out):
 
     (out / "manifest.json").unlink()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("dva_sim.experiments.execution.runner.write_tables", full)
+        patch.setattr("dva_sim.experiments.execution.session.write_tables", full)
         with pytest.raises(DvaSimError, match="full"):
             run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)
     run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)

@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from helpers.studies import small_study as kit
 from helpers.studies.dask_cluster import DaskCluster
+from helpers.studies.small_study import run_study
 from helpers.wording import unnamed
 
 from dva_sim.experiments.execution import dask_cluster, scheduling
 from dva_sim.experiments.execution.executors import WorkersLost
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 

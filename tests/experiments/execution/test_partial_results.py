@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from helpers.studies import small_study as kit
 from helpers.studies.report_text import words_of
+from helpers.studies.small_study import run_study
 
 from dva_sim.cli.results_json import shown
 from dva_sim.experiments.execution.checkpoint import load_so_far
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.cell_grid import StudyJob

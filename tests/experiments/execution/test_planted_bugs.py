@@ -8,21 +8,22 @@ import pytest
 from helpers.studies import interrupted_study as interrupted
 from helpers.studies import small_study as kit
 
-from dva_sim.experiments.execution import checkpoint, runner
+from dva_sim.experiments.execution import checkpoint
 from dva_sim.experiments.execution.checkpoint import Checkpoint, RunOutcome
+from dva_sim.experiments.execution.session import StudySession
 
 KILLS = 40
 
 
 def written_early(monkeypatch):
     """A run is in the journal before it has ended; its tables come when it has."""
-    run = runner._Session.run
+    run = StudySession.run
 
     def early(self, rest):
-        self.checkpoint.add([RunOutcome(job.key, json.dumps({"runs": []})) for job in rest])
+        self.journal.add([RunOutcome(job.key, json.dumps({"runs": []})) for job in rest])
         run(self, rest)
 
-    monkeypatch.setattr(runner._Session, "run", early)
+    monkeypatch.setattr(StudySession, "run", early)
     replaced = checkpoint._ADD.replace("WHERE tables IS NULL", "WHERE true")
     monkeypatch.setattr(checkpoint, "_ADD", replaced)
 

@@ -14,11 +14,11 @@ import pytest
 from helpers.paths import PYTHON_PATH
 from helpers.processes.patience import PATIENCE_S
 from helpers.studies import small_study as kit
+from helpers.studies.small_study import run_study
 from helpers.wording import unnamed
 
 from dva_sim.experiments.execution import scheduling
 from dva_sim.experiments.execution.dry_run import dry_run
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results import manifest
 from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError

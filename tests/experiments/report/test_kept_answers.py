@@ -5,11 +5,10 @@ from dataclasses import replace
 
 import pytest
 from generators import results
-from helpers.studies.small_study import cheap, study_in
+from helpers.studies.small_study import cheap, run_study, study_in
 from helpers.wording import unnamed
 
 from dva_sim.cli import answers as command
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.execution.sampled_runs import SampledRun, sampled_jobs
 from dva_sim.experiments.report import kept_answers
 from dva_sim.experiments.results.manifest import manifest_of

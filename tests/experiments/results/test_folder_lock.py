@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from helpers.processes import patience
 from helpers.studies import small_study as kit
+from helpers.studies.small_study import run_study
 from helpers.wording import unnamed
 
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results import folder_lock
 from dva_sim.experiments.results.folder_lock import LOCK, FolderInUse, FolderLock
 from dva_sim.experiments.study import registration

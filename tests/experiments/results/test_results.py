@@ -6,10 +6,9 @@ import math
 import numpy as np
 import pytest
 from helpers.studies import synthetic_results as synthetic
-from helpers.studies.small_study import cheap, study_in
+from helpers.studies.small_study import cheap, run_study, study_in
 
 import dva_sim
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Frame, Results
 from dva_sim.kernel.errors import ConfigError
 

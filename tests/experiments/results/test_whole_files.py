@@ -12,8 +12,8 @@ import pytest
 from helpers.paths import PYTHON_PATH
 from helpers.processes.command_line import call
 from helpers.studies import small_study as kit
+from helpers.studies.small_study import run_study
 
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.report import report
 from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.csv_cells import harmless

@@ -4,10 +4,9 @@ import itertools
 
 import numpy as np
 import pytest
-from helpers.studies.small_study import STUDY, cheap, complaint, study_in
+from helpers.studies.small_study import STUDY, cheap, complaint, run_study, study_in
 from helpers.wording import unnamed
 
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.factor_levels import size

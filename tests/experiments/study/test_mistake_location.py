@@ -4,9 +4,9 @@ import pytest
 from helpers.studies.small_study import STUDY, write_study
 from helpers.wording import unnamed
 
-from dva_sim.experiments.execution.dry_run import rehearse_all
 from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.experiments.study.loading import load_study
+from dva_sim.experiments.study.plan import checked_plan
 from dva_sim.experiments.study.scenario_mistakes import mistakes_of
 from dva_sim.kernel.config_overrides import build, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
@@ -21,7 +21,7 @@ def played(request):
 
 def complaint_of_study(folder, *settings):
     with pytest.raises(ConfigError) as caught:
-        rehearse_all(load_study(write_study(folder, STUDY), settings))
+        checked_plan(load_study(write_study(folder, STUDY), settings))
     return str(caught.value)
 
 

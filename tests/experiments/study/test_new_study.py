@@ -1,10 +1,10 @@
 """The study to begin with is one that works."""
 
 import pytest
+from helpers.studies.small_study import run_study
 
 from dva_sim.cli.studies import next_steps
 from dva_sim.experiments.analysis.predictions import judge_all
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid

@@ -4,10 +4,9 @@ import json
 
 import pytest
 from helpers.studies.report_text import words_of
-from helpers.studies.small_study import STUDY, study_in
+from helpers.studies.small_study import STUDY, run_study, study_in
 from helpers.wording import unnamed
 
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.registration import plan_of

@@ -3,9 +3,9 @@ import itertools
 import numpy as np
 import pytest
 from helpers.studies import small_study as kit
+from helpers.studies.small_study import run_study
 from helpers.wording import unnamed
 
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.factor_levels import latin_hypercube, parameter_sets

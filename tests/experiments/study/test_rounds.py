@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from helpers.studies import small_study as kit
 from helpers.studies.report_text import words_of
+from helpers.studies.small_study import run_study
 from helpers.wording import unnamed
 
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.report.study_size import not_reached
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.report.terminal import show

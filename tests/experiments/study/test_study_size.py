@@ -6,7 +6,6 @@ from helpers.studies.small_study import REPEATED, STUDY, study_in, write_study
 from dva_sim.cli import study_runs
 from dva_sim.experiments.execution import dry_run
 from dva_sim.experiments.execution.dry_run import DryRun
-from dva_sim.experiments.execution.runner import RunRequest
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.factor_levels import runs_of
 from dva_sim.experiments.study.loading import load_study
@@ -51,7 +50,7 @@ def test_what_takes_a_while_is_told(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(study_runs, "_MANY", 1)
     monkeypatch.setattr(study_runs, "_MANY_RUNS", 1)
     path = str(write_study(tmp_path))
-    study_runs.plan(RunRequest(RunOptions(path, tmp_path / "out")))
+    study_runs.plan(RunOptions(path, tmp_path / "out"))
     lines = capsys.readouterr().out.splitlines()
     assert lines[1].startswith("Checking every configuration")
     assert lines[-5].startswith("9/9 configurations")

@@ -5,9 +5,8 @@ from functools import partial
 import pytest
 from helpers.paths import ROOT
 from helpers.studies.report_text import words_of
-from helpers.studies.small_study import SHIFT, STUDY, cheap, study_in
+from helpers.studies.small_study import SHIFT, STUDY, cheap, run_study, study_in
 
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid

@@ -20,8 +20,7 @@ from typing import Any
 
 from helpers.studies import small_study as kit
 
-from dva_sim.experiments.execution import runner
-from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.execution import session
 from dva_sim.experiments.report.report import write_report
 from dva_sim.experiments.results.folder_lock import FolderInUse
 from dva_sim.experiments.study.cell_grid import StudyJob
@@ -35,7 +34,7 @@ STEP_KB = 16
 
 
 def run(out: Path, study: Any) -> None:
-    run_study(study, out, jobs=1, episode=reportable)
+    kit.run_study(study, out, jobs=1, episode=reportable)
 
 
 def run_after(out: Path, study: Any) -> None:
@@ -90,18 +89,18 @@ class Dies:
 
 
 def profiled(name: str, profile: Callable[..., None]) -> None:
-    """Profile from the first call of a function of the runner on; what precedes it is not counted.
+    """Profile from the first call of a function of the session on; what precedes it is not counted.
 
     Before the journal is opened a study is read, compiled and described: many times as many calls
     as its cheap runs take, and none that a kill could hurt.
     """
-    call = getattr(runner, name)
+    call = getattr(session, name)
 
     def watched(*arguments: Any) -> Any:
         sys.setprofile(profile)
         return call(*arguments)
 
-    setattr(runner, name, watched)
+    setattr(session, name, watched)
 
 
 def killed_at_a_call(
@@ -139,13 +138,13 @@ def killed_by_the_clock(out: Path, study: Any, cpu_s: float) -> int:
 
 def calls_of(out: Path, study: Any) -> int:
     """The number of calls from the moment when the journal is opened until the study has ended."""
-    opened, count = runner._opened, Dies(0)
+    opened, count = session._opened, Dies(0)
     profiled("_opened", count)
     try:
         run(out, study)
     finally:
         sys.setprofile(None)
-        runner._opened = opened
+        session._opened = opened
     return -count.left
 
 

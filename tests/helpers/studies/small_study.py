@@ -9,15 +9,18 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments import runner
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.options.studies import RunOptions
 from dva_sim.simulation.models import Tables
 
 STUDY = """\
@@ -84,6 +87,14 @@ def write_study(folder: Path, text: str = STUDY) -> Path:
 
 def study_in(folder: Path, *settings: str, text: str = STUDY) -> Study:
     return load_study(write_study(folder, text), settings)
+
+
+def run_study(
+    study: Study, out: Path, *, episode: Callable[[StudyJob], Tables] | None = None, **options: Any
+) -> Path:
+    """Run a study as it was loaded, without a report; its results folder."""
+    asked = RunOptions(study.file, out, report=False, **options)
+    return runner.run_study(asked, study=study, episode=episode).results.folder
 
 
 def complaint(folder: Path, text: str, *settings: str, version: str | None = None) -> str:

@@ -6,10 +6,9 @@ import pytest
 from helpers.network.emulated_link import need_link
 from helpers.wording import unnamed
 
-from dva_sim.experiments.execution.dry_run import rehearse_all
-from dva_sim.experiments.execution.runner import _at_random, _workers
+from dva_sim.experiments.execution.session import _at_random, _workers
 from dva_sim.experiments.study.loading import load_study
-from dva_sim.experiments.study.plan import StudyPlan
+from dva_sim.experiments.study.plan import StudyPlan, checked_plan
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.measures.middleware import tables
 from dva_sim.simulation.middleware import build, lacks, measure
@@ -59,7 +58,7 @@ def test_what_is_not_installed_is_said_before_the_first_run(monkeypatch):
     with pytest.raises(ConfigError, match="paho"):
         measure(scenario, 1)
     with pytest.raises(ConfigError, match="paho") as refused:
-        rehearse_all(load_study("middleware"))
+        checked_plan(load_study("middleware"))
     assert unnamed(str(refused.value), "[mqtt]", "[zenoh]", "[webrtc]", "[dds]") == []
 
 

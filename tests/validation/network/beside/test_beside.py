@@ -6,10 +6,10 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from helpers.studies.small_study import run_study
 from helpers.wording import unnamed
 
 from dva_sim.cli import validation
-from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.errors import ConfigError, ExitCode
