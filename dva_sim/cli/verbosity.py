@@ -89,7 +89,7 @@ def tell_cells(study: Study, cells: Sequence[DesignCell]) -> None:
     """The study's file, and every configuration."""
     if not is_verbose():
         return
-    from dva_sim.experiments.study.cell_grid import REFERENCE  # late: start-up
+    from dva_sim.experiments.study.addresses import REFERENCE  # late: start-up
     from dva_sim.simulation.labels import brief  # late: start-up
 
     detail(f"Study: {study.file}, seed {study.seed}")

@@ -14,7 +14,6 @@ from helpers.wording import unnamed
 from dva_sim.experiments.execution.kept_recordings import (
     chosen,
     name_of,
-    position_of,
     record_study,
 )
 from dva_sim.experiments.study import cell_grid
@@ -60,7 +59,7 @@ def recordings(folder) -> dict[str, bytes]:
 def names(study, values):
     """Names of the files, where the runs came to some values, in the order of the design."""
     rows = {
-        position_of(job): {study.answer.measure: value}
+        job.address: {study.answer.measure: value}
         for job, value in zip(cell_grid.jobs(study), values, strict=True)
     }
     return [name_of(job) for job in chosen(StudyPlan.of(study), rows)]
@@ -89,7 +88,7 @@ def test_where_more_is_better_the_smallest_is_the_worst(tmp_path):
 def test_all_are_all_that_were_run(tmp_path):
     study = study_in(tmp_path, "all")
     assert len(names(study, TIMES)) == 12
-    run = {position_of(job): {} for job in cell_grid.jobs(study)[:5]}
+    run = {job.address: {} for job in cell_grid.jobs(study)[:5]}
     assert [name_of(job) for job in chosen(StudyPlan.of(study), run)][-1] == "drive-0-0-0.mcap"
 
 

@@ -102,10 +102,7 @@ class Shelf:
 
 def _rows_by_name(results: Results) -> dict[str, Row]:
     """The runs of a study by the names that their recordings have."""
-    return {
-        f"{part}-{'reference' if row['is_reference'] else cell}-{person}-{trial}{SUFFIX}": row
-        for (part, cell, person, trial), row in rows_of(results).items()
-    }
+    return {f"{address}{SUFFIX}": row for address, row in rows_of(results).items()}
 
 
 def _answer_of(results: Results | None) -> str:

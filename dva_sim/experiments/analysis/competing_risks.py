@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.run_grid import Floats, Setting, Table, as_floats, codes_of
+from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, Table, as_floats
 from dva_sim.experiments.analysis.study_view import StudyView
+from dva_sim.experiments.study.addresses import Address
 from dva_sim.experiments.study.parts import Level
 from dva_sim.statistics import Interval, cumulative_incidence, paired_difference, share_interval
 
@@ -64,14 +65,12 @@ class Endings:
     """
 
     def __init__(self, view: StudyView, events: Table, runs: Table, horizon: float) -> None:
-        here = np.asarray(events["part"]) == view.part.name
-        here &= ~np.asarray(events["is_reference"]).astype(bool)
-        rows = {name: np.asarray(values)[here] for name, values in events.items()}
+        self._grid = RunGrid(events, view.part.name, view.part.factors)
+        rows = self._grid.treated
         self.horizon = horizon
-        self.way, self.time = _first(rows, _how_drives_ended(rows, runs, view.part.name))
+        self.way, self.time = _first(rows, _how_drives_ended(rows, runs))
         self._view = view
         self._person = rows["person"]
-        self._codes = {f.name: codes_of(rows, f) for f in view.part.factors if f.name in rows}
 
     def __len__(self) -> int:
         return len(self.way)
@@ -92,12 +91,7 @@ class Endings:
         view = self._view
         wanted: Setting = dict(view.panels[0] if panel is None else panel)
         wanted |= {f.name: v for f, v in ((view.line, line), (view.over, stop)) if f}
-        mask = np.ones(len(self), dtype=bool)
-        for factor in view.part.factors:
-            if factor.name in self._codes:
-                code = factor.levels.index(wanted[factor.name])
-                mask &= self._codes[factor.name] == code
-        return mask
+        return self._grid.at(wanted)
 
     def at(self, line: Level, stop: Level, panel: Setting | None = None) -> Ended:
         """Shares by the horizon, each with its 95 % interval over persons."""
@@ -135,13 +129,13 @@ def with_endings(runs: Table, events: Table) -> Table:
     is_true = np.asarray(events["is_true"]).astype(bool)
     times = as_floats(np.asarray(events["confirmation_s"]))
     words = np.asarray(events["outcome"])
-    met: dict[tuple[Any, ...], list[bool]] = defaultdict(list)
-    how: dict[tuple[Any, ...], list[str]] = defaultdict(list)
-    for key, real, time, word in zip(_keys(events), is_true, times, words, strict=True):
+    met: dict[Address, list[bool]] = defaultdict(list)
+    how: dict[Address, list[str]] = defaultdict(list)
+    for key, real, time, word in zip(Address.all_of(events), is_true, times, words, strict=True):
         if real:
             met[key].append(bool(np.isfinite(time)))
             how[key].append(_OF_RUNS.get(str(word), str(word)))
-    keys = _keys(runs)
+    keys = Address.all_of(runs)
     share = [float(np.mean(met[key])) if key in met else math.nan for key in keys]
     outcomes = np.asarray(runs.get("outcome", np.full(len(keys), None)), dtype=object)
     outcome = [
@@ -152,12 +146,6 @@ def with_endings(runs: Table, events: Table) -> Table:
 
 
 _OF_RUNS = {"contained": CONFIRMED, "open": "timeout"}
-
-
-def _keys(table: Table) -> list[tuple[Any, ...]]:
-    """Return the run of each row."""
-    names = ("part", "cell", "person", "trial", "is_reference")
-    return list(zip(*(np.asarray(table[name]).tolist() for name in names), strict=True))
 
 
 def horizon_of(view: StudyView, scenario: Mapping[str, Any]) -> float:
@@ -185,7 +173,7 @@ def _first(rows: Table, drives: NDArray[np.str_]) -> tuple[NDArray[np.str_], Flo
     return way, np.where(way == "never reported", 0.0, time)
 
 
-def _how_drives_ended(rows: Table, runs: Table, part: str) -> NDArray[np.str_]:
+def _how_drives_ended(rows: Table, runs: Table) -> NDArray[np.str_]:
     """Return how the last drive to an event ended; empty where a run has several events.
 
     A run tells of the drives to its first driven event only.
@@ -193,10 +181,9 @@ def _how_drives_ended(rows: Table, runs: Table, part: str) -> NDArray[np.str_]:
     nothing = np.full(len(rows["part"]), "", dtype="U24")
     if "outcome" not in runs:
         return nothing
-    keys = np.stack([rows[name] for name in ("cell", "person", "trial")], axis=1)
-    if len(np.unique(keys, axis=0)) < len(keys):
+    addresses = Address.all_of(rows)
+    if len(set(addresses)) < len(addresses):
         return nothing
-    here = np.asarray(runs["part"]) == part
-    columns = (np.asarray(runs[name])[here] for name in ("cell", "person", "trial", "outcome"))
-    known = {tuple(key): _OF_DRIVES.get(str(word), "") for *key, word in zip(*columns, strict=True)}
-    return np.array([known.get(tuple(key), "") for key in keys.tolist()], dtype="U24")
+    ends = [_OF_DRIVES.get(str(word), "") for word in runs["outcome"]]
+    known = dict(zip(Address.all_of(runs), ends, strict=True))
+    return np.array([known.get(address, "") for address in addresses], dtype="U24")

@@ -22,12 +22,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, Setting
 from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError
 
 SETTLED = "confirmed", "refuted"
 
-Levels = Mapping[str, Any]
 Floats = NDArray[np.float64]
 
 
@@ -59,7 +59,7 @@ class Need(NamedTuple):
         return (1.0 - idle) / self.interaction
 
 
-def settled_per_person(results: Results, part: str, where: Levels, since: float) -> Floats:
+def settled_per_person(results: Results, part: str, where: Setting, since: float) -> Floats:
     """Events settled per second from a time [s] on, for each person, shape `(persons,)`.
 
     The time before is left out: at the start every robot sets out, and nobody has anything to
@@ -79,7 +79,7 @@ def settled_per_person(results: Results, part: str, where: Levels, since: float)
     return rates
 
 
-def need_of(results: Results, part: str, where: Levels, since: float) -> Need:
+def need_of(results: Results, part: str, where: Setting, since: float) -> Need:
     """Estimate the needs of a single robot from the runs with certain levels.
 
     Interaction is from the first sight of the place to the judgement. All else is neglect: also
@@ -102,8 +102,6 @@ def need_of(results: Results, part: str, where: Levels, since: float) -> Need:
     return Need(cycle - interaction, interaction)
 
 
-def _rows(table: Mapping[str, Any], part: str, where: Levels) -> dict[str, Any]:
-    mask = np.asarray(table["part"]) == part
-    for name, level in where.items():
-        mask = mask & (np.asarray(table[name]) == level)
-    return {name: np.asarray(values)[mask] for name, values in table.items()}
+def _rows(table: Mapping[str, Any], part: str, where: Setting) -> dict[str, Any]:
+    grid = RunGrid(table, part, [Factor(name, (level,)) for name, level in where.items()])
+    return {name: values[grid.at(where)] for name, values in grid.treated.items()}

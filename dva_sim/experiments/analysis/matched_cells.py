@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dva_sim.experiments.results.results import Results
-from dva_sim.experiments.study.cell_grid import REFERENCE
+from dva_sim.experiments.study.addresses import REFERENCE, Address
 from dva_sim.experiments.study.parts import REPEATS, Level
 
 Levels = tuple[tuple[str, Level], ...]
@@ -117,8 +117,8 @@ def _once(cells: Iterable[_Cell], key: Callable[[_Cell], Hashable]) -> dict[Hash
 
 
 def _without(cells: Iterable[_Cell], taken: Iterable[_Cell]) -> list[_Cell]:
-    numbers = {(cell["part"], cell["cell"]) for cell in taken}
-    return [cell for cell in cells if (cell["part"], cell["cell"]) not in numbers]
+    addresses = set(map(Address.of, taken))
+    return [cell for cell in cells if Address.of(cell) not in addresses]
 
 
 def _key(cell: _Cell, but: Iterable[str]) -> Levels:

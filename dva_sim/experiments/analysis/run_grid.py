@@ -131,6 +131,14 @@ class RunGrid:
         )
         return np.asarray(grid[index])
 
+    def at(self, setting: Mapping[str, Level]) -> NDArray[np.bool_]:
+        """Mark the rows of `treated` at some levels; other factors may have any of theirs."""
+        mask = self._known.copy()
+        for factor, codes in zip(self.factors, self._index, strict=False):
+            if factor.name in setting:
+                mask &= codes == factor.levels.index(setting[factor.name])
+        return mask
+
     def settings(self, but: Sequence[str] = ()) -> Iterator[Setting]:
         """Every combination of levels of the factors, except those named in `but`."""
         free = [f for f in self.factors if f.name not in but]

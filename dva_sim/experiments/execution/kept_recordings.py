@@ -20,6 +20,7 @@ from dva_sim.experiments.execution import executors, scheduling
 from dva_sim.experiments.results.folder_lock import FolderLock
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.results.tables import DESIGN_COLUMNS
+from dva_sim.experiments.study.addresses import Address
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.hashing import stable_hash
 from dva_sim.experiments.study.plan import Progress, StudyPlan
@@ -35,7 +36,6 @@ FOLDER = "recordings"
 _FULL = os.strerror(errno.ENOSPC)
 
 Row = Mapping[str, Any]
-RunPosition = tuple[str, int, int, int]  # part, cell, person, trial
 
 
 def record_study(
@@ -80,7 +80,7 @@ def _record(
     folder = _tidied(out / FOLDER, wanted)
     rest = [job for name, job in wanted.items() if not (folder / name).exists()]
     own = {measure.about.name for measure in plan.measures.values()}
-    prints = {name_of(job): _fingerprint(job, rows[position_of(job)], own) for job in rest}
+    prints = {name_of(job): _fingerprint(job, rows[job.address], own) for job in rest}
     done = len(wanted) - len(rest)
     total = len(wanted)
     tell(done, total)
@@ -101,7 +101,7 @@ def _record(
     return sorted(problems)
 
 
-def chosen(plan: StudyPlan, rows: Mapping[RunPosition, Row]) -> list[StudyJob]:
+def chosen(plan: StudyPlan, rows: Mapping[Address, Row]) -> list[StudyJob]:
     """The runs to record, in the order of the design.
 
     Args:
@@ -112,36 +112,28 @@ def chosen(plan: StudyPlan, rows: Mapping[RunPosition, Row]) -> list[StudyJob]:
     every = [
         job
         for job in plan.jobs
-        if position_of(job) in rows and not job.is_repeat and model_for(job.scenario).is_recorded
+        if job.address in rows and not job.is_repeat and model_for(job.scenario).is_recorded
     ]
     if study.record == "all":
         return every
-    in_cells = (list(group) for _, group in groupby(every, key=lambda job: position_of(job)[:2]))
+    in_cells = (list(group) for _, group in groupby(every, key=lambda job: job.address[:2]))
     if study.record == "sample" or study.answer is None:
         return [runs[0] for runs in in_cells]
     measure = study.answer.measure
-    return [
-        max(runs, key=lambda job: badness(measure, rows[position_of(job)])) for runs in in_cells
-    ]
+    return [max(runs, key=lambda job: badness(measure, rows[job.address])) for runs in in_cells]
 
 
 def name_of(job: StudyJob) -> str:
-    """The file of a run: part, cell, person and trial."""
-    cell = "reference" if job.is_reference else str(job.index)
-    return f"{job.part}-{cell}-{job.person}-{job.trial}.mcap"
+    """Return the name of a run's file."""
+    return f"{job.address}.mcap"
 
 
-def position_of(job: StudyJob) -> RunPosition:
-    """Position of a run in its study: part, cell, person and trial."""
-    return job.part, job.index, job.person, job.trial
-
-
-def rows_of(results: Results) -> dict[RunPosition, Row]:
-    """The table of runs, by position in the design."""
+def rows_of(results: Results) -> dict[Address, Row]:
+    """Return the rows of the table of runs, by address."""
     runs = results.runs
     columns = {name: runs[name].tolist() for name in runs}
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    return {(row["part"], row["cell"], row["person"], row["trial"]): row for row in rows}
+    return {Address.of(row): row for row in rows}
 
 
 def badness(measure: str, row: Row) -> float:

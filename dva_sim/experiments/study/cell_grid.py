@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from dva_sim.experiments.study.addresses import REFERENCE, Address
 from dva_sim.experiments.study.factor_levels import (
     PARAMETERS,
     TRAITS,
@@ -75,7 +76,6 @@ def _places(study: Study, part: str, key: str, value: Any) -> Iterator[KeyPath]:
         yield in_design
 
 
-REFERENCE = -1
 _IN_FILES = {"dispatch.policy", "events", "events.table"}
 
 RunKey = tuple[str, int]
@@ -123,6 +123,11 @@ class StudyRun:
     trial: int
     seed: int
     config: str
+
+    @property
+    def address(self) -> Address:
+        """Its place among the runs of all parts."""
+        return Address(self.part, self.index, self.person, self.trial)
 
     @property
     def is_reference(self) -> bool:

@@ -47,7 +47,9 @@ class Kept(Results):
         events = {
             "part": ["hall"] * 5,
             "robot.count": [1, 1, 1, 1, 2],
+            "is_reference": [False] * 5,
             "person": [0, 0, 0, 1, 0],
+            "trial": [0] * 5,
             "outcome": ["confirmed", "refuted", "open", "confirmed", "confirmed"],
             "t_arrived_s": [150.0, 280.0, np.nan, 250.0, 300.0],
             "t_closed_s": [160.0, 300.0, np.nan, 255.0, 310.0],
@@ -55,7 +57,9 @@ class Kept(Results):
         runs = {
             "part": ["hall"] * 3,
             "robot.count": [1, 1, 2],
+            "is_reference": [False] * 3,
             "person": [0, 1, 0],
+            "trial": [0] * 3,
             "simulated_s": [400.0, 400.0, 400.0],
         }
         return {n: np.array(v) for n, v in {"events": events, "runs": runs}[name].items()}
