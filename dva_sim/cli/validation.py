@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,31 +27,24 @@ from dva_sim.kernel.suggestions import either
 from dva_sim.options.studies import VALIDATED, ValidateOptions
 from dva_sim.validation.dispatch import cases, identities
 from dva_sim.validation.dispatch import checks as dispatch
-from dva_sim.validation.dispatch import result_page as dispatch_page
-from dva_sim.validation.frame import ResultSheet, ValidationResult
+from dva_sim.validation.evidence_page import ResultSheet, ValidationResult
 from dva_sim.validation.network import comparison, reference
-from dva_sim.validation.network import result_page as network_page
-from dva_sim.validation.network.beside import measured as beside_measured
-from dva_sim.validation.network.beside import page as beside_page
+from dva_sim.validation.network import evidence as network_evidence
+from dva_sim.validation.network.beside import measured as beside
 from dva_sim.validation.network.beside import predictions
 from dva_sim.validation.network.real_side import measuring
 from dva_sim.validation.network.real_side.cell import PACKETS, PROXY, why_no_packets
 from dva_sim.validation.network.real_side.measuring import Progress
 from dva_sim.validation.network.verdicts import ConditionGroup, grouped
+from dva_sim.validation.operators import evidence as operators_evidence
 from dva_sim.validation.operators import experiments as operators
-from dva_sim.validation.operators import result_page as operators_page
 from dva_sim.validation.operators.exact import EXACT
 from dva_sim.validation.operators.experiments import EXPERIMENTS
-from dva_sim.validation.operators.verdicts import judge, outcome_of
 
-WIDTH, WIDE = 110, 240  # of tables at least, also in a file; of those with many columns
-_MANY = 8  # columns
-_STYLES = {
-    **dict.fromkeys(("agrees", "passes", "found out"), "green"),
-    **dict.fromkeys(("differs", "misses", "fails", "fooled us"), "bold red"),
-    "too rough": "yellow",
-    "shown only": "dim",
-}
+WIDTH = 110  # of tables at least, also in a file
+_COMMANDS = ".csv.gz"  # ending of a table of commands
+_WIDTHS = {"line": 5, "claim": 6, "predicted": 4, "verdict": 6}  # shares of the width
+_STYLES = {"holds": "green", "misses": "bold red", "too rough": "yellow", "shown only": "dim"}
 
 
 def validate(options: ValidateOptions) -> ExitCode:
@@ -104,50 +98,52 @@ def _refuse_foreign(options: ValidateOptions) -> None:
 
 
 def conclude(play: Callable[[], ValidationResult], out: Path | None) -> ExitCode:
-    """Play, tell what was found, and write it if asked to; how it ended."""
+    """Play, show the evidence, its state first, and write it if asked to; how it ended."""
     started = time.perf_counter()
     found = play()
-    for sheet in found.printed:
-        _tell(sheet)
-    say(f"\n[bold]{escape(found.headline)}[/bold]")
+    say(f"[bold]{escape(found.headline)}[/bold]")
     for note in found.notes:
         say(escape(note))
-    say(f"{time.perf_counter() - started:.0f} s")
+    for sheet in found.printed:
+        _tell(sheet)
+    say(f"\n{time.perf_counter() - started:.0f} s")
     if out is not None:
         say(f"Report: {found.write(out)}")
     return ExitCode.OK if found.passes else ExitCode.GATE_FAILED
 
 
 def _tell(sheet: ResultSheet) -> None:
-    """A title, and lines whose verdict at the end is coloured.
+    """Show a title, and lines whose verdict at the end is coloured.
 
     A narrow terminal breaks its lines: better than numbers that are cut off.
     """
-    width = WIDE if len(sheet.heads) > _MANY else WIDTH
-    where = Console(highlight=False, width=max(console.width, width))
-    if sheet.title:
-        where.print(f"\n[bold]{escape(sheet.title)}[/bold]")
-    table = Table(box=None, pad_edge=False, expand=bool(sheet.widths))
-    for place, head in enumerate(sheet.heads):
-        width_here = sheet.widths[place] if sheet.widths else None
-        table.add_column(
-            escape(head),
-            justify="left" if place in sheet.words or sheet.wraps else "right",
-            width=width_here,
-            ratio=1 if sheet.widths and width_here is None else None,
-            no_wrap=not sheet.wraps and place < len(sheet.heads) - 1,
-        )
-    above = ""
-    for first, *others, last in sheet.lines:
-        name = "" if sheet.merged and first == above else first
-        table.add_row(escape(name), *map(escape, others), _coloured(last))
-        above = first
-    where.print(table)
+    where = Console(highlight=False, width=max(console.width, WIDTH))
+    where.print(f"\n[bold]{escape(sheet.title)}[/bold]")
+    if sheet.text:
+        where.print(escape(sheet.text))
+    table = _table(sheet.heads, with_heads=True)
+    for row in sheet.rows:
+        if len(row) > 1:
+            table.add_row(*map(escape, row[:-1]), _coloured(row[-1]))
+            continue
+        if table.row_count:
+            where.print(table)
+            table = _table(sheet.heads, with_heads=False)
+        where.print(f"[dim]{escape(row[0])}[/dim]")
+    if table.row_count:
+        where.print(table)
+
+
+def _table(heads: Sequence[str], with_heads: bool) -> Table:
+    """A table of even columns, so that those below each other agree."""
+    table = Table(box=None, pad_edge=False, expand=True, show_header=with_heads)
+    for head in heads:
+        table.add_column(escape(head), ratio=_WIDTHS.get(head, 3), overflow="fold")
+    return table
 
 
 def _coloured(verdict: str) -> str:
-    styles = (style for word, style in _STYLES.items() if verdict.startswith(word))
-    style = next(styles, "")
+    style = _STYLES.get(verdict.partition(":")[0])
     return f"[{style}]{escape(verdict)}[/]" if style else escape(verdict)
 
 
@@ -171,7 +167,7 @@ def _dispatch(case_file: str | None, quick: bool, workers: int, seed: int) -> Va
             played, seed, quick, workers, lambda n: bar.update(task, completed=first + n)
         )
     conditions = {"cases": f"{name} ({len(played)})", "seed": str(seed), "length": _length(quick)}
-    return dispatch_page.evidence(checks, conditions, quick)
+    return dispatch.evidence(checks, conditions, quick)
 
 
 def _length(quick: bool) -> str:
@@ -194,15 +190,15 @@ def _operators(strategy: str | None, quick: bool, workers: int, seed: int) -> Va
             EXPERIMENTS, setting, lambda n: bar.update(task, completed=exact + n)
         )
     found |= operators.measured(EXPERIMENTS, played, seed)
-    judged = judge(lines, found)
     conditions = {
         "operators": setting.strategy,
         "persons": str(persons),
         "seed": str(seed),
         "length": _length(quick),
     }
-    outcome = outcome_of(judged, split.rule)
-    return operators_page.evidence(judged, outcome, played, conditions)
+    return operators_evidence.evidence(
+        lines, found, split.rule, played=played, conditions=conditions
+    )
 
 
 # --- the network -----------------------------------------------------------------------
@@ -256,25 +252,33 @@ def _compared(
         "seed": str(setting.seed),
         "length": _length(setting.quick),
     }
-    return network_page.evidence(found, conditions, causes)
+    return network_evidence.evidence(found, conditions, causes)
 
 
-def _beside(asked: str, quick: bool, workers: int) -> ValidationResult:
+def _beside(source: str, quick: bool, workers: int) -> ValidationResult:
     """Predictions of a middleware study, with its results beside them if there are any."""
-    results = Results.load(asked) if Path(asked).is_dir() else None
-    study = load_study(asked) if results is None else Study.model_validate(results.study)
+    results = Results.load(source) if Path(source).is_dir() else None
+    has_commands = source.endswith(_COMMANDS)
+    study = (
+        load_study(beside.STUDY if has_commands else source)
+        if results is None
+        else Study.model_validate(results.study)
+    )
+    configurations = beside.asked_by(study, results)
+    measured = None if results is None else beside.measured_in(results)
+    if has_commands:
+        measured = beside.measured_in_commands(Path(source), configurations)
     plays = predictions.QUICK_PLAYS if quick else predictions.PLAYS
     with _bar() as bar:
         task = bar.add_task("runs of the model")
-        found = beside_measured.beside_of(
-            beside_measured.asked_by(study, results),
-            None if results is None else beside_measured.measured_in(results),
+        found = beside.beside_of(
+            configurations,
+            measured,
             plays,
             workers,
             lambda done, of: bar.update(task, completed=done, total=of),
         )
-    conditions = {"study": asked, "plays of each seed": str(plays)}
-    return beside_page.evidence(found, conditions)
+    return replace(found, conditions={"study": source, "plays of each seed": str(plays)})
 
 
 def _measured_now(

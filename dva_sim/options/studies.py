@@ -206,7 +206,7 @@ class ValidateOptions:
     beside: Annotated[
         str | None,
         OptionForm(
-            "Compare the results of a middleware study with predictions; network only.",
+            "Compare results or commands of a middleware study with predictions; network only.",
             metavar="FOLDER",
         ),
     ] = None

@@ -46,7 +46,7 @@ def worth(gap: float) -> float:
     return min(gap, STILL)
 
 
-class Evidence:
+class WeighedEvidence:
     """Evidence for an event, as one person weighs it.
 
     In a clear picture the level drifts by `sensitivity / 2` a second towards the criterion if the
@@ -134,7 +134,7 @@ class Looking:
         self._planner = planner
         self._person = person
         self._habits = habits = person.habits.looking
-        self._evidence = Evidence(person.sensitivity, person.confirm_look, normals, habits)
+        self._evidence = WeighedEvidence(person.sensitivity, person.confirm_look, normals, habits)
         self._tell_arrived = arrived
         self._arrived = False
         self._last: float | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -24,59 +24,28 @@ from dva_sim.validation.dispatch.batch_measures import (
 )
 from dva_sim.validation.dispatch.cases import Case
 from dva_sim.validation.dispatch.estimation import (
+    ERRORS,
     PRECISION,
-    CheckVerdict,
+    TOLERANCE,
     Estimate,
     certain,
     controls,
     estimate,
+    expected_alarms,
+    half_band,
     inputs,
     verdict,
 )
 from dva_sim.validation.dispatch.identities import IDENTITIES, check_identity
+from dva_sim.validation.evidence import NORMAL_95, Evidence, share_rule
+from dva_sim.validation.evidence_page import ValidationResult
 from dva_sim.validation.frame import Key, Progress, Row, job_of, play_jobs
 
 Columns = dict[str, Floats]
 FAILED = "a run of case {!r} failed"
 LOOK_AGAIN = 4  # times as many runs, in all, for a case that seems to differ
-
-
-@dataclass(frozen=True)
-class Check:
-    """One comparison.
-
-    Attributes:
-        case: Name of the case.
-        title: Title of the case.
-        measure: Name of the measure.
-        exact: Exact value.
-        found: Estimate from the runs.
-        source: Source of the exact value.
-        events: Number of events simulated for it.
-        kind: `result`; `input` for what the scenario put in; `identity` for what holds
-            without chance.
-        again: Measures that differed at first, so that the case was run again for longer; empty if
-            none did.
-    """
-
-    case: str
-    title: str
-    measure: str
-    exact: float
-    found: Estimate
-    verdict: CheckVerdict
-    source: str
-    events: int
-    kind: str = "result"
-    again: str = ""
-
-    @property
-    def deviation(self) -> float:
-        """Deviation in standard errors; 0 for an exact match without randomness."""
-        off = self.found.value - self.exact
-        if self.found.error > 0:
-            return off / self.found.error
-        return 0.0 if self.verdict != "differs" else float(np.copysign(np.inf, off))
+GROUPS = {"input": "What the scenarios put in", "identity": "Identities"}
+"""Headings of checks that are alike in all cases."""
 
 
 def check_cases(
@@ -85,7 +54,7 @@ def check_cases(
     quick: bool,
     workers: int,
     progress: Progress = lambda done: None,
-) -> list[Check]:
+) -> list[Evidence]:
     """Play all cases and compare.
 
     A case that differs by more than chance easily explains is played again, longer, and judged
@@ -106,12 +75,13 @@ def check_cases(
     for case in cases:
         runs = _runs(case, quick)
         found = _compare(case, _columns(_jobs(case, seed, runs), rows))
-        off = [c for c in found if c.verdict == "differs" and c.found.error > 0]
+        off = [e for e in found if e.verdict == "misses" and e.predicted_low is not None]
         if off:
             again = _jobs(case, seed, LOOK_AGAIN * runs)
             rows |= play_jobs(again[runs:], play, workers, FAILED)
-            why = ", ".join(f"{c.measure} {c.deviation:+.2f} SE" for c in off)
-            found = [replace(c, again=why) for c in _compare(case, _columns(again, rows))]
+            why = f"{LOOK_AGAIN} times as long, for {', '.join(f'{e.claim} {e.note}' for e in off)}"
+            longer = _compare(case, _columns(again, rows))
+            found = [replace(e, note="; ".join(filter(None, (e.note, why)))) for e in longer]
         checks += found
     return checks
 
@@ -143,34 +113,19 @@ def play(job: StudyJob) -> Tables:
     return {"rows": [dict(zip(names, row.tolist(), strict=True)) for row in rows]}
 
 
-def check_identities(seed: int, progress: Progress = lambda done: None) -> list[Check]:
+def check_identities(seed: int, progress: Progress = lambda done: None) -> list[Evidence]:
     """Look at everything that must hold exactly, in any world.
 
     Args:
         seed: Random seed of the checks.
         progress: Callback with the number of finished checks.
     """
-    checks = []
+    lines = []
     for done, name in enumerate(IDENTITIES, start=1):
-        for what, off in check_identity(name, seed):
-            found = certain(off)
-            title = name[0].upper() + name[1:]
-            judged = verdict(found, 0.0)
-            checks.append(
-                Check(
-                    case=name,
-                    title=title,
-                    measure=what,
-                    exact=0.0,
-                    found=found,
-                    verdict=judged,
-                    source="",
-                    events=0,
-                    kind="identity",
-                )
-            )
+        for claim, off in check_identity(name, seed):
+            lines.append(_line(name, GROUPS["identity"], claim, 0.0, certain(off)))
         progress(done)
-    return checks
+    return lines
 
 
 def runs_of(cases: Sequence[Case], quick: bool) -> int:
@@ -216,7 +171,7 @@ def _columns(jobs: Sequence[StudyJob], rows: Mapping[Key, list[Row]]) -> Columns
     return {name: np.array([row[name] for row in found], dtype=float) for name in found[0]}
 
 
-def _compare(case: Case, columns: Columns) -> list[Check]:
+def _compare(case: Case, columns: Columns) -> list[Evidence]:
     """All that a case is judged by: results, what was put in, and what must hold in any case."""
     known = [values for name, values in columns.items() if name.startswith("control ")]
     controls = np.column_stack(known) if known else None
@@ -238,23 +193,98 @@ def _compare(case: Case, columns: Columns) -> list[Check]:
     found.append(("identity", "work by the units over work by the events", 1.0, same))
     lost = columns["open"].sum() + columns["broken"].max()
     found.append(("identity", "events lost, rules broken", 0.0, certain(lost)))
-    return [_check(case, columns, *each) for each in found]
+    lines = []
+    for kind, measure, exact, value in found:
+        is_strict = kind == "result" and measure not in case.loosely
+        precision = PRECISION if is_strict else None
+        line = _line(case.name, GROUPS.get(kind, case.title), measure, exact, value, precision)
+        lines.append(replace(line, source=case.source, sample=int(columns["events"].sum())))
+    return lines
 
 
-def _check(
-    case: Case, columns: Columns, kind: str, measure: str, exact: float, found: Estimate
-) -> Check:
-    strict = kind == "result" and measure not in case.loosely
-    judged = verdict(found, exact, PRECISION if strict else None)
-    events = int(columns["events"].sum())
-    return Check(
-        case=case.name,
-        title=case.title,
-        measure=measure,
-        exact=exact,
-        found=found,
-        verdict=judged,
-        source=case.source,
-        events=events,
-        kind=kind,
+def _line(
+    case: str,
+    group: str,
+    claim: str,
+    exact: float,
+    found: Estimate,
+    precision: float | None = None,
+) -> Evidence:
+    """One comparison; its note is the deviation in standard errors, with and without controls."""
+    half = half_band(found.error, exact, found.batches)
+    spread = NORMAL_95 * found.error if found.error > 0 else None
+    note = ""
+    if spread is not None:
+        note = f"{(found.value - exact) / found.error:+.2f} SE"
+        if found.plain != found.value:
+            note += f", {(found.plain - exact) / found.plain_error:+.2f} without controls"
+    return Evidence(
+        "dispatch",
+        group,
+        f"{case} {claim}",
+        claim,
+        measured=exact,
+        predicted=found.value,
+        predicted_low=None if spread is None else found.value - spread,
+        predicted_high=None if spread is None else found.value + spread,
+        low=exact - half,
+        high=exact + half,
+        verdict=verdict(found, exact, precision),
+        note=note,
+    )
+
+
+def evidence(
+    lines: Sequence[Evidence], conditions: Mapping[str, str], quick: bool
+) -> ValidationResult:
+    """Result of all checks: all must agree, and of a full run none may be too rough.
+
+    Args:
+        lines: The checks.
+        conditions: Conditions of the runs, by name.
+        quick: True if only few runs were made, which may be too rough.
+    """
+    events = sum({e.line.split()[0]: e.sample for e in lines}.values())
+    rough = sum(e.verdict == "too rough" for e in lines)
+    rule = share_rule(
+        "dispatch",
+        "all checks",
+        sum(e.verdict != "misses" for e in lines),
+        len(lines),
+        note=f"within {ERRORS:g} standard errors or {100 * TOLERANCE:g} %",
+    )
+    precise = share_rule(
+        "dispatch",
+        "precision",
+        len(lines) - rough,
+        len(lines),
+        note=f"standard errors up to {100 * PRECISION:g} % of the exact value",
+    )
+    if quick:
+        precise = replace(
+            precise, verdict="shown only", note=f"{precise.note}, no rule of a quick run"
+        )
+    return ValidationResult(
+        [*sorted(lines, key=lambda line: line.group in GROUPS.values()), rule, precise],
+        notes=[_chance(lines)],
+        conditions={**conditions, "events played": f"{events:,}"},
+    )
+
+
+def _chance(lines: Sequence[Evidence]) -> str:
+    """Say how many right checks would miss on average, and how many are far off."""
+    errors = [
+        (e.predicted, e.measured, (e.predicted_high - e.predicted_low) / (2 * NORMAL_95))
+        for e in lines
+        if e.predicted_low is not None and e.predicted_high is not None
+    ]
+    off = sum(
+        abs(value - exact) > ERRORS * error
+        for value, exact, error in errors
+        if value is not None and exact is not None
+    )
+    return (
+        f"{len(errors)} of the checks leave something to chance; if everything is right, up to "
+        f"{expected_alarms(len(errors)):.1f} of them miss all the same, on average. "
+        f"Here {off} lie beyond {ERRORS:g} standard errors."
     )

@@ -35,7 +35,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,8 +45,7 @@ from dva_sim.validation.dispatch.batch_measures import Batches, Floats, Sample, 
 from dva_sim.validation.dispatch.exact import cobham
 from dva_sim.validation.dispatch.queues import LawMoments, gm1
 from dva_sim.validation.dispatch.transforms import laplace
-
-CheckVerdict = Literal["agrees", "too rough", "differs"]
+from dva_sim.validation.evidence import Verdict
 
 ERRORS = 3.0  # an estimate may be so many standard errors off
 TOLERANCE = 0.005  # or so much, as a share of the exact value
@@ -124,7 +122,7 @@ def adjusted(values: Floats, controls: Floats) -> Floats:
     return left
 
 
-def verdict(found: Estimate, exact: float, precision: float | None = PRECISION) -> CheckVerdict:
+def verdict(found: Estimate, exact: float, precision: float | None = PRECISION) -> Verdict:
     """Judge whether an estimate agrees with the exact value.
 
     Args:
@@ -133,18 +131,33 @@ def verdict(found: Estimate, exact: float, precision: float | None = PRECISION) 
         precision: Standard error asked for, as a share of the exact value; None asks for none.
 
     Returns:
-        `differs`: further off than 3 standard errors (as many more as Student's t asks for
-        with few batches) and than 0.5 %, with controls or without them. `too rough`: the
-        standard error is above what is asked for, so that agreement says little.
+        `misses`: outside its band, with controls or without them. `too rough`: the standard error
+        is above what is asked for, so that agreement says little.
     """
-    rounding = _ROUNDING * max(1.0, abs(exact))
-    errors = _errors_allowed(found.batches)
     for value, error in ((found.value, found.error), (found.plain, found.plain_error)):
-        if not abs(value - exact) <= max(errors * error, TOLERANCE * abs(exact), rounding):
-            return "differs"
-    if precision is not None and not found.error <= max(precision * abs(exact), rounding):
+        if not abs(value - exact) <= half_band(error, exact, found.batches):
+            return "misses"
+    if precision is not None and not found.error <= max(precision * abs(exact), _rounding(exact)):
         return "too rough"
-    return "agrees"
+    return "holds"
+
+
+def half_band(error: float, exact: float, batches: int) -> float:
+    """Distance from the exact value up to which an estimate agrees.
+
+    It is 3 standard errors (as many more as Student's t asks for with few batches) or 0.5 %,
+    whichever is more.
+
+    Args:
+        error: Standard error of the estimate.
+        exact: Exact value.
+        batches: Number of batches that the standard error comes from.
+    """
+    return max(_errors_allowed(batches) * error, TOLERANCE * abs(exact), _rounding(exact))
+
+
+def _rounding(exact: float) -> float:
+    return _ROUNDING * max(1.0, abs(exact))
 
 
 @cache

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dva_sim.agents.operator.attention import Attention
-from dva_sim.agents.operator.inspection import Evidence, clearness
+from dva_sim.agents.operator.inspection import WeighedEvidence, clearness
 from dva_sim.agents.people.profiles import Walker
 from dva_sim.agents.population import Person
 from dva_sim.kernel.clock import Clock
@@ -140,10 +140,12 @@ def _attention(clock: Clock, person: Person, seed: int) -> Attention:
     return Attention(clock, person.switch, person.habits.attention, _normals(seed))
 
 
-def _evidence(person: Person, cell: str, noise: Iterator[float], share: float = 1.0) -> Evidence:
+def _evidence(
+    person: Person, cell: str, noise: Iterator[float], share: float = 1.0
+) -> WeighedEvidence:
     looking = person.habits.looking
     share *= looking.hurried if cell == "speed" else 1.0
-    return Evidence(person.sensitivity, share * person.confirm_look, noise, looking)
+    return WeighedEvidence(person.sensitivity, share * person.confirm_look, noise, looking)
 
 
 def _normals(seed: int) -> Iterator[float]:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dva_sim.agents.operator.published import CurveConfig, load_targets
-from dva_sim.experiments.report.figures.style import Drawn, panels
-from dva_sim.validation.frame import captioned
+from dva_sim.experiments.report.figures.style import Drawn, panels, styled
+from dva_sim.validation.figure import captioned
 from dva_sim.validation.operators import experiments as of
 from dva_sim.validation.operators.trials import Cells, Floats, person_means, person_medians
 
@@ -23,11 +23,12 @@ ORANGE = "#D55E00"
 def draw_curves(played: Mapping[str, Cells]) -> list[Drawn]:
     """One figure for each kind of raw data."""
     curves = load_targets().curves
-    return [
-        _moving(curves, played["moving"]),
-        _pushed(curves, played["pushed"]),
-        _looks(curves, played["heading"], played["looks"]),
-    ]
+    with styled():
+        return [
+            _moving(curves, played["moving"]),
+            _pushed(curves, played["pushed"]),
+            _looks(curves, played["heading"], played["looks"]),
+        ]
 
 
 def _people(axes: Axes, curve: CurveConfig, *, joined: bool = True) -> None:

@@ -14,7 +14,7 @@ import pytest
 from helpers.worlds.delayed_loops import normals
 
 from dva_sim.agents.habits import LookingHabits
-from dva_sim.agents.operator.inspection import Evidence, clearness, worth
+from dva_sim.agents.operator.inspection import WeighedEvidence, clearness, worth
 
 HABITS = LookingHabits()
 SENSITIVITY, LOOK = 4.5, 1.5  # of the person in the middle of the population
@@ -38,7 +38,7 @@ def until_sure(
     at_most: float = math.inf,
 ) -> float:
     """Time that a person looks until it is sure [s]; infinite if it never is."""
-    evidence, now = Evidence(sensitivity, look, normals(seed), HABITS), 0.0
+    evidence, now = WeighedEvidence(sensitivity, look, normals(seed), HABITS), 0.0
     while not evidence.sure:
         now += 1.0 / rate
         if now > at_most:
@@ -115,7 +115,7 @@ def test_what_looks_small_speaks_against_itself():
 
 
 def test_having_long_seen_nothing_makes_nobody_harder_to_convince():
-    evidence = Evidence(SENSITIVITY, LOOK, normals(1), HABITS)
+    evidence = WeighedEvidence(SENSITIVITY, LOOK, normals(1), HABITS)
     for _ in range(3000):
         evidence.weigh(0.1, 0.0, 1.0)
     assert 0.0 <= evidence.level < evidence.criterion

@@ -83,8 +83,8 @@ def test_a_wrong_value_stays_wrong_whatever_the_controls():
     right = estimate(values, np.ones(100), controls)
     wrong = estimate(values + 0.7, np.ones(100), controls)
     assert wrong.value - right.value == pytest.approx(0.7)
-    assert verdict(right, 2.0) != "differs"
-    assert verdict(wrong, 2.0) == "differs"
+    assert verdict(right, 2.0) != "misses"
+    assert verdict(wrong, 2.0) == "misses"
 
 
 def test_controls_that_do_not_vary_or_that_there_are_too_few_batches_for_are_left_out():
@@ -102,15 +102,15 @@ def an_estimate(value, error, plain=None, plain_error=None, batches=100):
 @pytest.mark.parametrize(
     ("found", "expected"),
     [
-        (an_estimate(1.02, 0.008), "agrees"),  # 2.5 standard errors
-        (an_estimate(1.004, 0.0001), "agrees"),  # many standard errors, but within 0.5 %
-        (an_estimate(1.006, 0.0001), "differs"),
-        (an_estimate(1.03, 0.009), "differs"),
+        (an_estimate(1.02, 0.008), "holds"),  # 2.5 standard errors
+        (an_estimate(1.004, 0.0001), "holds"),  # many standard errors, but within 0.5 %
+        (an_estimate(1.006, 0.0001), "misses"),
+        (an_estimate(1.03, 0.009), "misses"),
         (an_estimate(1.02, 0.011), "too rough"),
-        (an_estimate(1.06, 0.011), "differs"),
-        (an_estimate(math.nan, math.nan), "differs"),
-        (an_estimate(1.0, 0.001, 0.8, 0.1), "agrees"),
-        (an_estimate(1.0, 0.001, 0.8, 0.06), "differs"),  # what only the controls make right
+        (an_estimate(1.06, 0.011), "misses"),
+        (an_estimate(math.nan, math.nan), "misses"),
+        (an_estimate(1.0, 0.001, 0.8, 0.1), "holds"),
+        (an_estimate(1.0, 0.001, 0.8, 0.06), "misses"),  # what only the controls make right
     ],
 )
 def test_an_estimate_of_1_agrees_within_3_errors_or_half_a_percent(found, expected):
@@ -120,11 +120,11 @@ def test_an_estimate_of_1_agrees_within_3_errors_or_half_a_percent(found, expect
 @pytest.mark.parametrize(
     ("found", "expected"),
     [
-        (an_estimate(1.2, 0.1), "agrees"),
-        (an_estimate(1.4, 0.1), "differs"),
+        (an_estimate(1.2, 0.1), "holds"),
+        (an_estimate(1.4, 0.1), "misses"),
         # With 10 batches 4.09 standard errors are as rare as 3 are with many.
-        (an_estimate(1.4, 0.1, batches=10), "agrees"),
-        (an_estimate(1.42, 0.1, batches=10), "differs"),
+        (an_estimate(1.4, 0.1, batches=10), "holds"),
+        (an_estimate(1.42, 0.1, batches=10), "misses"),
     ],
 )
 def test_where_no_precision_is_asked_for_a_rough_estimate_agrees(found, expected):
@@ -132,8 +132,8 @@ def test_where_no_precision_is_asked_for_a_rough_estimate_agrees(found, expected
 
 
 def test_where_nothing_is_left_to_chance_only_rounding_is_forgiven():
-    assert verdict(Estimate(1e-12, 0.0, 0.0, 0.0, 10), 0.0) == "agrees"
-    assert verdict(Estimate(1e-6, 0.0, 0.0, 0.0, 10), 0.0) == "differs"
+    assert verdict(Estimate(1e-12, 0.0, 0.0, 0.0, 10), 0.0) == "holds"
+    assert verdict(Estimate(1e-6, 0.0, 0.0, 0.0, 10), 0.0) == "misses"
 
 
 def test_of_370_right_checks_two_at_most_differ_on_average():

@@ -1,7 +1,5 @@
 """The command as a whole, on cases that take a second."""
 
-import csv
-
 import pytest
 from helpers.wording import unnamed
 
@@ -11,6 +9,7 @@ from dva_sim.validation.dispatch import checks
 from dva_sim.validation.dispatch.cases import load_cases
 from dva_sim.validation.dispatch.checks import check_cases
 from dva_sim.validation.dispatch.identities import IDENTITIES, check_identity
+from dva_sim.validation.evidence import read_evidence
 
 pytestmark = pytest.mark.system
 
@@ -56,7 +55,7 @@ def test_a_right_core_passes_and_says_what_is_too_rough(tmp_path, capsys, only_o
         == 0
     )
     output = capsys.readouterr().out
-    assert not unnamed(output, "agree", "quick run")
+    assert not unnamed(output, "lines hold", "too rough", "The rule holds", "quick run")
 
 
 def test_a_full_run_that_is_too_rough_fails(tmp_path, only_one_identity):
@@ -69,7 +68,8 @@ def test_a_full_run_that_is_too_rough_fails(tmp_path, only_one_identity):
 def test_a_wrong_answer_fails(tmp_path, capsys, only_one_identity):
     path = a_file(tmp_path, measures="{utilisation: 0.6}", source="wrong on purpose")
     assert validate(ValidateOptions("dispatch", cases=path, quick=True, jobs=1, seed=1)) == 4
-    assert "1 of" in capsys.readouterr().out
+    output = capsys.readouterr().out
+    assert not unnamed(output, "these do not: queue utilisation. The rule fails in: all checks")
 
 
 @pytest.mark.soak
@@ -80,12 +80,15 @@ def test_what_is_written_is_the_same_bytes_each_time(tmp_path, only_one_identity
             ValidateOptions("dispatch", out=tmp_path / name, cases=path, quick=True, jobs=1, seed=3)
         )
     files = sorted(p.relative_to(tmp_path / "one") for p in (tmp_path / "one").rglob("*.*"))
-    assert {f.name for f in files} >= {"dispatch.csv", "dispatch.parquet", "index.html"}
-    assert {f.stem for f in files if f.suffix == ".svg"} == {"deviations", "relative", "waits"}
+    assert {f.name for f in files} >= {"evidence.csv", "evidence.parquet", "index.html"}
+    assert {f.stem for f in files if f.suffix == ".svg"} == {"evidence"}
     for file in files:
         assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
-    rows = list(csv.DictReader((tmp_path / "one/dispatch.csv").read_text().splitlines()))
-    assert {"exact", "simulated", "standard_error", "plain", "deviation"} <= rows[0].keys()
+    lines = {line.line: line for line in read_evidence(tmp_path / "one/evidence.csv")}
+    wait = lines["queue wait_s"]
+    assert wait.predicted_low < wait.predicted < wait.predicted_high
+    assert not unnamed(wait.note, "SE", "without controls")
+    assert "seed: 3" in lines["all checks"].source
 
 
 @pytest.mark.soak
@@ -97,17 +100,18 @@ def test_the_number_of_processes_changes_nothing(tmp_path):
 
 def test_what_holds_without_chance_is_judged_to_the_last_digit(tmp_path):
     checks = check_cases(load_cases(a_file(tmp_path)), 1, True, 1)
-    exact = [c for c in checks if c.kind == "identity"]
-    assert [c.found.error for c in exact] == [0.0] * 4
-    assert all(c.verdict == "agrees" for c in exact)
+    exact = [line for line in checks if line.group == "Identities"]
+    assert [line.predicted_low for line in exact] == [None] * 4
+    assert all(line.verdict == "holds" for line in exact)
 
 
 def test_a_case_that_seems_to_differ_is_played_again_and_longer(tmp_path):
     path = a_file(tmp_path, measures="{utilisation: 0.6}", source="wrong on purpose")
-    (check,) = (c for c in check_cases(load_cases(path), 1, True, 1) if c.measure == "utilisation")
-    assert check.found.batches == 4 * 2 * 10
-    assert check.again.startswith("utilisation -")
-    assert check.verdict == "differs"
+    (check,) = (c for c in check_cases(load_cases(path), 1, True, 1) if c.claim == "utilisation")
+    (once, *_) = check_cases(load_cases(a_file(tmp_path)), 1, True, 1)
+    assert 3.5 < check.sample / once.sample < 4.5
+    assert "4 times as long, for utilisation -" in check.note
+    assert check.verdict == "misses"
 
 
 @pytest.mark.soak

@@ -4,9 +4,9 @@ import numpy as np
 
 from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.comparison import NetworkComparison
+from dva_sim.validation.network.evidence import lines_of
 from dva_sim.validation.network.pooling import pool
 from dva_sim.validation.network.reference import SocketRun, load_plan, load_runs
-from dva_sim.validation.network.result_page import evidence, reasons_of
 from dva_sim.validation.network.verdicts import BY_NAME, ComparedCell, ConditionGroup, judge
 
 
@@ -27,14 +27,10 @@ def compared(*rates):
 def test_each_miss_has_its_cause_or_is_said_to_have_none():
     found = compared(10.0, 20.0, 30.0)
     known = {Condition("pub", 20.0).label: "a full queue"}
-    assert reasons_of(found, known) == [
-        (Condition("pub", 20.0).label, "applied_hz", "a full queue"),
-        (Condition("pub", 30.0).label, "applied_hz", "not known"),
-    ]
-    titles = [sheet.title for sheet in evidence(found, {}, known).printed]
-    assert "Why conditions miss" in titles
-    assert "Why conditions miss" not in [
-        sheet.title for sheet in evidence(compared(10.0), {}, known).printed
+    assert [(line.verdict, line.note) for line in lines_of(found, known)] == [
+        ("holds", ""),
+        ("misses", "a full queue"),
+        ("misses", "cause not known"),
     ]
 
 

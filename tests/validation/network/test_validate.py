@@ -1,11 +1,13 @@
 """The command on a few conditions: what it tells, writes and finds out."""
 
-import csv
+from dataclasses import replace
 
 import pytest
+from helpers.wording import unnamed
 
 from dva_sim.cli import validation
-from dva_sim.validation.network import comparison, result_page
+from dva_sim.validation.evidence import read_evidence
+from dva_sim.validation.network import comparison, evidence
 from dva_sim.validation.network.comparison import NetworkSetting, compare
 from dva_sim.validation.network.reference import load_plan, load_runs
 from dva_sim.validation.network.verdicts import grouped
@@ -65,12 +67,32 @@ def test_what_is_missing_is_counted(compared):
     assert every == 150 - len(compared.judged)
 
 
-def test_a_row_of_the_table_shows_measured_and_predicted(compared):
-    [row] = result_page.table(compared, "lossless")
-    reported = dict(zip(result_page.HEADS, row, strict=True))
-    assert reported["depth"] == "message"
-    assert reported["age [ms]"].startswith("105.3 → 105.1 |")
-    assert reported["verdict"] == "passes"
+def test_a_line_shows_measured_and_predicted_with_its_band(compared):
+    lines = {line.line: line for line in evidence.lines_of(compared, {})}
+    age = lines["req10_d100_j0_l0_r0_p5_T2500 age_p50"]
+    assert age.words[2:] == ("105.3", "105.1", "98.06 to 112.6", "holds")
+    assert not age.holds_measured
+    assert lines["req10_d100_j20_l5_r0_p5_T2500 age_p95"].holds_measured
+
+
+def test_lines_of_pooled_conditions_have_z_and_no_band(compared):
+    lines = {line.line: line for line in evidence.lines_of(compared, {})}
+    pooled = lines["pub10_d50_j0_l5_r0_p5 applied_hz"]
+    assert not unnamed(pooled.note, "z ", "p ")
+    assert (pooled.low, pooled.high) == (None, None)
+
+
+def test_a_condition_that_is_not_played_is_shown_with_its_reason(compared):
+    group = replace(compared.groups[0], left_out="the service time equals the period")
+    *_, line = evidence.lines_of(replace(compared, left_out=[group]), {})
+    assert (line.line, line.verdict) == (group.condition.label, "shown only")
+    assert line.note == "the service time equals the period"
+
+
+def test_the_rule_passes_and_fails_with_the_comparison(compared):
+    rule = list(evidence.rule_of(compared))
+    assert all(line.verdict == "holds" for line in rule) == compared.passes
+    assert {line.line for line in rule} >= {"without loss", "overload", "control: datagrams"}
 
 
 @pytest.mark.parametrize("again", [False, pytest.param(True, marks=pytest.mark.soak)])
@@ -82,13 +104,13 @@ def test_the_command_writes_tables_and_figures(runs, tmp_path, capsys, monkeypat
     first, second = tmp_path / "a", tmp_path / ("b" if again else "a")
     for folder in dict.fromkeys([first, second]):
         assert validation.judge_runs(few, {}, folder, QUICK, {}) == 0
-    assert "conditions are judged" in capsys.readouterr().out
+    assert not unnamed(capsys.readouterr().out, "7 of 7 lines hold", "conditions are judged")
     files = [path.relative_to(first) for path in first.rglob("*") if path.is_file()]
-    assert {str(f) for f in files} >= {"index.html", "network.csv", "figures/scatter.png"}
+    assert {str(f) for f in files} >= {"index.html", "evidence.csv", "figures/evidence.png"}
     for file in files:
         assert (first / file).read_bytes() == (second / file).read_bytes()
-    rows = list(csv.DictReader((first / "network.csv").read_text().splitlines()))
-    assert {row["verdict"] for row in rows} <= {"inside", "shown only"}
+    verdicts = {line.verdict for line in read_evidence(first / "evidence.csv")}
+    assert verdicts == {"holds", "shown only"}
 
 
 def test_the_number_of_processes_changes_nothing(runs, monkeypatch):
@@ -104,9 +126,11 @@ def test_a_mechanism_that_is_left_out_has_its_line(runs, monkeypatch):
     monkeypatch.setattr(comparison, "QUICK_RUNS", 3)
     one = [run for run in runs if run.condition.label == "pub10_d50_j0_l5_r0_p5"]
     found = compare(grouped(one), NetworkSetting(quick=True, ablate=True))
-    left_out = {name for name, *_ in result_page.ablation(found)}
+    left_out = {name for name, *_ in evidence.ablation(found)}
     assert {"nothing", "datagrams", "tail-loss probe", "RACK"} <= left_out
 
 
 def test_what_judges_nothing_does_not_pass():
-    assert not compare([], QUICK).passes
+    nothing = compare([], QUICK)
+    assert not nothing.passes
+    assert list(evidence.rule_of(nothing)) == []

@@ -1,21 +1,20 @@
 """The command, on few persons: what it writes, and that who knows no delay fails."""
 
-import csv
-
 import pytest
 
 from dva_sim.agents.operator.published import lines_of, load_split, load_targets
 from dva_sim.cli.validation import validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.options.studies import ValidateOptions
+from dva_sim.validation.evidence import RULE, passes, read_evidence
 from dva_sim.validation.operators import experiments
+from dva_sim.validation.operators.evidence import judge, rule_of
 from dva_sim.validation.operators.experiments import (
     EXPERIMENTS,
     OperatorsSetting,
     measured,
     play_experiments,
 )
-from dva_sim.validation.operators.verdicts import judge, outcome_of
 
 pytestmark = pytest.mark.system
 
@@ -26,7 +25,7 @@ def played(strategy, *names):
     chosen = [e for e in EXPERIMENTS if e.name in names]
     setting = OperatorsSetting(strategy, persons=2, quick=True)
     found = measured(chosen, play_experiments(chosen, setting), seed=1)
-    return {v.line.id: v for v in judge(LINES, found)}, found
+    return judge(LINES, found), found
 
 
 def test_an_operator_on_whom_delay_has_no_effect_fails_whatever_else_it_does():
@@ -35,14 +34,14 @@ def test_an_operator_on_whom_delay_has_no_effect_fails_whatever_else_it_does():
     assert found["S7/75"].value == pytest.approx(1.0)
     assert found["S17/increase"].value == pytest.approx(0.0)
     held_out = {
-        v.line.id: v.word
-        for v in verdicts.values()
-        if v.line.kind == "held-out" and v.line.check[0] == "S"
+        line.id: v.verdict
+        for line, v in zip(LINES, verdicts, strict=True)
+        if line.kind == "held-out" and line.check[0] == "S"
     }
     without_delay = {"S11/mean", "S11/variance"}  # the steering law, not played here
     assert len(held_out) == 10
     assert {held_out[line] for line in held_out.keys() - without_delay} == {"misses"}
-    assert not outcome_of(list(verdicts.values()), load_split().rule).passes
+    assert not passes(rule_of(LINES, verdicts, load_split().rule))
 
 
 def test_delay_costs_two_persons_time_also_in_the_worst_of_their_intervals():
@@ -95,16 +94,15 @@ def test_what_is_written_is_the_same_bytes_each_time(tmp_path, monkeypatch, caps
     assert "negative" not in capsys.readouterr().err
     files = sorted(p.relative_to(tmp_path / "one") for p in (tmp_path / "one").rglob("*.*"))
     assert {f.name for f in files} >= {
-        "operators.csv",
-        "operators.parquet",
+        "evidence.csv",
+        "evidence.parquet",
         "steered.csv",
         "index.html",
     }
-    pictures = {"overview", "lag", "tilt", "steering", "waiting", "frames", "tracking"}
-    pictures |= {"moving", "pushed", "looks"}
+    pictures = {"evidence", "moving", "pushed", "looks"}
     assert {f.stem for f in files if f.suffix == ".svg"} == pictures
     for file in files:
         assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
-    rows = list(csv.DictReader((tmp_path / "one/operators.csv").read_text().splitlines()))
-    assert [row["line"] for row in rows] == [line.id for line in LINES]
-    assert {row["verdict"] for row in rows} == {"passes", "misses", "shown only"}
+    lines = [line for line in read_evidence(tmp_path / "one/evidence.csv") if line.group != RULE]
+    assert {line.line for line in lines} == {line.id for line in LINES}
+    assert {line.verdict for line in lines} == {"holds", "misses", "shown only"}

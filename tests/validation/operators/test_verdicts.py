@@ -9,8 +9,9 @@ import pytest
 from helpers.wording import unnamed
 
 from dva_sim.agents.operator.published import lines_of, load_split, load_targets
+from dva_sim.validation.evidence import headline, passes
 from dva_sim.validation.operators import experiments as of
-from dva_sim.validation.operators import result_page
+from dva_sim.validation.operators.evidence import GROUPS, judge, rule_of, steered
 from dva_sim.validation.operators.trials import (
     Found,
     Trials,
@@ -19,7 +20,6 @@ from dva_sim.validation.operators.trials import (
     mean,
     with_intervals,
 )
-from dva_sim.validation.operators.verdicts import judge, outcome_of
 
 LINES = {line.id: line for line in lines_of(load_targets(), load_split())}
 RULE = load_split().rule
@@ -34,6 +34,11 @@ def verdict(line, value):
     return judge([line], {line.id: certain(value)})[0]
 
 
+def rule(lines, values):
+    """The rule on some lines, by the line's name."""
+    return {line.line: line for line in rule_of(lines, judge(lines, values), RULE)}
+
+
 def trials(person=(0, 1), **columns):
     arrays = {name: np.array(values, float) for name, values in columns.items()}
     return Trials(np.array(person), arrays)
@@ -45,106 +50,105 @@ def timed(*times):
 
 def test_a_value_in_its_band_passes_and_one_beyond_it_misses():
     line = LINES["S17/increase"]
-    assert verdict(line, 0.39).word == verdict(line, 0.59).word == "passes"
-    assert verdict(line, 0.60).word == "misses"
+    assert verdict(line, 0.39).verdict == verdict(line, 0.59).verdict == "holds"
+    assert verdict(line, 0.60).verdict == "misses"
 
 
 def test_a_target_changed_to_a_wrong_number_makes_the_verdict_a_miss():
     wrong = replace(LINES["S16/slow"], target=500.0, low=495.0, high=505.0)
-    assert verdict(LINES["S16/slow"], 600.0).word == "passes"
-    assert verdict(wrong, 600.0).word == "misses"
+    assert verdict(LINES["S16/slow"], 600.0).verdict == "holds"
+    assert verdict(wrong, 600.0).verdict == "misses"
 
 
 @pytest.mark.parametrize(("line", "sign"), [("S12/less", -1), ("S12/more", 1), ("S7/25", 1)])
 def test_where_the_sign_counts_no_effect_misses_and_so_does_an_interval_that_holds_none(line, sign):
-    for value, other_end, word in ((0.0, 0.0, "misses"), (2, -1, "misses"), (2, 1, "passes")):
+    for value, other_end, word in ((0.0, 0.0, "misses"), (2, -1, "misses"), (2, 1, "holds")):
         ends = sorted(1 + 0.01 * sign * share for share in (other_end, 3))
         found = Found(1 + 0.01 * sign * value, *ends, 24)
-        assert judge([LINES[line]], {line: found})[0].word == word
+        assert judge([LINES[line]], {line: found})[0].verdict == word
 
 
 def test_a_line_beside_the_others_is_shown_without_a_band():
     shown = verdict(LINES["S7/time-25"], 2000.0)
-    assert (shown.word, shown.inside) == ("shown only", False)
-    assert result_page.words(shown)[2:] == ["934 ms", "2000 ms", "shown only"]
+    assert shown.words[2:] == ("934", "2000", "–", "shown only: no band")
 
 
 def test_a_publication_passes_as_a_whole_if_all_its_lines_do():
     held_out = [line for line in LINES.values() if line.kind == "held-out"]
     values = {line.id: middle(line) for line in held_out}
-    assert outcome_of(judge(held_out, values), RULE).publications == (9, 9)
+    assert rule(held_out, values)["held-out publications"].note == "9 of 9"
     values["S8/slope"] = values["S7/75"] = certain(0.0)  # both of one publication
-    assert outcome_of(judge(held_out, values), RULE).publications == (8, 9)
+    assert rule(held_out, values)["held-out publications"].note == "8 of 9"
 
 
 @pytest.mark.parametrize("line", ["S9/dwell", "S14/crossover"])
 def test_what_was_fitted_to_or_remembered_is_shown_only_wherever_it_lies(line):
-    assert verdict(LINES[line], 1.2).word == verdict(LINES[line], 99.0).word == "shown only"
-    assert verdict(LINES[line], 1.2).inside
-    assert not verdict(LINES[line], 99.0).inside
+    assert verdict(LINES[line], 1.2).verdict == verdict(LINES[line], 99.0).verdict == "shown only"
+    assert verdict(LINES[line], 1.2).note == "inside its band"
+    assert verdict(LINES[line], 99.0).note == "outside its band"
 
 
 def test_what_was_not_simulated_misses():
     (missing,) = judge([LINES["S1/critical"]], {})
-    assert missing.word == "misses"
+    assert missing.verdict == "misses"
 
 
-@pytest.mark.parametrize(("misses", "passes"), [(0, True), (3, True), (4, False)])
-def test_four_of_five_held_out_lines_are_enough(misses, passes):
+@pytest.mark.parametrize(("misses", "holds"), [(0, True), (3, True), (4, False)])
+def test_four_of_five_held_out_lines_are_enough(misses, holds):
     held_out = [line for line in LINES.values() if line.kind == "held-out"]
     values = {line.id: middle(line) for line in held_out}
     values |= {line.id: certain(-99.0) for line in held_out[:misses]}
-    outcome = outcome_of(judge(held_out, values), RULE)
-    assert outcome.held_out == (19 - misses, 19)
-    assert outcome.passes == passes
+    lines = rule(held_out, values)
+    assert lines["held-out lines"].note == f"{19 - misses} of 19"
+    assert passes(lines.values()) == holds
 
 
 def test_what_judges_nothing_does_not_pass():
-    assert not outcome_of([], RULE).passes
+    assert not passes(rule_of([], [], RULE))
 
 
 def test_a_single_exact_line_that_misses_fails_it_all():
     exact = [line for line in LINES.values() if line.kind == "exact"]
     values = {line.id: certain(line.high if line.low is None else line.low) for line in exact}
-    assert outcome_of(judge(exact, values), RULE).passes
+    assert passes(rule(exact, values).values())
     values["S16/slow"] = certain(650.0)
-    assert not outcome_of(judge(exact, values), RULE).passes
+    assert not passes(rule(exact, values).values())
 
 
-def test_the_headline_says_both_shares_and_what_is_asked_for():
+def test_the_headline_names_every_miss_and_what_the_rule_asks_for():
     held_out = [line for line in LINES.values() if line.kind == "held-out"]
-    outcome = outcome_of(judge(held_out, {line.id: certain(-9.0) for line in held_out}), RULE)
-    shares = "0 of 0 exact", "0 of 19 held-out", "(0 %)", "0 of 9 held-out", "80 %", "failed"
-    assert not unnamed(result_page.headline(outcome), *shares)
+    verdicts = judge(held_out, {line.id: certain(-9.0) for line in held_out})
+    text = headline([*verdicts, *rule_of(held_out, verdicts, RULE)])
+    assert text.startswith("0 of 19 lines hold; these do not: ")
+    assert not unnamed(text, *(line.id for line in held_out))
+    assert not unnamed(text, "held-out lines (0, 0 of 19; asked for: at least 0.8)")
 
 
 def test_words_give_target_band_and_unit():
-    assert unnamed(result_page.published(LINES["S9/dwell"]), "1.2 (", "0.95 to 1.45", "bit/s") == []
-    assert result_page.published(LINES["S16c/30"]) == "at least 120 min"
-    assert result_page.published(LINES["S16c/300"]) == "at most 3 min"
-    assert unnamed(result_page.published(LINES["S12/less"]), "0.83 to 1", "below 1") == []
-    assert result_page.simulated(verdict(LINES["S16c/30"], math.inf)) == "never"
+    assert verdict(LINES["S9/dwell"], 1.3).words[2:5] == ("1.2", "1.3", "0.95 to 1.45")
+    assert verdict(LINES["S16c/30"], math.inf).words[1:5] == (
+        *("30 ppm, not before [min]", "–", "∞", "at least 120"),
+    )
+    assert verdict(LINES["S16c/300"], 2.0).words[4] == "at most 3"
+    assert verdict(LINES["S12/less"], 0.9).note == "surely below 1"
 
 
 def test_a_value_at_the_edge_of_what_was_tried_says_so():
     line = LINES["S15/c"]
-    assert result_page.simulated(verdict(line, 6.0)).startswith("6, at the edge")
-    assert result_page.simulated(verdict(line, 2.0)) == "2"
+    assert "at the edge" in verdict(line, 6.0).note
+    assert "at the edge" not in verdict(line, 2.0).note
 
 
 def test_fires_and_people_on_foot_stand_under_a_heading_of_their_own():
-    verdicts = judge(list(LINES.values()), {})
-    exact = {title: own for title, own in result_page.grouped(verdicts) if "exact" in title}
-    assert [(title.split()[0], len(own)) for title, own in exact.items()] == [
-        ("Operators", 9),
-        ("Fires,", 19),
-    ]
+    groups = [v.group for v in judge(list(LINES.values()), {})]
+    counts = [groups.count(GROUPS["exact", is_standard]) for is_standard in (False, True)]
+    assert counts == [9, 19]
 
 
 def test_how_they_steered_is_told_cell_by_cell_where_it_differs():
     lag = {name: trials(move_and_wait_share=(0, 0)) for name in ("8.3", "25")}
     reach = {"0": lag["25"], "1.5": trials(move_and_wait_share=(0.5, 1.0))}
-    reported = result_page.steered({"steering": lag, "excavator": reach})
+    reported = steered({"steering": lag, "excavator": reach})
     assert [(name, re.findall(r"[\d.]+", shares)) for name, shares in reported] == [
         ("steering", ["0"]),
         ("excavator, by delay [s]", ["0", "0", "1.5", "75"]),

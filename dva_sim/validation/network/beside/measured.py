@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Final, Literal
+import csv
+import gzip
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -12,20 +15,27 @@ from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.cell_grid import cells, jobs
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.units import unit_of
+from dva_sim.simulation.measures.middleware import RUN_COLUMNS, command_row
 from dva_sim.simulation.middleware import MiddlewareScenario
+from dva_sim.simulation.middleware.run import Window
+from dva_sim.validation.evidence import RULE, Evidence, judged, share_rule, short_number
+from dva_sim.validation.evidence_page import ValidationResult
 from dva_sim.validation.network.beside.predictions import (
     ALLOWANCES,
     AskedCell,
     CellPrediction,
-    PredictedBand,
     plays_in,
     predict_all,
     read_kept,
+    rows_of,
 )
 
+STUDY: Final = "middleware"  # measured the commands that are kept
 MIN_RUNS: Final = 3  # undisturbed ones, of which a median is judged
 MIN_INSIDE: Final = 0.90  # share of the rows that are judged
-BesideWord = Literal["inside", "outside", "predicted", "not predicted", "not judged"]
+MEANINGS: Final = {column.name: column.meaning for column in RUN_COLUMNS}
+NOT_JUDGED: Final = "not judged"
 
 
 def asked_by(study: Study, results: Results | None = None) -> list[AskedCell]:
@@ -88,92 +98,107 @@ def measured_in(results: Results) -> dict[str, Measured]:
     return found
 
 
-@dataclass(frozen=True)
-class BesideRow:
-    """One measure of one configuration.
+def measured_in_commands(path: Path, asked: Sequence[AskedCell]) -> dict[str, Measured]:
+    """The kept commands of a study, by configuration; it is not kept which runs were disturbed.
 
-    Attributes:
-        levels: Its level of each factor.
-        values: Measured values, run by run.
-        band: The prediction; None where the model says nothing.
-        why: Reason for not predicting, or for not judging the row.
+    Args:
+        path: A table of commands, by middleware, link and person: when each was made and when it
+            was applied, [s] from the start of its run.
+        asked: The study's configurations.
+
+    Raises:
+        ConfigError: the table cannot be read.
     """
-
-    levels: Mapping[str, str]
-    measure: str
-    values: Sequence[float]
-    band: PredictedBand | None
-    why: str = ""
-
-    @property
-    def median(self) -> float:
-        """Median of the measured values; nan without any."""
-        return float(np.median(self.values)) if len(self.values) else float("nan")
-
-    @property
-    def word(self) -> BesideWord:
-        """The verdict."""
-        if self.band is None:
-            return "not predicted"
-        if self.why:
-            return "not judged"
-        if not len(self.values):
-            return "predicted"
-        return "inside" if self.band.holds(self.median) else "outside"
+    times: dict[tuple[str, ...], dict[str, list[tuple[float, float]]]] = {}
+    try:
+        with gzip.open(path, "rt", encoding="utf-8") as file:
+            for row in csv.DictReader(file):
+                run = times.setdefault((row["middleware"], row["link"]), {})
+                own = run.setdefault(row["person"], [])
+                if row["arrived_s"]:
+                    own.append((float(row["made_s"]), float(row["arrived_s"])))
+    except (OSError, UnicodeDecodeError, KeyError, ValueError) as error:
+        raise ConfigError(f"cannot be read as a table of commands: {error}", path) from None
+    return {
+        cell.config: Measured(
+            _measures(cell.scenario, times[cell.levels["middleware"], cell.levels["link"]].values())
+        )
+        for cell in asked
+        if cell.scenario is not None
+    }
 
 
-def rows_beside(
-    predictions: Sequence[CellPrediction], measured: Mapping[str, Measured] | None
-) -> list[BesideRow]:
-    """Every measure of every configuration, with what was measured, if anything was."""
+def _measures(
+    scenario: MiddlewareScenario, runs: Iterable[Sequence[tuple[float, float]]]
+) -> dict[str, list[float]]:
+    """The measures of some runs by the newest command at each time, as a run takes them."""
+    window = Window(0.0, scenario.set_up_s, scenario.set_up_s + scenario.measure_s)
     rows = []
-    for prediction in predictions:
-        own = None if measured is None else measured.get(prediction.config, Measured({}))
-        for measure in ALLOWANCES:
-            values = () if own is None else own.values.get(measure, ())
-            band = prediction.bands.get(measure)
-            why = prediction.why if band is None else "" if own is None else _against(own, values)
-            rows.append(BesideRow(prediction.levels, measure, values, band, why))
-    return rows
+    for run in runs:
+        ordered = sorted(run, key=lambda times: times[1])
+        made, applied = np.array(ordered, dtype=float).reshape(-1, 2).T
+        robot = scenario.robot
+        limits = {"max_age_s": robot.max_age_s, "watchdog_s": robot.watchdog_s}
+        rows.append(command_row(made, applied, window, **limits))
+    return {name: [row[name] for row in rows if name in row] for name in ALLOWANCES}
 
 
-def _against(own: Measured, values: Sequence[float]) -> str:
-    """Reason why a predicted row is not judged; empty if it is."""
-    if len(values) >= MIN_RUNS:
-        return ""
-    late = f", {own.disturbed} more were disturbed" if own.disturbed else ""
-    return f"{len(values)} of at least {MIN_RUNS} runs{late}"
+def lines_beside(
+    predictions: Sequence[CellPrediction], measured: Mapping[str, Measured] | None
+) -> list[Evidence]:
+    """Every measure of every configuration, with what was measured, if anything was."""
+    lines = []
+    for measure in ALLOWANCES:
+        for prediction in predictions:
+            own = None if measured is None else measured.get(prediction.config, Measured({}))
+            lines.append(_line(prediction, measure, own))
+    return lines
 
 
-@dataclass(frozen=True)
-class Beside:
-    """Comparison of measured rows with predicted bands.
+def _line(prediction: CellPrediction, measure: str, own: Measured | None) -> Evidence:
+    values = () if own is None else own.values.get(measure, ())
+    median = float(np.median(values)) if len(values) else None
+    line = Evidence(
+        "middleware",
+        f"{measure}: {MEANINGS[measure]}",
+        " ".join((*prediction.levels.values(), measure)),
+        MEANINGS[measure],
+        source="the study's runs over real middleware",
+        unit=unit_of(measure),
+        measured=median,
+        holds_measured=True,
+        sample=len(values),
+        note=f"not predicted: {prediction.why}",
+    )
+    band = prediction.bands.get(measure)
+    if band is None:
+        return line
+    line = replace(line, predicted=band.predicted, low=band.low, high=band.high, note="predicted")
+    if own is None:
+        return line
+    if len(values) < MIN_RUNS or median is None:
+        late = f", {own.disturbed} more were disturbed" if own.disturbed else ""
+        return replace(line, note=f"{NOT_JUDGED}: {len(values)} of at least {MIN_RUNS} runs{late}")
+    ends = f"runs from {short_number(min(values))} to {short_number(max(values))}"
+    return replace(line, verdict="holds" if band.holds(median) else "misses", note=ends)
 
-    Attributes:
-        rows: Every measure of every configuration.
-        kept: Configurations whose bands were kept before the study was measured.
-        played: New predictions.
-    """
 
-    rows: Sequence[BesideRow]
-    kept: int = 0
-    played: Sequence[CellPrediction] = ()
-
-    def with_word(self, *words: BesideWord) -> list[BesideRow]:
-        """The rows with one of some verdicts."""
-        return [row for row in self.rows if row.word in words]
-
-    @property
-    def share(self) -> tuple[int, int]:
-        """Number of judged rows inside their bands, and number of judged rows."""
-        return len(self.with_word("inside")), len(self.with_word("inside", "outside"))
-
-    @property
-    def passes(self) -> bool:
-        """True if enough rows lie inside; False if something was measured and nothing judged."""
-        inside, judged = self.share
-        is_empty = not judged and bool(self.with_word("not judged"))
-        return inside >= MIN_INSIDE * judged and not is_empty
+def rule_of(lines: Sequence[Evidence]) -> Evidence:
+    """The share of rows inside their bands; it misses if what was measured cannot be judged."""
+    verdicts = [line.verdict for line in judged(lines)]
+    if verdicts:
+        held = verdicts.count("holds")
+        return share_rule("middleware", "rows", held, len(verdicts), least=MIN_INSIDE)
+    is_empty = any(line.note.startswith(NOT_JUDGED) for line in lines)
+    return Evidence(
+        "middleware",
+        RULE,
+        "rows",
+        "share that holds",
+        low=MIN_INSIDE,
+        verdict="misses" if is_empty else "shown only",
+        note="nothing is judged",
+    )
 
 
 def beside_of(
@@ -182,7 +207,7 @@ def beside_of(
     plays: int,
     workers: int,
     progress: Callable[[int, int], None] = lambda done, of: None,
-) -> Beside:
+) -> ValidationResult:
     """Predict some configurations, as far as no bands were kept, beside what was measured.
 
     Args:
@@ -208,5 +233,15 @@ def beside_of(
         or CellPrediction(cell.config, cell.levels, cell.seeds, known[cell.config] or {})
         for cell in asked
     ]
-    now = [prediction for prediction in predictions if prediction.config in played]
-    return Beside(rows_beside(predictions, measured), len(asked) - len(todo), now)
+    lines = lines_beside(predictions, measured)
+    notes = []
+    if kept_here := len(asked) - len(todo):
+        notes = [f"The bands of {kept_here} configurations were kept before they were measured."]
+    table = rows_of([prediction for prediction in predictions if prediction.config in played])
+    if table:
+        notes.append(f"{len(table)} configurations were played now, by the model as it is.")
+    return ValidationResult(
+        [*lines, rule_of(lines)],
+        notes=notes,
+        tables={"predictions": table} if table else {},
+    )

@@ -4,23 +4,29 @@ import csv
 import shutil
 from functools import partial
 from pathlib import Path
+from statistics import fmean
 
 import pytest
+from helpers.paths import ROOT
 from helpers.studies.small_study import run_study
 from helpers.wording import unnamed
 
 from dva_sim.cli import validation
+from dva_sim.experiments.report.kept_answers import read
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.errors import ConfigError, ExitCode
 from dva_sim.options.studies import ValidateOptions
-from dva_sim.validation.network.beside import measured, page
+from dva_sim.validation.evidence import read_evidence
+from dva_sim.validation.network.beside import measured
 from dva_sim.validation.network.beside.measured import (
     Measured,
     asked_by,
     beside_of,
+    lines_beside,
     measured_in,
-    rows_beside,
+    measured_in_commands,
+    rule_of,
 )
 from dva_sim.validation.network.beside.predictions import (
     ALLOWANCES,
@@ -29,6 +35,8 @@ from dva_sim.validation.network.beside.predictions import (
     read_kept,
 )
 
+TRACE = ROOT / "experiments/traces/commands-over-middleware.csv.gz"
+ANSWER = ROOT / "experiments/answers/middleware.json"
 OWN = Path(__file__).parents[4] / "protocol/transports/repeated_udp.py"
 STUDY = """
 question: Which?
@@ -83,9 +91,9 @@ def results(tmp_path, monkeypatch):
     return run
 
 
-def rows_in(folder):
-    with (folder / "beside.csv").open() as file:
-        return list(csv.DictReader(file))
+def judged_in(result, *words):
+    """The lines of some verdicts, without the rule."""
+    return [line for line in result.lines[:-1] if line.verdict in words]
 
 
 @pytest.mark.system  # it draws
@@ -98,20 +106,16 @@ def test_measured_rows_stand_beside_their_bands(results, tmp_path, capsys):
         == 0
     )
     assert unnamed(capsys.readouterr().out, "14 of 14", "is not modelled") == []
-    rows = rows_in(written)
-    assert len(rows) == 4 * len(ALLOWANCES)
-    words = {(row["middleware"], row["verdict"]) for row in rows}
-    assert words == {("udp", "inside"), ("own", "not predicted")}
-    [age] = [
-        row
-        for row in rows
-        if (row["link"], row["measure"]) == ("far", "age_in_force_p50_s")
-        and row["middleware"] == "udp"
-    ]
-    assert [float(age[key]) for key in ("measured", "least")] == pytest.approx([0.176, 0.036])
-    assert float(age["low"]) < float(age["predicted"]) < float(age["high"])
+    *lines, _ = read_evidence(written / "evidence.csv")
+    assert len(lines) == 4 * len(ALLOWANCES)
+    words = {(line.line.split()[0], line.verdict) for line in lines}
+    assert words == {("udp", "holds"), ("own", "shown only")}
+    [age] = [line for line in lines if line.line == "udp far age_in_force_p50_s"]
+    assert age.measured == pytest.approx(0.176)
+    assert age.note == "runs from 0.036 to 0.176"
+    assert age.low < age.predicted < age.high
     files = {str(path.relative_to(written)) for path in written.rglob("*")}
-    assert {"index.html", "predictions.csv", "figures/beside-longest_gap_s.svg"} <= files
+    assert {"index.html", "predictions.csv", "figures/evidence.svg"} <= files
     assert "repeated_udp" not in (written / "predictions.csv").read_text()
 
 
@@ -120,26 +124,28 @@ def test_a_row_outside_its_band_is_named_and_fails_the_model(results, capsys, mo
     found = validation.validate(ValidateOptions("network", beside=results(), quick=True, jobs=1))
     assert found == ExitCode.GATE_FAILED
     output = capsys.readouterr().out
-    assert unnamed(output, "12 of 14", "command_rate_hz", "outside") == []
+    assert unnamed(output, "12 of 14", "udp clean command_rate_hz", "udp far command_rate_hz") == []
 
 
 def test_disturbed_runs_are_not_judged(results):
     runs = measured_in(Results.load(results(late=True)))
     found = beside_of(asked_by(load_study("study.yaml")), runs, 2, 1)
-    far = [row for row in found.rows if row.levels == {"middleware": "udp", "link": "far"}]
-    assert {row.word for row in far} == {"not judged"}
-    assert unnamed(far[0].why, "0 of at least 3", "3 more were disturbed") == []
+    far = [line for line in found.lines if line.line.startswith("udp far ")]
+    assert {line.verdict for line in far} == {"shown only"}
+    assert unnamed(far[0].note, "not judged: 0 of at least 3", "3 more were disturbed") == []
     assert found.passes
     none = beside_of(asked_by(load_study("study.yaml")), {}, 2, 1)
-    assert none.share == (0, 0)
+    assert judged_in(none, "holds", "misses") == []
     assert not none.passes
 
 
 def test_of_a_study_without_results_predictions_alone_are_made(results, tmp_path):
     results()
     asked = asked_by(load_study("study.yaml"))
-    found = page.evidence(beside_of(asked, None, 2, 1), {})
-    assert {row["verdict"] for row in found.tables["beside"]} == {"predicted", "not predicted"}
+    found = beside_of(asked, None, 2, 1)
+    notes = {line.note.partition(":")[0] for line in found.lines[:-1]}
+    assert notes == {"predicted", "not predicted"}
+    assert found.passes
     table = tmp_path / "mine.csv"
     with table.open("w") as file:
         writer = csv.DictWriter(file, list(found.tables["predictions"][0]))
@@ -156,8 +162,9 @@ def test_kept_bands_are_taken_before_any_are_made(results, monkeypatch):
     kept = {(asked[0].config, asked[0].seeds): BANDS}
     monkeypatch.setattr(measured, "read_kept", lambda: kept)
     found = beside_of(asked, {}, 1, 1)
-    assert (found.kept, found.played) == (1, [])
-    assert {row.band for row in found.rows} == {PredictedBand(1, 2, 3)}
+    assert found.notes == ["The bands of 1 configurations were kept before they were measured."]
+    assert found.tables == {}
+    assert {(e.low, e.predicted, e.high) for e in found.lines[:-1]} == {(1, 2, 3)}
 
 
 def test_runs_of_a_scenario_that_is_another_one_today_are_not_predicted_again(results):
@@ -168,19 +175,38 @@ def test_runs_of_a_scenario_that_is_another_one_today_are_not_predicted_again(re
     old = {f"old-{config}": each for config, each in runs.items()}
     asked = asked_by(load_study("study.yaml"), made)
     assert {cell.config for cell in asked} == set(old)
-    rows = beside_of(asked, old, 1, 1).rows
-    assert {row.word for row in rows} == {"not predicted"}
-    assert unnamed(rows[0].why, "scenario has changed") == []
-    assert len(rows[0].values) == 3
+    *lines, _ = beside_of(asked, old, 1, 1).lines
+    assert {line.verdict for line in lines} == {"shown only"}
+    assert unnamed(lines[0].note, "not predicted", "scenario has changed") == []
+    assert lines[0].sample == 3
 
 
 @pytest.mark.parametrize(
     ("values", "word"),
-    [([2.0, 3.0, 9.0], "inside"), ([2.0, 3.1, 9.0], "outside"), ([3.1, 3.1], "not judged")],
+    [([2.0, 3.0, 9.0], "holds"), ([2.0, 3.1, 9.0], "misses"), ([3.1, 3.1], "shown only")],
 )
 def test_the_median_of_at_least_three_runs_has_to_lie_inside(values, word):
-    rows = rows_beside([PREDICTED], {"a": Measured(dict.fromkeys(ALLOWANCES, values))})
-    assert {row.word for row in rows} == {word}
+    lines = lines_beside([PREDICTED], {"a": Measured(dict.fromkeys(ALLOWANCES, values))})
+    assert {line.verdict for line in lines} == {word}
+
+
+def test_nine_lines_of_ten_have_to_hold():
+    values = {name: [2.0, 2.0, 2.0] for name in ALLOWANCES}
+    assert rule_of(lines_beside([PREDICTED], {"a": Measured(values)})).verdict == "holds"
+    values["up_bytes"] = [9.0, 9.0, 9.0]
+    rule = rule_of(lines_beside([PREDICTED], {"a": Measured(values)}))
+    assert (rule.verdict, rule.note) == ("misses", "6 of 7")
+
+
+@pytest.mark.parametrize("link", ["far", "narrow"])
+def test_kept_commands_give_the_kept_answer(link):
+    """Mean age in force of REQ/REP less that of PUB/SUB, 95th percentile."""
+    asked = {tuple(cell.levels.values()): cell for cell in asked_by(load_study("middleware"))}
+    pair = [asked[name, link] for name in ("req-rep", "pub-sub")]
+    found = measured_in_commands(TRACE, pair)
+    ages = [fmean(found[cell.config].values["age_in_force_p95_s"]) for cell in pair]
+    [kept] = [row.mean for row in read(ANSWER).rows if row.level == link]
+    assert ages[0] - ages[1] == pytest.approx(kept, abs=1e-4)
 
 
 def test_what_is_no_middleware_study_is_refused(tmp_path):

@@ -1,0 +1,177 @@
+"""Evidence on operators: a line for each published number, and how they steered.
+
+A line holds if the simulated value lies in the published band; the split says which shares of the
+exact and of the held-out lines must.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+from dva_sim.agents.operator.published import LineKind, RuleConfig, TargetLine
+from dva_sim.validation.evidence import RULE, Evidence, share_rule
+from dva_sim.validation.evidence_page import ResultSheet, ValidationResult
+from dva_sim.validation.frame import Row
+from dva_sim.validation.operators.experiments import TRIED
+from dva_sim.validation.operators.people_figures import draw_curves
+from dva_sim.validation.operators.trials import Cells, Found, certain, mean
+
+OTHER = "standards"  # the exact lines that have nothing to do with operators and phones
+GROUPS: dict[tuple[LineKind, bool], str] = {
+    ("exact", False): "Operators and phones: theory, the dissertation's app (exact)",
+    ("held-out", False): "Operators: published experiments that no fit used (held out, not unseen)",
+    ("beside", False): "Operators: beside these, shown, never counted",
+    ("fitted", False): "Operators: fitted to, shown, never counted",
+    ("remembered", False): "Operators: from memory, shown, never counted",
+    ("exact", True): "Fires, alarms and people on foot: standards and textbooks (exact)",
+}
+"""Headings, in their order, by kind and by whether the line is one of `OTHER`."""
+COUNTED: tuple[LineKind, ...] = ("exact", "held-out")
+STEERING = (
+    "In which share of the time the persons of each experiment moved and waited for what they had "
+    "done; the rest of it they steered in a closed loop."
+)
+STEERED = "move_and_wait_share"
+BY = {
+    "lag": "lag [ms]",
+    "tilt": "gain, selection",
+    "waiting": "delay [s]",
+    "excavator": "delay [s]",
+    "frames": "frame rate [1/s], delay [s]",
+    "moving": "added lag [s], speed of the target [m/s]",
+    "click": "added lag [s]",
+}
+"""Meanings of cell names that do not explain themselves, by experiment."""
+
+
+def evidence(
+    lines: Sequence[TargetLine],
+    found: Mapping[str, Found],
+    rule: RuleConfig,
+    *,
+    played: Mapping[str, Cells],
+    conditions: Mapping[str, str],
+) -> ValidationResult:
+    """Result of all lines.
+
+    Args:
+        lines: Published numbers.
+        found: Simulated numbers by the line's id.
+        rule: Shares that must hold.
+        played: The trials of each experiment.
+        conditions: Conditions of the runs, by name.
+    """
+    verdicts = judge(lines, found)
+    return ValidationResult(
+        [
+            *sorted(verdicts, key=lambda line: list(GROUPS.values()).index(line.group)),
+            *rule_of(lines, verdicts, rule),
+        ],
+        conditions=conditions,
+        sheets=[
+            ResultSheet("How they steered", ("experiment", "share"), steered(played), STEERING)
+        ],
+        tables={"steered": _shares(played)},
+        draw=partial(draw_curves, played),
+    )
+
+
+def judge(lines: Sequence[TargetLine], found: Mapping[str, Found]) -> list[Evidence]:
+    """A verdict for each line; what was not simulated is nan, and misses."""
+    return [_judged(line, found.get(line.id, certain(math.nan))) for line in lines]
+
+
+def _judged(line: TargetLine, found: Found) -> Evidence:
+    inside = line.holds(found.value) and line.is_sure(found.low, found.high)
+    is_counted = line.kind in COUNTED
+    notes = []
+    if not is_counted:
+        notes = (
+            ["inside its band" if inside else "outside its band"] if line.has_band else ["no band"]
+        )
+    for side, limit in (("above", line.above), ("below", line.below)):
+        notes += [f"surely {side} {limit:g}"] if limit is not None else []
+    if found.value in TRIED.get(line.id, ()):
+        notes.append("at the edge of what was tried")
+    return Evidence(
+        "operators",
+        GROUPS[line.kind, line.publication == OTHER],
+        line.id,
+        line.what,
+        source=f"{line.metric}: {line.source} [{line.tag}]",
+        unit=line.unit,
+        measured=line.target,
+        predicted=found.value,
+        predicted_low=found.low if found.persons else None,
+        predicted_high=found.high if found.persons else None,
+        low=line.low,
+        high=line.high,
+        sample=found.persons,
+        verdict=("holds" if inside else "misses") if is_counted else "shown only",
+        note=", ".join(notes),
+    )
+
+
+def rule_of(
+    lines: Sequence[TargetLine], verdicts: Sequence[Evidence], rule: RuleConfig
+) -> list[Evidence]:
+    """The shares that must hold, and how many publications hold in all their lines."""
+    shares = {"exact": rule.exact, "held-out": rule.held_out}
+    rows = []
+    for kind, least in shares.items():
+        own = [v for line, v in zip(lines, verdicts, strict=True) if line.kind == kind]
+        if own:
+            held = sum(v.verdict == "holds" for v in own)
+            rows.append(share_rule("operators", f"{kind} lines", held, len(own), least=least))
+    by_publication: dict[str, list[bool]] = {}
+    for line, v in zip(lines, verdicts, strict=True):
+        if line.kind == "held-out":
+            by_publication.setdefault(line.publication, []).append(v.verdict == "holds")
+    if by_publication:
+        whole = sum(map(all, by_publication.values()))
+        rows.append(
+            Evidence(
+                "operators",
+                RULE,
+                "held-out publications",
+                "share that holds in all lines",
+                predicted=whole / len(by_publication),
+                sample=len(by_publication),
+                note=f"{whole} of {len(by_publication)}",
+            )
+        )
+    return rows
+
+
+def steered(played: Mapping[str, Cells]) -> list[tuple[str, str]]:
+    """Share of time in move-and-wait, by experiment and cell."""
+    rows = []
+    for name, cells in _steering(played).items():
+        shares = {
+            cell: f"{100 * mean(trials, STEERED):.0f}\N{NO-BREAK SPACE}%"
+            for cell, trials in cells.items()
+        }
+        text = f"{name}, by {BY[name]}" if name in BY else name
+        first, *others = dict.fromkeys(shares.values())
+        each = ", ".join(f"{cell}: {share}" for cell, share in shares.items())
+        rows.append((text, each if others else f"{first} everywhere"))
+    return rows
+
+
+def _steering(played: Mapping[str, Cells]) -> dict[str, Cells]:
+    """The experiments in which something is steered."""
+    return {
+        name: cells
+        for name, cells in played.items()
+        if all(STEERED in trials.columns for trials in cells.values())
+    }
+
+
+def _shares(played: Mapping[str, Cells]) -> list[Row]:
+    return [
+        {"experiment": name, "cell": cell, STEERED: mean(trials, STEERED)}
+        for name, cells in _steering(played).items()
+        for cell, trials in cells.items()
+    ]
