@@ -1,4 +1,4 @@
-"""Reference pages that are written from the code before each build of the documentation."""
+"""Pages that are written from the code and from kept results before each build."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from generators import (
     configuration,
     console,
     correspondences,
+    evidence,
     exit_codes,
     glossary,
     json_output,
@@ -46,6 +47,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "reference/correspondences.md": correspondences.page,
     "reference/samples.md": samples.page,
     "reference/glossary.md": glossary.page,
+    "explanation/evidence.md": evidence.page,
 }
 """Pages by their path below docs, each with the function that returns its Markdown."""
 
@@ -63,7 +65,7 @@ def paths() -> list[str]:
 
 
 def write(docs: Path) -> None:
-    """Write every page whose text has changed, and remove those of studies that are gone."""
+    """Write every page and picture that has changed, and remove pages of studies that are gone."""
     for file in (docs / "results").glob("*.md"):
         if str(file.relative_to(docs)) not in paths():
             file.unlink()
@@ -72,3 +74,7 @@ def write(docs: Path) -> None:
         file.parent.mkdir(exist_ok=True)
         if not file.exists() or file.read_text(encoding="utf-8") != text:
             file.write_text(text, encoding="utf-8")
+    picture = docs / evidence.PICTURE
+    drawn = evidence.picture()
+    if not picture.exists() or picture.read_bytes() != drawn:
+        picture.write_bytes(drawn)
