@@ -93,6 +93,8 @@ def test_the_rule_passes_and_fails_with_the_comparison(compared):
     rule = list(evidence.rule_of(compared))
     assert all(line.verdict == "holds" for line in rule) == compared.passes
     assert {line.line for line in rule} >= {"without loss", "overload", "control: datagrams"}
+    values = [value for line in rule for value in (line.predicted, line.low, line.high)]
+    assert {type(value) for value in values} == {float, type(None)}  # as a table gives them back
 
 
 @pytest.mark.parametrize("again", [False, pytest.param(True, marks=pytest.mark.soak)])
