@@ -32,6 +32,25 @@ _SOCKETS: Final = {
 }
 
 
+def plain_socket(
+    context: zmq.Context[Socket], kind: int, high_water_mark: int, conflates: bool
+) -> Socket:
+    """Return a socket for single frames without a topic, which forgets them when it is closed.
+
+    Args:
+        high_water_mark: Messages that may wait at this end.
+        conflates: True to keep only the newest.
+    """
+    socket = context.socket(kind)
+    socket.linger = 0
+    socket.sndhwm = socket.rcvhwm = high_water_mark
+    if conflates:
+        socket.conflate = True
+    if kind == zmq.SUB:
+        socket.subscribe(b"")
+    return socket
+
+
 class PlainWire(Wire):
     """A connected REQ or DEALER socket, whose replies come in the order of its requests.
 
@@ -100,14 +119,8 @@ class ZeroMqTransport(CommandTransport):
 
     def opened(self, context: zmq.Context[Socket], kind: int) -> Socket:
         """A socket with these options."""
-        socket = context.socket(kind)
-        socket.linger = 0
-        socket.sndhwm = socket.rcvhwm = self.high_water_mark
-        if self.pattern == "conflate" and kind in (zmq.PUB, zmq.SUB):
-            socket.conflate = True
-        if kind == zmq.SUB:
-            socket.subscribe(b"")
-        return socket
+        conflates = self.pattern == "conflate" and kind in (zmq.PUB, zmq.SUB)
+        return plain_socket(context, kind, self.high_water_mark, conflates)
 
 
 class _Sockets(TransportEnd):

@@ -18,7 +18,7 @@ import zmq
 from zmq.utils.monitor import recv_monitor_message
 
 from dva_sim.network.messaging import OnReply
-from dva_sim.network.middleware.zeromq import PlainWire
+from dva_sim.network.middleware.zeromq import PlainWire, plain_socket
 from dva_sim.network.pattern_runs import COMMAND_BYTES, REPLY_BYTES, Condition, operator_of
 from dva_sim.network.realtime import ProgramClock, Socket
 from dva_sim.network.workload import FileNotes, NoteKind, NumberedBytes, RobotWorkload
@@ -163,17 +163,13 @@ class OperatorSockets:
 
 def _open(context: Context, condition: Condition, operator: bool) -> Socket:
     """A socket of one end, set as the condition says."""
-    opened = context.socket(_ENDS[condition.pattern][0 if operator else 1])
-    opened.linger = 0
-    opened.sndhwm = opened.rcvhwm = condition.hwm
-    if condition.conflate in ("both", "op" if operator else "rob"):
-        opened.conflate = 1
+    kind = _ENDS[condition.pattern][0 if operator else 1]
+    conflates = condition.conflate in ("both", "op" if operator else "rob")
+    opened = plain_socket(context, kind, condition.hwm, conflates)
     if operator and condition.sndbuf is not None:
         opened.sndbuf = condition.sndbuf
     if not operator and condition.rcvbuf is not None:
         opened.rcvbuf = condition.rcvbuf
-    if opened.type == zmq.SUB:
-        opened.subscribe(b"")
     return opened
 
 
