@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dva_sim.experiments.report.glossary import GLOSSARY
+from dva_sim.experiments.report.blocks import GLOSSARY
 from generators.markdown import page as page_of
 from generators.markdown import prose, sentence, table
 

@@ -13,10 +13,8 @@ from dva_sim.cli.console import console, print_lines
 from dva_sim.cli.results_json import compared
 from dva_sim.cli.verbosity import print_json
 from dva_sim.experiments.analysis.compare import Comparison
-from dva_sim.experiments.analysis.compare_rows import Difference
-from dva_sim.experiments.analysis.fail_conditions import parse
-from dva_sim.experiments.analysis.gate_verdicts import GateVerdict, judge
-from dva_sim.experiments.analysis.matched_cells import Levels
+from dva_sim.experiments.analysis.fail_conditions import GateVerdict, judge, parse
+from dva_sim.experiments.analysis.matched_results import Difference, Levels
 from dva_sim.experiments.execution.kept_run import complete
 from dva_sim.experiments.report.terminal import print_table, program
 from dva_sim.experiments.results.results import Results

@@ -9,9 +9,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from dva_sim.experiments.analysis.compare import Comparison
-from dva_sim.experiments.analysis.compare_rows import Difference
-from dva_sim.experiments.analysis.gate_verdicts import GateVerdict
-from dva_sim.experiments.analysis.matched_cells import Levels
+from dva_sim.experiments.analysis.fail_conditions import GateVerdict
+from dva_sim.experiments.analysis.matched_results import Difference, Levels
 from dva_sim.experiments.analysis.run_grid import RunGrid
 from dva_sim.experiments.analysis.study_view import interval_of, layout_of
 from dva_sim.experiments.report.summary import Reading

@@ -21,8 +21,7 @@ from dva_sim.experiments.execution.dry_run import DryRun, contradictions_in, dry
 from dva_sim.experiments.execution.scheduling import Simulate, run_job
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.runner import StudyListener, planned_study, run_study
-from dva_sim.experiments.study import coverage
-from dva_sim.experiments.study.answerable import why_unanswered
+from dva_sim.experiments.study.answerable import coverage_remarks, why_unanswered
 from dva_sim.experiments.study.factor_levels import runs_of
 from dva_sim.experiments.study.file_kinds import open_study
 from dva_sim.experiments.study.plan import Progress, StudyPlan
@@ -156,7 +155,7 @@ class _Shown(StudyListener):
         if self.preview.remark:
             say(f"[yellow]{escape(self.preview.remark)}[/yellow]")
         say(escape(_plan(self.preview, folder)))
-        for remark in coverage.remarks(study):
+        for remark in coverage_remarks(study):
             say(escape(capital(remark)))
 
     @override

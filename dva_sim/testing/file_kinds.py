@@ -17,8 +17,8 @@ from dva_sim.agents.operator.published import SplitFile, load_split
 from dva_sim.agents.robot.profile import RobotProfile, read_robot
 from dva_sim.agents.tilt import PhoneProfile, try_phone
 from dva_sim.experiments.execution.dry_run import contradictions_in
-from dva_sim.experiments.study import cell_grid, coverage
-from dva_sim.experiments.study.answerable import why_unanswered
+from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study.answerable import coverage_remarks, why_unanswered
 from dva_sim.experiments.study.file_kinds import EVIDENCE, FileKind
 from dva_sim.experiments.study.file_kinds import KINDS as KINDS_OF_RUNS
 from dva_sim.experiments.study.loading import load_study
@@ -94,7 +94,7 @@ def doubts(kind: FileKind, document: Document) -> list[str]:
 def notes(kind: FileKind, document: Document) -> str:
     """Describe what a valid file holds, or promises less of than it prints, in a line."""
     if kind.model is Study:
-        return "; ".join(coverage.remarks(load_study(document.file)))
+        return "; ".join(coverage_remarks(load_study(document.file)))
     if kind.model in (Scenario, TimedScenario):
         return str(model_of(document).build(document, {}).events_summary)
     return ""

@@ -19,7 +19,7 @@ from dva_sim.cli import names
 from dva_sim.cli.commands import name_of
 from dva_sim.cli.program import app, call
 from dva_sim.console.wire.actions import ACTIONS
-from dva_sim.experiments.report.glossary import GLOSSARY
+from dva_sim.experiments.report.blocks import GLOSSARY
 from dva_sim.experiments.report.kept_answers import HISTORY, all_kept
 from dva_sim.kernel.errors import ExitCode
 from dva_sim.network.patterns import PATTERNS

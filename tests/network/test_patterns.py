@@ -8,8 +8,8 @@ import pytest
 from helpers.paths import ROOT
 
 from dva_sim.cli import names
+from dva_sim.experiments.report.blocks import TERMS
 from dva_sim.experiments.report.figures.palette import look_of
-from dva_sim.experiments.report.glossary import TERMS
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.patterns import PATTERNS, PubSub, load_pattern, meaning_of
 from dva_sim.simulation import scenario as scenarios

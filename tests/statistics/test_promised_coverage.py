@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from helpers.paths import ROOT
 
-from dva_sim.experiments.study.coverage import OF_BANDS, OF_STOPPING
+from dva_sim.experiments.study.answerable import OF_BANDS, OF_STOPPING
 from dva_sim.statistics import LEVEL, band
 
 STUDIES, AT_ONCE, LEVELS = 2000, 250, 6

@@ -185,7 +185,12 @@ def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
         most=view.possible[1] if is_loss else np.inf,
         outside=_outside(view, axes),
         median=np.nanmedian(cells, axis=(3, 4)),
-        beside={column: _mean(view, column, axes) for column in BESIDE},
+        beside={
+            column: nan_mean(
+                nan_mean(_cells(view.part, view.part.grid(column), axes), axis=-1), axis=-1
+            )
+            for column in BESIDE
+        },
         waiting=_waiting(view, axes, declared.get("choosing")),
         notes=dict(declared.get("notes") or {}),
     )
@@ -239,11 +244,6 @@ def _differences(losses: Floats) -> tuple[Floats, Floats, Floats]:
     low[other, one] = -highs
     high[other, one] = -lows
     return mean, low, high
-
-
-def _mean(view: StudyView, column: str, axes: tuple[Factor, ...]) -> Floats:
-    cells = _cells(view.part, view.part.grid(column), axes)
-    return nan_mean(nan_mean(cells, axis=-1), axis=-1)
 
 
 def _waiting(view: StudyView, axes: tuple[Factor, ...], choosing: Any) -> Floats | None:

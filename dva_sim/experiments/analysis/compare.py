@@ -9,14 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.compare_rows import Difference, as_numbers, difference
-from dva_sim.experiments.analysis.fail_conditions import parse
-from dva_sim.experiments.analysis.gate_verdicts import GateVerdict, judge
-from dva_sim.experiments.analysis.matched_results import MatchedResults
+from dva_sim.experiments.analysis.fail_conditions import GateVerdict, judge, parse
+from dva_sim.experiments.analysis.matched_results import (
+    Difference,
+    MatchedResults,
+    as_numbers,
+    difference,
+)
 from dva_sim.experiments.results.results import Frame
 
 
@@ -60,7 +62,8 @@ class Comparison(MatchedResults):
         for group in self.groups(None):
             if self.shared(group):
                 a, b = (self.rows(side, "runs", column, group).by_run() for side in (0, 1))
-                if any(not _alike(a[run], b[run]) for run in a):
+                pairs = [(value, b[run]) for run, value in a.items()]
+                if any(x != y and (x == x or y == y) for x, y in pairs):  # nan is like nan
                     return True
         return False
 
@@ -97,7 +100,3 @@ class Comparison(MatchedResults):
         }
         part = np.array([row.part for row in rows], dtype=object)
         return Frame({"part": part} | levels | {k: np.array(v) for k, v in numbers.items()})
-
-
-def _alike(a: Any, b: Any) -> bool:
-    return bool(a == b or (a != a and b != b))  # nan is like nan

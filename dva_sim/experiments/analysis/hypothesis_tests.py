@@ -111,8 +111,17 @@ def judged(study: Mapping[str, Any], runs: Table) -> Judgement:
     All tests of a family share its chance of a false alarm, comparisons and hypotheses alike;
     what speaks against hypotheses is adjusted among its own.
     """
-    compared = _compare_all(study, runs)
-    tested = _test_all(study, runs)
+    compared = [
+        _compared(study, runs, name, contrast, at)
+        for name, contrast in contrasts_of(study).items()
+        if name != ANSWER
+        for at in places_of(study, contrast)
+    ]
+    named = contrasts_of(study)
+    tested = [
+        _tested(study, runs, name, claim, named[claim.comparison])
+        for name, claim in claims_of(study).items()
+    ]
     claimed = [t.contrast.family for t in tested]
     families = [*(c.contrast.family for c in compared), *claimed]
     values = [*(c.p for c in compared), *(t.p for t in tested)]
@@ -151,24 +160,6 @@ def _with_interval(
     by_verdict = {"held": own, "did not hold": opposite}
     level = 1 - 2 * by_verdict.get(tested.verdict, min(own, opposite))
     return replace(tested, difference=paired_difference(*pairs, level), level=level)
-
-
-def _compare_all(study: Mapping[str, Any], runs: Table) -> list[Compared]:
-    """Every named comparison at every level that it runs over."""
-    return [
-        _compared(study, runs, name, contrast, at)
-        for name, contrast in contrasts_of(study).items()
-        if name != ANSWER
-        for at in places_of(study, contrast)
-    ]
-
-
-def _test_all(study: Mapping[str, Any], runs: Table) -> list[Tested]:
-    named = contrasts_of(study)
-    return [
-        _tested(study, runs, name, claim, named[claim.comparison])
-        for name, claim in claims_of(study).items()
-    ]
 
 
 def verdict_of(tested: Tested) -> Verdict:

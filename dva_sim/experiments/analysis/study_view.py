@@ -85,16 +85,15 @@ class StudyView:
         """
         names = [f.name for f in (self.line, self.over) if f]
         every = list(self.part.settings(but=names))
-        order = sorted(every, key=lambda panel: [self._is_aside(*item) for item in panel.items()])
+        order = sorted(
+            every, key=lambda panel: [self.within.get(*item) != item[1] for item in panel.items()]
+        )
         return [panel for panel in order if self.part.where(self.part.ran, panel).any()] or order
 
     @property
     def shown(self) -> list[Setting]:
         """The panels that a figure has room for."""
         return self.panels[:MOST_PANELS]
-
-    def _is_aside(self, factor: str, level: Level) -> bool:
-        return level != self.within.get(factor, level)
 
     @property
     def widest(self) -> float:
@@ -130,12 +129,9 @@ class StudyView:
         if self.outside is None:
             return []
         some = self.lines if lines is None else lines
-        marks = np.array([self._marks(panel, line) for line in some]).any(axis=0)
-        return [int(stop) for stop in np.flatnonzero(marks)]
-
-    def _marks(self, panel: Setting, line: Level) -> NDArray[np.bool_]:
         outside = np.asarray(self.outside, dtype=float)
-        return np.atleast_1d(self.part.where(outside, self.setting(panel, line)) > 0)
+        marks = [self.part.where(outside, self.setting(panel, line)) > 0 for line in some]
+        return [int(stop) for stop in np.flatnonzero(np.array(marks).any(axis=0))]
 
     def difference(self, panel: Setting, first: Level, second: Level) -> Floats:
         """First minus second, paired by person and trial, as person means `(persons, stops)`.
@@ -203,7 +199,9 @@ def layout_of(
     factors = factors_of(study)
     design = study.get("design") or {}
     if together := design.get("zip"):
-        kept = _spoken_of(study, together)
+        declared = study.get("answer") or {}
+        named = [declared.get("factor"), declared.get("over"), *(declared.get("within") or {})]
+        kept = next((name for name in named if name in together), together[0])
         return runs, [f for f in factors if f.name not in together or f.name == kept]
     if POINT in study.get("factors", {}) and POINT in runs and are_points_trials:
         return _as_trials(runs), [f for f in factors if f.name != POINT]
@@ -219,13 +217,6 @@ def points_of(study: Mapping[str, Any], runs: Table) -> list[str]:
     design = list(runs)[: list(runs).index("is_reference")]
     names = [n for n in design if n not in DESIGN_COLUMNS and n not in study["factors"]]
     return [n for n in names if np.isfinite(as_floats(runs[n])).any()]
-
-
-def _spoken_of(study: Mapping[str, Any], together: Sequence[str]) -> str:
-    """Choose the factor that represents those varied together."""
-    declared = study.get("answer") or {}
-    named = [declared.get("factor"), declared.get("over"), *(declared.get("within") or {})]
-    return next((name for name in named if name in together), together[0])
 
 
 def _as_trials(runs: Table) -> Table:

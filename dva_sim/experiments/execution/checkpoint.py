@@ -277,7 +277,9 @@ def _so_far(folder: Path, checkpoint: Checkpoint) -> Results:
     every = runs_in(manifest)
     done = checkpoint.done()
     failed = checkpoint.failures()
-    whole = _of_whole_persons(every, done | failed.keys())
+    there = set(done | failed.keys())
+    unfinished = {run.person for run in every if run.key not in there}
+    whole = [run for run in every if run.person not in unfinished]
     keys = {run.key for run in every}
     if not any(run.key in done for run in whole):
         raise ConfigError(
@@ -300,13 +302,6 @@ def _aside(
     results = Results(folder, manifest, aside)
     weakref.finalize(results, shutil.rmtree, aside, ignore_errors=True)
     return results
-
-
-def _of_whole_persons(runs: Sequence[StudyRun], ended: Iterable[RunKey]) -> list[StudyRun]:
-    """The runs of the persons of whom no run is left to make."""
-    there = set(ended)
-    unfinished = {run.person for run in runs if run.key not in there}
-    return [run for run in runs if run.person not in unfinished]
 
 
 def _tables_aside(runs: Sequence[StudyRun], tables_of: TablesOf) -> Path:

@@ -25,8 +25,7 @@ from typing import Any, ParamSpec, TypeVar
 
 from typing_extensions import override
 
-from dva_sim.experiments.execution.executors import Workers, WorkersLost
-from dva_sim.experiments.execution.worker_process import WorkerDied, WorkerProcess
+from dva_sim.experiments.execution.executors import WorkerDied, WorkerProcess, Workers, WorkersLost
 from dva_sim.experiments.results.manifest import versions
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 
@@ -99,8 +98,10 @@ class DaskCluster(Workers):
         except Exception as error:
             if isinstance(error, CancelledError) or not self._is_connected():
                 raise WorkersLost(f"the scheduler at {self.address} is gone") from None
+            cause = error.__cause__ or error
+            text = f"{type(cause).__name__}: {' '.join(str(cause).split())}"
             raise DvaSimError(
-                f"the cluster at {self.address} cannot run this program: {_line(error)}; its "
+                f"the cluster at {self.address} cannot run this program: {text}; its "
                 "scheduler and workers need the same dva-sim as here"
             ) from error
         finally:
@@ -218,8 +219,3 @@ def differences(wanted: Versions, found: Versions) -> str:
     names = [name for name in {**wanted, **found} if name not in _STATE]
     odd = [name for name in names if wanted.get(name) != found.get(name)]
     return ", ".join(f"{name} {found.get(name)} (here {wanted.get(name)})" for name in odd)
-
-
-def _line(error: Exception) -> str:
-    cause = error.__cause__ or error
-    return f"{type(cause).__name__}: {' '.join(str(cause).split())}"

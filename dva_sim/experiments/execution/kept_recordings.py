@@ -43,7 +43,7 @@ def record_study(
     out: Path,
     *,
     jobs: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = lambda *_: None,
     limit_s: float = scheduling.LIMIT_S,
 ) -> list[str]:
     """Make the recordings that a study asks for and its results folder does not hold yet.
@@ -69,36 +69,32 @@ def record_study(
     if plan.study.record is None:
         return []
     with FolderLock(out):
-        return _record(plan, out, jobs, progress or (lambda *_: None), limit_s)
-
-
-def _record(
-    plan: StudyPlan, out: Path, jobs: int | None, tell: Progress, limit_s: float
-) -> list[str]:
-    rows = rows_of(Results.load(out))
-    wanted = {name_of(job): job for job in chosen(plan, rows)}
-    folder = _tidied(out / FOLDER, wanted)
-    rest = [job for name, job in wanted.items() if not (folder / name).exists()]
-    own = {measure.about.name for measure in plan.measures.values()}
-    prints = {name_of(job): _fingerprint(job, rows[job.address], own) for job in rest}
-    done = len(wanted) - len(rest)
-    total = len(wanted)
-    tell(done, total)
-    problems = []
-    try:
-        with (
-            executors.local(jobs) as workers,
-            closing(scheduling.run_all(rest, Rerun(folder, prints), workers, limit_s)) as batches,
-        ):
-            for outcome in (outcome for batch in batches for outcome in batch):
-                done += outcome.error is None
-                problems += [] if outcome.error is None else [outcome.error]
-                tell(done, total)
-                if (outcome.error or "").endswith(_FULL):
-                    return [f"{outcome.error}; {done} of {total} are made: free space, then again"]
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"{done} of {total} recordings are made") from None
-    return sorted(problems)
+        rows = rows_of(Results.load(out))
+        wanted = {name_of(job): job for job in chosen(plan, rows)}
+        folder = _tidied(out / FOLDER, wanted)
+        rest = [job for name, job in wanted.items() if not (folder / name).exists()]
+        own = {measure.about.name for measure in plan.measures.values()}
+        prints = {name_of(job): _fingerprint(job, rows[job.address], own) for job in rest}
+        done = len(wanted) - len(rest)
+        total = len(wanted)
+        progress(done, total)
+        problems = []
+        rerun = Rerun(folder, prints)
+        try:
+            with (
+                executors.local(jobs) as workers,
+                closing(scheduling.run_all(rest, rerun, workers, limit_s)) as batches,
+            ):
+                for outcome in (outcome for batch in batches for outcome in batch):
+                    done += outcome.error is None
+                    problems += [] if outcome.error is None else [outcome.error]
+                    progress(done, total)
+                    if (outcome.error or "").endswith(_FULL):
+                        made = f"{done} of {total} are made: free space, then again"
+                        return [f"{outcome.error}; {made}"]
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(f"{done} of {total} recordings are made") from None
+        return sorted(problems)
 
 
 def chosen(plan: StudyPlan, rows: Mapping[Address, Row]) -> list[StudyJob]:
@@ -193,7 +189,19 @@ class Rerun:
         tables = tables_of(run)
         if _print_of(tables["runs"][0]) != self.prints[name]:
             raise DvaSimError(f"{name}: the run is not what the study has: another version made it")
-        write_recording(run, self.folder / name, tables=tables, about=_about(job))
+        write_recording(
+            run,
+            self.folder / name,
+            tables=tables,
+            about={
+                "part": job.part,
+                "cell": str(job.index),
+                "person": str(job.person),
+                "trial": str(job.trial),
+                "config": job.config,
+                **{f"factor {name}": str(level) for name, level in job.cell},
+            },
+        )
         return {}
 
 
@@ -207,15 +215,3 @@ def _print_of(row: Row) -> str:
     """Hash a row, the same for the row of a run and for that of a table."""
     there = {name: v for name, v in row.items() if v is not None and v == v}
     return stable_hash({n: v if isinstance(v, str) else float(v) for n, v in there.items()})
-
-
-def _about(job: StudyJob) -> dict[str, str]:
-    """Labels that identify a run within its study."""
-    return {
-        "part": job.part,
-        "cell": str(job.index),
-        "person": str(job.person),
-        "trial": str(job.trial),
-        "config": job.config,
-        **{f"factor {name}": str(level) for name, level in job.cell},
-    }

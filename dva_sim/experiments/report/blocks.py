@@ -1,12 +1,16 @@
-"""Building blocks of a report, in order, set by both the page and the printed document."""
+"""Blocks that a page consists of, and the glossary of their words."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from dva_sim.experiments.report.cell_table import CellTable
+from dva_sim.kernel.yaml_files import load_yaml
+from dva_sim.network.patterns import PATTERNS, meaning_of
 
 if TYPE_CHECKING:
     from dva_sim.experiments.report.figures.style import Drawn
@@ -127,3 +131,52 @@ def texts_of(blocks: Iterable[Block]) -> Iterator[str]:
                 yield drawn.caption
             case Folded(blocks=inner):
                 yield from texts_of(inner)
+
+
+@dataclass(frozen=True)
+class Term:
+    """A word or phrase.
+
+    Attributes:
+        name: Term as the list has it.
+        means: In one sentence, without its full stop.
+        regex: Pattern of how it is said in a text, if otherwise than its name.
+        in_reports: False for words that only the documentation explains.
+    """
+
+    name: str
+    means: str
+    regex: str = ""
+    in_reports: bool = True
+
+    @property
+    def pattern(self) -> str:
+        """Regular expression that matches the term."""
+        return self.regex or rf"\b{re.escape(self.name)}\b"
+
+
+def _all() -> Iterator[Term]:
+    """Patterns by either of their names, and what stands in `words.yaml`."""
+    for kind in PATTERNS.values():
+        yield Term(
+            kind.title, meaning_of(kind), f"\\b(?:{re.escape(kind.title)}|{re.escape(kind.label)})"
+        )
+    words = load_yaml(Path(__file__).with_name("words.yaml")).data
+    for name, entry in words["reports"].items():
+        yield Term(name, **entry) if isinstance(entry, dict) else Term(name, entry)
+    for name, means in words["documentation"].items():
+        yield Term(name, means, in_reports=False)
+
+
+GLOSSARY = tuple(_all())
+TERMS = tuple(term for term in GLOSSARY if term.in_reports)
+
+
+def terms_in(texts: Iterable[str]) -> list[Term]:
+    """Return the terms that occur anywhere, in the order of their names."""
+    text = "\n".join(texts)
+    return [
+        term
+        for term in sorted(TERMS, key=lambda term: term.name.lower())
+        if re.search(term.pattern, text)
+    ]

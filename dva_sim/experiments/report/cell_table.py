@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from dva_sim.experiments.analysis.robustness import Support
 from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, plain_level, present
-from dva_sim.experiments.analysis.support import Support
-from dva_sim.experiments.report.prose import note
+from dva_sim.experiments.report.prose import note, sentence
+from dva_sim.experiments.study.tuning import TunedValues, TuningBasis
+from dva_sim.kernel.config import validate
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import number, percent
-from dva_sim.simulation.labels import factor_name, level_name, measure_name, with_unit
+from dva_sim.simulation.labels import factor_name, level_name, measure_name, setting, with_unit
 from dva_sim.statistics import mean_interval
 
 
@@ -87,7 +89,12 @@ def cell_table(
         *_endings(part),
         *_measure(part, measure, possible),
     ]
-    columns += [*_others(part, [s for s in summaries if s[0] != measure]), _beyond(support)]
+    columns += [
+        (head, [_text(summary, cell, text) for cell in _cells(part, column)])
+        for column, head, summary, text in summaries
+        if column != measure and part.has(column)
+    ]
+    columns.append(_beyond(support))
     there = [c for c in columns if c is not None]
     names = [factor_name(f.name) for f in part.factors]
     rows = [
@@ -103,7 +110,10 @@ def cell_table(
     empty = 0 if is_listed else ran.count(False)
     heads = [*names, *(head for head, _ in there)]
     whole = CellTable(part.name, heads, len(names) + len(points), rows, empty)
-    return replace(_without_constants(whole), note=_note(whole, _what_is_covered(support)))
+    same = [f"{whole.heads[n]} {whole.rows[0][n]}" for n in _constant(whole)]
+    notes = f"The same in all configurations: {', '.join(same)}." if same else ""
+    notes = " ".join(filter(None, (notes, _what_is_covered(support))))
+    return replace(_without_constants(whole), note=notes)
 
 
 def _constant(table: CellTable) -> list[int]:
@@ -120,13 +130,6 @@ def _without_constants(table: CellTable) -> CellTable:
     heads = [table.heads[n] for n in kept]
     rows = [[row[n] for n in kept] for row in table.rows]
     return replace(table, heads=heads, rows=rows)
-
-
-def _note(table: CellTable, covered: str) -> str:
-    """Note below the table: values common to all rows, and which rows are extrapolated."""
-    same = [f"{table.heads[n]} {table.rows[0][n]}" for n in _constant(table)]
-    text = f"The same in all configurations: {', '.join(same)}." if same else ""
-    return " ".join(filter(None, (text, covered)))
 
 
 _Column = tuple[str, list[str]]
@@ -203,14 +206,6 @@ def _measure(part: RunGrid, measure: str, possible: tuple[float, float]) -> list
     return [(f"{name}, median{unit}", medians), (f"its mean (95 % interval){unit}", means)]
 
 
-def _others(part: RunGrid, summaries: Sequence[Summary]) -> list[_Column]:
-    return [
-        (head, [_text(summary, cell, text) for cell in _cells(part, column)])
-        for column, head, summary, text in summaries
-        if part.has(column)
-    ]
-
-
 def _beyond(support: Support | None) -> _Column | None:
     """The delay that people would have been watched at, marked where nobody was."""
     if support is None:
@@ -230,3 +225,38 @@ def _what_is_covered(support: Support | None) -> str:
 def _text(summary: _Summarise, cell: Floats, text: Callable[[float], str]) -> str:
     """The runs of a cell as one printed number; a dash where there are none."""
     return text(float(summary(cell))) if len(cell) else "–"
+
+
+def tuned_table(manifest: Mapping[str, Any]) -> CellTable | None:
+    """All that a tuning saw, as a report prints it; None where nothing was tuned."""
+    if not manifest.get("tuned"):
+        return None
+    tuned = validate(TunedValues, manifest["tuned"])
+    rule = tuned.tuning
+    chosen = {(str(c.when), c.value) for c in tuned.chosen}
+    rows = [
+        [
+            *(level_name(name, level) for name, level in seen.when.items()),
+            f"{seen.value:g}",
+            f"{number(seen.mean)} ({number(seen.low)} to {number(seen.high)})",
+            "chosen" if (str(seen.when), seen.value) in chosen else "",
+        ]
+        for seen in tuned.seen
+    ]
+    heads = [*(factor_name(name) for name in rule.by), factor_name(rule.key)]
+    heads += [f"{measure_name(rule.measure)}, mean (95 % interval)", ""]
+    is_other = str(manifest["versions"].get("fingerprint")) not in tuned.made_with
+    text = note("tuning", rule=rule, at=setting(rule.at), is_other_version=is_other)
+    return CellTable(rule.part, heads, len(rule.by), rows, note=text)
+
+
+def tuning_warning(manifest: Mapping[str, Any]) -> str:
+    """Warn that values were tuned with other persons or phones than the study's."""
+    if not manifest.get("tuned"):
+        return ""
+    tuned = validate(TunedValues, manifest["tuned"])
+    others = tuned.basis.unlike(validate(TuningBasis, manifest["basis"]))
+    if not others:
+        return ""
+    factor = factor_name(tuned.tuning.key)
+    return sentence("tuned_otherwise", factor=factor, others=others, study=tuned.study)

@@ -84,7 +84,11 @@ def beside_table(found: ChoiceMap, part: str) -> CellTable:
         cells = [found.beside["contacts"][g, c], stops]
         waits = [] if found.waiting is None else [regret_number(100.0 * float(found.waiting[g, c]))]
         choice = level_name(found.choice.name, found.choice.levels[c], short=True)
-        losses = _range(found.median[g, c]), _behind(found, g, c)
+        is_lost = found.never[g, c].any() and not found.is_lost[g]
+        losses = (
+            _range(found.median[g, c]),
+            regret_number(math.inf if is_lost else max(0.0, float(found.high[g, c].max()))),
+        )
         rows.append([situation_name(found, g), choice, *losses, *map(_range, cells), *waits])
     return CellTable(part, heads, 2, rows, note=note("beside", **facts_of(found)))
 
@@ -102,12 +106,6 @@ def facts_of(found: ChoiceMap) -> dict[str, Any]:
         "cut_off": quantity(found.most, found.unit) if found.never.any() else "",
         "never": NEVER,
     }
-
-
-def _behind(found: ChoiceMap, g: int, c: int) -> str:
-    """Greatest upper end of the bands of the regret."""
-    is_lost = found.never[g, c].any() and not found.is_lost[g]
-    return regret_number(math.inf if is_lost else max(0.0, float(found.high[g, c].max())))
 
 
 def _range(values: Floats) -> str:

@@ -127,7 +127,7 @@ def comparison_table(found: Judgement, cluster: str = "person") -> CellTable:
         [
             f"{c.name}: {_sides(c)}",
             measure_of(c.contrast.measure, c.contrast.part),
-            (setting(c.at) or "on average"),
+            setting(c.at) or "on average",
             _interval(c.difference, c.contrast.measure),
             _bare(c.size.average) if c.size else "–",
             number(c.correlation),
@@ -200,10 +200,6 @@ def _interval(found: Interval | None, measure: str) -> str:
         return "not run"
     unit = unit_of(measure)
     return f"{quantity(found.mean, unit)} ({number(found.low)} to {quantity(found.high, unit)})"
-
-
-def _bare(found: Interval) -> str:
-    return f"{number(found.mean)} ({number(found.low)} to {number(found.high)})"
 
 
 def _p(value: float) -> str:
@@ -294,3 +290,7 @@ def _earlier(hashes: Sequence[str]) -> tuple[str, str]:
     if not hashes:
         return "none told", ""
     return f"{len(hashes)}: {', '.join(h[:_DIGITS] for h in hashes)}", ""
+
+
+def _bare(found: Interval) -> str:
+    return f"{number(found.mean)} ({number(found.low)} to {number(found.high)})"

@@ -265,15 +265,15 @@ def _append(answer: KeptAnswer, file: Path) -> None:
     before = file.read_text(encoding="utf-8") if file.exists() else ",".join(_COLUMNS) + "\n"
     text = io.StringIO()
     writer = csv.DictWriter(text, _COLUMNS, lineterminator="\n", extrasaction="ignore")
-    writer.writerows(asdict(answer) | _rounded(row) for row in answer.rows)
+    writer.writerows(
+        asdict(answer)
+        | {
+            key: f"{value:.4g}" if isinstance(value, float) else value
+            for key, value in asdict(row).items()
+        }
+        for row in answer.rows
+    )
     write_whole(file, before + text.getvalue())
-
-
-def _rounded(row: AnswerRow) -> dict[str, Any]:
-    return {
-        key: f"{value:.4g}" if isinstance(value, float) else value
-        for key, value in asdict(row).items()
-    }
 
 
 def read(file: Path) -> KeptAnswer:

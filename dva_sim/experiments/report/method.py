@@ -11,7 +11,11 @@ import numpy as np
 from dva_sim.experiments.analysis.conditions import waits
 from dva_sim.experiments.report.prose import paragraphs, sentence
 from dva_sim.experiments.report.summary import Reading
-from dva_sim.experiments.study import coverage
+from dva_sim.experiments.study.answerable import (
+    OF_STOPPING,
+    coverage_in_words,
+    of_few_persons,
+)
 from dva_sim.experiments.study.parts import POINT, multiplied
 from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT
 from dva_sim.simulation.labels import level_name, measure_called, measure_name
@@ -27,7 +31,19 @@ def remarks(reading: Reading) -> list[str]:
     study = {"hypotheses": None, "comparisons": None} | reading.study
     tests = paragraphs("tests", study=study)
     size = [] if reading.by_people else [_size(reading)]
-    return [*size, *lines, *tests, _made_by(reading)]
+    versions = reading.manifest.get("versions") or {}
+    return [
+        *size,
+        *lines,
+        *tests,
+        sentence(
+            "made_by",
+            version=versions.get("dva-sim", "of unknown version"),
+            fingerprint=versions.get("fingerprint"),
+            commit=versions.get("commit"),
+            dirty=versions.get("dirty"),
+        ),
+    ]
 
 
 def _size(reading: Reading) -> str:
@@ -44,10 +60,10 @@ def _size(reading: Reading) -> str:
         of=stopped.get("of"),
         is_doubled=stop.get("batch_persons") == "double",
         level="" if reading.view is None else f"{100 * reading.view.level:.3g}",
-        coverage=coverage.in_words(coverage.OF_STOPPING),
+        coverage=coverage_in_words(OF_STOPPING),
         trials="" if reading.cluster in ("shift", "repeat") else _trials(reading),
         is_task=_is_task(reading),
-        few=coverage.of_few_persons(reading.persons),
+        few=of_few_persons(reading.persons),
     )
 
 
@@ -63,18 +79,6 @@ def _trials(reading: Reading) -> str:
 
 def _is_task(reading: Reading) -> bool:
     return any(s.get("model") == "task" for s in reading.scenarios.values())
-
-
-def _made_by(reading: Reading) -> str:
-    """The program, and whether it can be had again."""
-    versions = reading.manifest.get("versions") or {}
-    return sentence(
-        "made_by",
-        version=versions.get("dva-sim", "of unknown version"),
-        fingerprint=versions.get("fingerprint"),
-        commit=versions.get("commit"),
-        dirty=versions.get("dirty"),
-    )
 
 
 def _usual(reading: Reading) -> list[str]:

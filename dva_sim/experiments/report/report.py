@@ -32,13 +32,13 @@ from dva_sim.experiments.report.blocks import (
     Terms,
     Verbatim,
     Words,
+    terms_in,
     texts_of,
 )
-from dva_sim.experiments.report.cell_table import CellTable
+from dva_sim.experiments.report.cell_table import CellTable, tuned_table
 from dva_sim.experiments.report.choice_table import beside_table, choice_table
 from dva_sim.experiments.report.figures.registry import draw_all
 from dva_sim.experiments.report.figures.style import Drawn
-from dva_sim.experiments.report.glossary import terms_in
 from dva_sim.experiments.report.hypothesis_tables import (
     comparison_table,
     hypothesis_table,
@@ -52,7 +52,6 @@ from dva_sim.experiments.report.printing import print_page
 from dva_sim.experiments.report.prose import note
 from dva_sim.experiments.report.study_size import not_reached, plan_table, size_of
 from dva_sim.experiments.report.summary import Reading
-from dva_sim.experiments.report.tuning_table import tuned_table
 from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.study.parts import POINT
 from dva_sim.experiments.study.study import Status
@@ -80,10 +79,11 @@ def blocks_of(reading: Reading, drawn: Sequence[Drawn]) -> list[Block]:
         reading: The results.
         drawn: The figures; the first is the one that answers.
     """
+    found = reading.answer
     blocks = list(
         chain(
             _status(reading),
-            [_first(reading, drawn)],
+            [First(found.lead, drawn[0] if drawn else None, tuple(found.depends.items()))],
             _events(reading),
             _claims(reading),
             _comparisons(reading),
@@ -111,12 +111,6 @@ def _status(reading: Reading) -> Iterator[Block]:
         yield Words(f"Why: {'; '.join(status.why)}.", "note")
     for warning in reading.warnings:
         yield Words(warning, "warning")
-
-
-def _first(reading: Reading, drawn: Sequence[Drawn]) -> First:
-    """The answer, the figure that answers it, and what it depends on."""
-    found = reading.answer
-    return First(found.lead, drawn[0] if drawn else None, tuple(found.depends.items()))
 
 
 def _events(reading: Reading) -> Iterator[Block]:
@@ -303,7 +297,9 @@ def _method(reading: Reading) -> Iterator[Block]:
     scenarios = reading.scenarios
     study = reading.study
     of_model = reading.page.conditions if reading.view else conditions
-    if stated := of_model(scenarios, keys_of(study), _changed(study)):
+    parts = study.get("parts", {}).values()
+    changed = dict.fromkeys(key for part in parts for key in part.get("changes") or {})
+    if stated := of_model(scenarios, keys_of(study), list(changed)):
         rows = [[name, *values] for name, values in stated]
         settings = Printed(CellTable("", ["setting", *scenarios], 1, rows))
         remark = timeout_remark(scenarios, study)
@@ -333,12 +329,6 @@ def _in_full(name: str, level: Any) -> str:
     """A level with the file it is from, if it is a class in one."""
     file = f" ({level.rpartition(':')[0]})" if is_in_file(level) else ""
     return level_name(name, level) + file
-
-
-def _changed(study: Mapping[str, Any]) -> list[str]:
-    """Scenario keys that the study's parts set themselves."""
-    parts = study.get("parts", {}).values()
-    return list(dict.fromkeys(key for part in parts for key in part.get("changes") or {}))
 
 
 PAGE = "report.html"

@@ -13,7 +13,7 @@ from dva_sim import statistics
 from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.choice_map import ChoiceMap, choice_map
 from dva_sim.experiments.analysis.competing_risks import Endings, horizon_of, with_endings
-from dva_sim.experiments.analysis.robustness import RepeatedAnswer, robustness_of
+from dva_sim.experiments.analysis.robustness import RepeatedAnswer, robustness_of, support_of_part
 from dva_sim.experiments.analysis.run_grid import (
     Floats,
     Table,
@@ -27,7 +27,6 @@ from dva_sim.experiments.analysis.study_view import (
     view_of,
     with_rows,
 )
-from dva_sim.experiments.analysis.support import support_of_part
 from dva_sim.experiments.report.model_page import (
     MiddlewarePage,
     ModelPage,

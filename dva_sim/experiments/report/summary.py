@@ -14,7 +14,7 @@ from dva_sim import statistics
 from dva_sim.experiments.analysis.answer import Answer, Finding, OtherRuns
 from dva_sim.experiments.analysis.conditions import get
 from dva_sim.experiments.analysis.hypothesis_tests import Judgement, Tested, judged
-from dva_sim.experiments.analysis.robustness import RepeatedAnswer
+from dva_sim.experiments.analysis.robustness import support_of_part
 from dva_sim.experiments.analysis.run_grid import (
     Floats,
     RunGrid,
@@ -30,15 +30,13 @@ from dva_sim.experiments.analysis.study_view import (
     layout_of,
     possible_values,
 )
-from dva_sim.experiments.analysis.support import support_of_part
 from dva_sim.experiments.report.answer_conditions import depends
 from dva_sim.experiments.report.answer_sentences import telling_stop
-from dva_sim.experiments.report.cell_table import CellTable, cell_table
+from dva_sim.experiments.report.cell_table import CellTable, cell_table, tuning_warning
 from dva_sim.experiments.report.choice_table import lead_of
 from dva_sim.experiments.report.hypothesis_tables import verdict_lead
 from dva_sim.experiments.report.prose import sentence
 from dva_sim.experiments.report.results_reading import ResultsReading
-from dva_sim.experiments.report.tuning_table import tuning_warning
 from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.study.parts import STRATEGY, Level
 from dva_sim.kernel.wording import listing, quantity
@@ -245,10 +243,14 @@ def in_context(reading: ResultsReading) -> Finding | None:
     finding = reading.finding
     if view is None or finding is None or (stop := telling_stop(finding)) is None:
         return finding
+    stops = reading.robustness.stops if reading.robustness is not None else ()
+    others = [r for s in stops if s.level == finding.levels[stop] for r in s.others]
+    bands = [view.band_of(p, finding.first, finding.second) for p in view.panels[1:]]
+    found = [(float(b.mean[stop]), float(b.low[stop]), float(b.high[stop])) for b in bands]
     return replace(
         finding,
-        models=_models(reading.robustness, finding, stop),
-        elsewhere=_elsewhere(view, finding, stop),
+        models=_together(finding.mean[stop], [(r.mean, r.low, r.high) for r in others]),
+        elsewhere=_together(finding.mean[stop], [each for each in found if np.isfinite(each[0])]),
         only_model=only_model(reading, finding.part),
         useful=useful_counts(view),
     )
@@ -262,20 +264,6 @@ def only_model(reading: ResultsReading, part: str) -> str:
     if STRATEGY in {key.name for key in keys_of(reading.study)}:
         return ""
     return f"strategy {level_name(STRATEGY, strategy)}"
-
-
-def _models(found: RepeatedAnswer | None, finding: Finding, at: int) -> OtherRuns | None:
-    """The difference under other models of the persons, if it was repeated at this stop."""
-    stops = found.stops if found is not None else ()
-    others = [r for s in stops if s.level == finding.levels[at] for r in s.others]
-    return _together(finding.mean[at], [(r.mean, r.low, r.high) for r in others])
-
-
-def _elsewhere(view: StudyView, finding: Finding, at: int) -> OtherRuns | None:
-    """The difference in the other settings that were run."""
-    bands = [view.band_of(p, finding.first, finding.second) for p in view.panels[1:]]
-    found = [(float(b.mean[at]), float(b.low[at]), float(b.high[at])) for b in bands]
-    return _together(finding.mean[at], [each for each in found if np.isfinite(each[0])])
 
 
 def _together(own: float, found: list[tuple[float, float, float]]) -> OtherRuns | None:

@@ -126,7 +126,10 @@ def print_table(
         console: Output; a file that is not a terminal has room for all columns.
         labels: Number of leading columns that name a row.
     """
-    widths = [_width(head, [row[n] for row in rows]) for n, head in enumerate(heads)]
+    widths = [
+        max(map(len, [*head.split(), *(row[n] for row in rows)]), default=0) + _GAP
+        for n, head in enumerate(heads)
+    ]
     if not console.is_terminal:
         console = Console(file=console.file, width=sum(widths), highlight=False)
     fits = max(
@@ -134,7 +137,9 @@ def print_table(
     )
     table = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
     for index, head in enumerate(heads[:fits]):
-        numbers = all(_is_number(row[index]) for row in rows)
+        numbers = all(
+            not row[index] or re.match(r"[-+\u2212\u2013]?(\d|$)", row[index]) for row in rows
+        )
         width = widths[index] - _GAP
         is_right = numbers and index >= labels
         table.add_column(escape(head), justify="right" if is_right else "left", width=width)
@@ -143,14 +148,6 @@ def print_table(
     console.print(table)
     if fits < len(heads):
         console.print(escape(f"also: {', '.join(heads[fits:])}"), style="dim", soft_wrap=True)
-
-
-def _width(head: str, values: Sequence[str]) -> int:
-    return max(map(len, [*head.split(), *values]), default=0) + _GAP
-
-
-def _is_number(text: str) -> bool:
-    return not text or re.match(r"[-+\u2212\u2013]?(\d|$)", text) is not None
 
 
 def _facts(reading: Reading) -> Iterator[str]:

@@ -23,7 +23,7 @@ from dva_sim.experiments.study.hashing import (
     program_state,
     stable_hash,
 )
-from dva_sim.experiments.study.own_measures import own_columns
+from dva_sim.experiments.study.inputs import own_columns
 from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.experiments.study.study import Status
 from dva_sim.kernel.errors import DvaSimError, RunTooLong

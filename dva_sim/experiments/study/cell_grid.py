@@ -245,7 +245,10 @@ def jobs(study: Study, grid: Sequence[DesignCell] | None = None) -> list[StudyJo
     every = cells(study) if grid is None else grid
     names = dict.fromkeys(cell.part for cell in every)
     of_part = {name: [cell for cell in every if cell.part == name] for name in names}
-    teams = {name: _team(part_cells) for name, part_cells in of_part.items()}
+    teams = {
+        name: max(1, *(model_for(cell.scenario).team(cell.scenario) for cell in part_cells))
+        for name, part_cells in of_part.items()
+    }
     return [
         job
         for name, part_cells in of_part.items()
@@ -400,11 +403,6 @@ def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
         scenarios.locate_files(named, [folder])
         found[key] = named[part][inner] if inner else named[part]
     return found
-
-
-def _team(part_cells: Sequence[DesignCell]) -> int:
-    """Return the number of persons in a cluster of a part, in whichever of its cells it is most."""
-    return max(1, *(model_for(cell.scenario).team(cell.scenario) for cell in part_cells))
 
 
 def _jobs_of(

@@ -1,20 +1,52 @@
-"""The files that a study names: each is read when it is first needed, and once."""
+"""The files that a study names, and its own measures: each is read when needed, and once."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from dva_sim.experiments.study.factor_levels import Traits, parameter_sets
-from dva_sim.experiments.study.own_measures import own_measures
-from dva_sim.experiments.study.parts import TUNED, TUNING
+from dva_sim.experiments.study.parts import DESIGN, TUNED, TUNING
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import TunedValues, load_tuned
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import Document
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.run_measures import RunMeasure, reads
+from dva_sim.simulation.models import measured_names
+from dva_sim.simulation.run_measures import PLUGINS, RunMeasure, load_measure, reads, refuse_twins
+
+
+def own_measures(study: Study) -> dict[str, RunMeasure]:
+    """The measures that a study brings itself, by names that hold in any process.
+
+    Raises:
+        ConfigError: one cannot be had, or has the name of another column.
+    """
+    found: dict[str, RunMeasure] = {}
+    for number, name in enumerate(study.measures):
+        try:
+            located = PLUGINS.located(name, study.folder)
+            found[located] = load_measure(located)
+            refuse_twins(found.values(), {*DESIGN, *study.factors, *measured_names()})
+        except ConfigError as error:
+            if error.file is not None:
+                raise
+            raise study.error(error.problem, ("measures", number)) from None
+    return found
+
+
+def own_columns(measures: Iterable[RunMeasure]) -> dict[str, Any]:
+    """Describe user-defined columns, by table and name; kept with the results.
+
+    They are read without the files that the columns come from.
+
+    Args:
+        measures: Measures that the study itself defines.
+    """
+    own = {measure.about.name: measure.about.as_json() for measure in measures}
+    return {"runs": own} if own else {}
 
 
 @dataclass(frozen=True, eq=False)

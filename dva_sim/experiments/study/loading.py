@@ -241,19 +241,17 @@ def _in_version(document: Document, version: Version | None) -> tuple[Study, Cha
     """The study as its file says, or one of its versions; all of them are judged."""
     written = Changed(document.data, {}, ())
     study = _built(written, document)
-    study._usual = _size_of(study)
+    factors = {name: list(levels) for name, levels in study.factors.items()}
+    size = {"persons": study.persons, "replications": study.replications, "factors": factors}
+    study._usual = {"name": study.file.stem} | size
     made = {name: _version_of(study, written, document, name) for name in study.versions}
     if version is None:
         return study, written
     if version not in made:
-        names = either(_studies_with(version))
+        files = resources.available(FOLDER).items()
+        names = either([name for name, file in files if f"\n{version}:" in read_text(file)])
         raise document.error(f"has no {SIZES[version]} version: no key {version!r}; {names} have")
     return made[version]
-
-
-def _studies_with(version: Version) -> list[str]:
-    files = resources.available(FOLDER).items()
-    return [name for name, file in files if f"\n{version}:" in read_text(file)]
 
 
 def _version_of(
@@ -268,32 +266,20 @@ def _version_of(
         made._usual = study.usual
         return made, data
     except ConfigError as error:
-        raise _located(study, version, error) from None
+        named = [
+            key
+            for key in getattr(study, version)
+            if key.rpartition(".")[2] in error.problem
+            or any(repr(step) in error.problem for step in key.split("."))
+        ]
+        problem = f"in the {SIZES[version]} version: {error.problem}"
+        raise study.error(problem, (version, *named[:1])) from None
 
 
 def _is_answered(study: Study, data: Changed) -> bool:
     """Return True if the study has the very contrast that its keys declare."""
     declared = (data.data.get("answer") or {}).get("contrast", ())
     return study.answer is not None and study.answer.contrast == tuple(declared)
-
-
-def _size_of(study: Study) -> dict[str, Any]:
-    """Size of the study, by which a report tells its versions apart."""
-    factors = {name: list(levels) for name, levels in study.factors.items()}
-    size = {"persons": study.persons, "replications": study.replications, "factors": factors}
-    return {"name": study.file.stem} | size
-
-
-def _located(study: Study, version: Version, error: ConfigError) -> ConfigError:
-    """A mistake of a version, at the key that it names."""
-    named = [
-        key
-        for key in getattr(study, version)
-        if key.rpartition(".")[2] in error.problem
-        or any(repr(step) in error.problem for step in key.split("."))
-    ]
-    problem = f"in the {SIZES[version]} version: {error.problem}"
-    return study.error(problem, (version, *named[:1]))
 
 
 def _with_settings(data: Changed, document: Document, settings: tuple[str, ...]) -> Study:

@@ -76,7 +76,10 @@ def screening_study(study: Study) -> Study:
     rule, answer = rule_of(study)
     numbers = screened(study)
     rows: list[dict[str, Level]] = [
-        {each.key: _within(each, float(place)) for each, place in zip(numbers, point, strict=True)}
+        {
+            each.key: value_at(_range_of(each), float(np.clip(float(place), 0.0, 1.0)))
+            for each, place in zip(numbers, point, strict=True)
+        }
         for point in walks_of(study).reshape(-1, len(numbers))
     ]
     factors: dict[str, Levels] = {POINT: tuple(range(len(rows)))}
@@ -138,7 +141,3 @@ def _range_of(number: Assumption) -> ValueRange:
     if number.is_whole:
         return ValueRange(low=low, high=high, scale="whole")
     return ValueRange(low=low, high=high, scale="log" if 0 < low * _WIDE < high else "linear")
-
-
-def _within(number: Assumption, share: float) -> float | int:
-    return value_at(_range_of(number), float(np.clip(share, 0.0, 1.0)))

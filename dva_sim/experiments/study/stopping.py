@@ -87,7 +87,9 @@ def _of_contrast(study: Study, asked: Contrast, rows: Iterable[Row], level: floa
     """
     wanted = study.covariates if asked is study.answer else ()
     sides: tuple[dict[Any, Row], dict[Any, Row]] = ({}, {})
-    fixed = _place(study, asked)
+    names = {asked.factor, asked.over, *factors_in_rows(study)}
+    free = {f: levels[0] for f, levels in study.factors.items() if f not in names}
+    fixed = free | dict(asked.within)
     ranges = study.design.ranges if study.design is not None else ()
     keys = [name for name in (*study.factors, *ranges) if name != asked.factor]
     for row in rows:
@@ -134,13 +136,6 @@ def _means(found: Mapping[Any, float], at: int | None) -> Floats:
         there = [value for value in values if np.isfinite(value)]
         means[persons[who], levels[level]] = np.mean(there) if there else np.nan
     return means
-
-
-def _place(study: Study, asked: Contrast) -> dict[str, Level]:
-    """The panel that the contrast speaks of: the levels it is within, else the first."""
-    names = {asked.factor, asked.over, *factors_in_rows(study)}
-    free = {f: levels[0] for f, levels in study.factors.items() if f not in names}
-    return free | dict(asked.within)
 
 
 def _number(value: Any) -> float:

@@ -3,9 +3,9 @@ import pytest
 from helpers.wording import unnamed
 
 from dva_sim.agents.operator.published import ranges
+from dva_sim.experiments.analysis.robustness import support_of_part
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
 from dva_sim.experiments.analysis.study_view import StudyView
-from dva_sim.experiments.analysis.support import support_of_part
 from dva_sim.experiments.report.cell_table import cell_table
 
 DELAY = Factor("link.delay_s", (0.0, 0.5, 5.0))

@@ -8,8 +8,7 @@ from helpers.studies.small_study import cheap, run_study, study_in
 from helpers.wording import unnamed
 
 from dva_sim.experiments.analysis.compare import Comparison
-from dva_sim.experiments.analysis.fail_conditions import Bound, parse
-from dva_sim.experiments.analysis.gate_verdicts import judge
+from dva_sim.experiments.analysis.fail_conditions import Bound, judge, parse
 from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError
 

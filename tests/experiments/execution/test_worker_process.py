@@ -8,8 +8,7 @@ from functools import partial
 import pytest
 from helpers.wording import unnamed
 
-from dva_sim.experiments.execution.executors import LocalProcesses
-from dva_sim.experiments.execution.worker_process import WorkerDied, WorkerProcess
+from dva_sim.experiments.execution.executors import LocalProcesses, WorkerDied, WorkerProcess
 from dva_sim.kernel.errors import ConfigError
 
 

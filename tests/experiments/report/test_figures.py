@@ -13,7 +13,7 @@ from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.answer_table import spread_table
 from dva_sim.experiments.report.figures.answer_figure import AnswerFigure
-from dva_sim.experiments.report.figures.commands import CommandAge
+from dva_sim.experiments.report.figures.commands import Brought, CommandAge
 from dva_sim.experiments.report.figures.cut_bars import fit_to
 from dva_sim.experiments.report.figures.delay_budget import DelayBudget, stages_of
 from dva_sim.experiments.report.figures.distribution import Distributions
@@ -33,7 +33,6 @@ from dva_sim.experiments.report.figures.style import (
     styled,
 )
 from dva_sim.experiments.report.figures.tradeoff import TradeOff
-from dva_sim.experiments.report.figures.transport import Brought
 from dva_sim.statistics import band
 
 DELAY = Factor("link.delay_s", (0.0, 0.05, 0.1, 0.25, 0.5, 1.0))

@@ -1,4 +1,4 @@
-from dva_sim.experiments.report.glossary import TERMS, terms_in
+from dva_sim.experiments.report.blocks import TERMS, terms_in
 
 
 def test_a_term_inside_of_another_word_is_none():

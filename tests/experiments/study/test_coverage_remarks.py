@@ -4,7 +4,7 @@ import pytest
 from helpers.processes.command_line import call
 from helpers.wording import unnamed
 
-from dva_sim.experiments.study.coverage import OF_BANDS, of_few_persons
+from dva_sim.experiments.study.answerable import OF_BANDS, of_few_persons
 
 BARE = """\
 question: Which is quicker?

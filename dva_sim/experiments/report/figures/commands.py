@@ -1,16 +1,18 @@
-"""Age of the commands when they take effect."""
+"""Figures of commands: their age when they take effect, and what each transport brings."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from dva_sim.experiments.analysis.run_grid import Floats, nan_mean
+import numpy as np
+
+from dva_sim.experiments.analysis.run_grid import Floats, nan_mean, person_means
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
-from dva_sim.experiments.report.figures.csv_numbers import Numbers
+from dva_sim.experiments.report.figures.csv_numbers import Numbers, with_limits
 from dva_sim.experiments.report.figures.legend import legend
-from dva_sim.experiments.report.figures.palette import Look, looks
+from dva_sim.experiments.report.figures.palette import INK, Look, looks
 from dva_sim.experiments.report.prose import caption
 
 if TYPE_CHECKING:
@@ -61,3 +63,100 @@ def _ranges(ax: Axes, x: Sequence[float], ages: list[Floats], look: Look) -> Non
     ax.vlines(x, low, high, color=look.colour, lw=1)
     ax.vlines(x, quarter, three_quarters, color=look.colour, lw=4, alpha=0.55)
     ax.plot(x, middle, look.mark, color=look.colour, ms=4.5)
+
+
+WIDTH = 0.6  # of the marks of a stop, side by side
+
+
+class ShownMeasure(NamedTuple):
+    """A panel: a column, its title, the factor to its unit, and whether its axis is logarithmic."""
+
+    column: str
+    title: str
+    scale: float = 1.0
+    is_log: bool = False
+
+
+SHOWN = (
+    ShownMeasure("movement_time_s", "Driving time [s]", is_log=True),
+    ShownMeasure("round_trip_p95_s", "Round trip, 95th percentile [s]", is_log=True),
+    ShownMeasure("picture_rate_hz", "Pictures shown [Hz]"),
+    ShownMeasure("picture_age_p95_s", "Age of pictures, 95th percentile [s]", is_log=True),
+    ShownMeasure("command_rate_hz", "Commands applied [Hz]"),
+    ShownMeasure("age_in_force_mean_s", "Age of the command in force [s]", is_log=True),
+    ShownMeasure("share_of_fair_down", "Rate of the session, in equal shares"),
+    ShownMeasure("jain_down", "Jain's index of fairness"),
+)
+
+
+class Brought(style.ReportFigure):
+    """A panel for each of some measures that the runs have."""
+
+    name = "brought"
+    title = "What each transport brings, and what it leaves to TCP"
+    pages = ("transport",)
+
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
+        """Draw it."""
+        there = [each for each in SHOWN if view.part.has(each.column)]
+        if not there:
+            return None
+        figure, _, axes = style.places(len(there), 2, 2.3)
+        for ax, each in zip(axes, there, strict=True):
+            _panel(ax, view, each)
+        for ax in axes[: len(there) - 2]:
+            ax.set_xlabel("")
+        legend(figure, view.line)
+        return self.finish(figure, caption("brought"), _numbers(view, there))
+
+
+def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> Numbers:
+    """Means over persons and the middle 90 % of them, in the units of the table of runs."""
+    numbers = Numbers()
+    panel = view.panels[0]
+    grids = {each.column: view.part.grid(each.column) for each in shown}
+    for level in view.lines:
+        curves = {name: view.curve(grid, panel, level) for name, grid in grids.items()}
+        columns: dict[str, Floats] = {}
+        for name, curve in curves.items():
+            persons = person_means(curve)
+            columns |= with_limits(name, nan_mean(persons, axis=0), *_middle(persons))
+        numbers.add(view.setting(panel, level), view.along_x() | columns)
+    return numbers
+
+
+def _panel(ax: Axes, view: StudyView, shown: ShownMeasure) -> None:
+    grid = shown.scale * view.part.grid(shown.column)
+    count = len(view.lines)
+    for index, (level, look) in enumerate(looks(view.line).items()):
+        values = person_means(view.curve(grid, view.panels[0], level))
+        place = WIDTH * ((index + 0.5) / count - 0.5)
+        _marks(ax, place, values, look)
+    scale = ", log scale" if shown.is_log else ""
+    ax.set_title(f"{shown.title}{scale}", fontweight="normal")
+    style.stops_axis(ax, view.over)
+    if shown.is_log:
+        style.log_axis(ax)
+    else:
+        ax.set_ylim(bottom=0)
+    if shown.column.startswith(("share_of_fair", "jain")):
+        ax.axhline(1.0, color=INK, lw=0.8, ls=(0, (4, 2)), zorder=1)
+
+
+def _middle(values: Floats) -> Floats:
+    """Ends of the middle 90 % of persons at each stop: `(2, stops)`."""
+    found = np.full((2, values.shape[1]), np.nan)
+    there = np.isfinite(values).any(axis=0)
+    found[:, there] = np.nanpercentile(values[:, there], [5, 95], axis=0)
+    return found
+
+
+def _marks(ax: Axes, place: float, values: Floats, look: Look) -> None:
+    """Means over persons of `values` `(persons, stops)`, with the middle 90 % of them."""
+    means = nan_mean(values, axis=0)
+    stops = np.flatnonzero(np.isfinite(means))
+    if not len(stops):
+        return
+    low, high = _middle(values[:, stops])
+    ax.vlines(stops + place, low, high, color=look.colour, lw=1.2, zorder=2)
+    ax.plot(stops + place, means[stops], look.mark, color=look.colour, ms=4.5, zorder=3)

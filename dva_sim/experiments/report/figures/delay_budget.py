@@ -60,7 +60,8 @@ class DelayBudget(style.ReportFigure):
             means = {stage: _means(view, grid, panel, level) for stage, grid in grids.items()}
             measured = _means(view, view.part.grid(_MEASURED), panel, level)
             stack(ax, means, STAGES)
-            _mark(ax, measured)
+            stops = range(len(measured))
+            ax.plot(measured, stops, "D", ms=4.5, color=PAPER, mec=INK, mew=1.1, zorder=3)
             columns = view.along_x() | means | {_MEASURED: measured}
             numbers.add(view.setting(panel, level), columns)
         stacks.close()
@@ -107,12 +108,6 @@ def _means(view: StudyView, grid: Floats, panel: Setting, level: Level) -> Float
     """Over all runs of each stop."""
     values = view.curve(grid, panel, level)
     return nan_mean(values.reshape(len(values), -1), axis=1)
-
-
-def _mark(ax: Axes, measured: Floats) -> None:
-    """The whole as it was measured."""
-    stops = range(len(measured))
-    ax.plot(measured, stops, "D", ms=4.5, color=PAPER, mec=INK, mew=1.1, zorder=3)
 
 
 def _parts(stages: list[str]) -> dict[str, Artist]:

@@ -63,7 +63,9 @@ class Distributions(style.ReportFigure):
             ax.set_ylabel(
                 style.axis_label(view.measure, style.wrapped(measure_name(view.measure), 24))
             )
-        _spread(axes[0][0], present(raw))
+        there = present(raw)
+        if len(there) and there.min() > 0 and there.max() > 5 * there.min():
+            style.log_axis(axes[0][0])
         legend(figure, view.line)
         words = caption("distributions", has_missed=bool((confirmed == 0).any()))
         title = f"{capital(measure_name(view.measure))} of all {len(view.part):,} runs"
@@ -117,12 +119,6 @@ def _boxes(ax: Axes, offset: float, width: float, values: Floats) -> None:
     for y in (low, high):
         ax.hlines(y, left, right, lw=0.8, **box)
     ax.hlines(middle, left, right, lw=2, **box)
-
-
-def _spread(ax: Axes, values: Floats) -> None:
-    """A logarithmic axis where the slowest run takes many times as long as the fastest."""
-    if len(values) and values.min() > 0 and values.max() > 5 * values.min():
-        style.log_axis(ax)
 
 
 def _reference_line(ax: Axes, view: StudyView) -> None:

@@ -111,7 +111,18 @@ def _curves(
             ends[level] = draw(ax, bands, look[level], shift)
             at = _places(bands, shift)
             bars.append(Bars(ax, at, bands.low, bands.high, look[level].colour))
-            numbers.add(view.setting(panel, level), view.along_x() | _columns(view.measure, bands))
+            numbers.add(
+                view.setting(panel, level),
+                view.along_x()
+                | in_units(
+                    view.measure,
+                    mean=bands.mean,
+                    band_low=bands.low,
+                    band_high=bands.high,
+                    low=bands.pointwise_low,
+                    high=bands.pointwise_high,
+                ),
+            )
         style.hatch_stops(ax, view.stops_outside(panel))
         every.append(ends)
     style.label_panels(axes, view, ylabel)
@@ -128,18 +139,6 @@ def _possible(bands: Band, least: float, most: float) -> Band:
 def _places(bands: Band, shift: float) -> Floats:
     """Along x, beside each stop."""
     return np.arange(len(bands.mean), dtype=np.float64) + shift
-
-
-def _columns(measure: str, bands: Band) -> dict[str, Floats]:
-    """A band as columns: mean, simultaneous and pointwise 95 % limits."""
-    return in_units(
-        measure,
-        mean=bands.mean,
-        band_low=bands.low,
-        band_high=bands.high,
-        low=bands.pointwise_low,
-        high=bands.pointwise_high,
-    )
 
 
 def _zoom_on_small(axes: list[Axes], smallest: float) -> bool:

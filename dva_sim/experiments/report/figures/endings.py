@@ -45,7 +45,8 @@ class EndingsInTime(style.ReportFigure):
         endings = reading.endings
         if endings is None:
             return None
-        lines = _lines(endings, view)
+        others = [line for line in view.lines if not _all_right(endings, [line], view.stops)]
+        lines = tuple(dict.fromkeys([*(view.contrast or ()), *others]))[:_MOST_LINES]
         stops = [stop for stop in view.stops if not _all_right(endings, lines, [stop])][
             -_MOST_STOPS:
         ]
@@ -81,12 +82,6 @@ class EndingsInTime(style.ReportFigure):
         )
         words = caption("endings", part=view.part.name, place=brief(view.panels[0]))
         return self.finish(figure, words, numbers)
-
-
-def _lines(endings: Endings, view: StudyView) -> tuple[Level, ...]:
-    """The two that are compared, and others of which not all went right."""
-    others = [line for line in view.lines if not _all_right(endings, [line], view.stops)]
-    return tuple(dict.fromkeys([*(view.contrast or ()), *others]))[:_MOST_LINES]
 
 
 def _all_right(endings: Endings, lines: Sequence[Level], stops: Sequence[Level]) -> bool:

@@ -19,7 +19,6 @@ from dva_sim.experiments.report.figures import (
     scatter,
     shift,
     tradeoff,
-    transport,
 )
 from dva_sim.experiments.report.figures.style import Drawn, ReportFigure, styled
 from dva_sim.kernel.wording import listing
@@ -43,7 +42,7 @@ SHIPPED: Final[tuple[type[ReportFigure], ...]] = (
     endings.EndingsInTime,
     shift.Trade,
     shift.WayToBest,
-    transport.Brought,
+    commands.Brought,
 )
 """In the order of the report; the first that applies answers the question."""
 

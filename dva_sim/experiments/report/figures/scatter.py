@@ -127,7 +127,8 @@ class Scatter(style.ReportFigure):
         for cloud, y in zip(clouds, means, strict=True):
             columns = dict(zip(names, where, strict=True)) | {with_unit("mean", view.measure): y}
             numbers.add(panel | {"of": cloud.name}, {POINT: range(len(y))} | columns)
-        title = f"{capital(_what(view, clouds))} against each factor{_place(panel)}"
+        place = f" ({setting(panel)})" if panel else ""
+        title = f"{capital(_what(view, clouds))} against each factor{place}"
         return self.finish(figure, caption("scatter"), numbers, title=title)
 
 
@@ -135,10 +136,6 @@ def _what(view: StudyView, clouds: list[Cloud]) -> str:
     if view.contrast is None:
         return measure_name(view.measure)
     return f"{clouds[0].name} in {measure_name(view.measure)}"
-
-
-def _place(panel: Setting) -> str:
-    return f" ({setting(panel)})" if panel else ""
 
 
 def _dots(ax: Axes, x: Floats, y: Floats, look: Look) -> None:

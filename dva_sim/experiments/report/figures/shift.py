@@ -57,11 +57,12 @@ class Trade(ShiftFigure):
             return None
         label = "Exposure of people in finding out what it is [s per event]"
         figure = _scatter(shifts, "exposure_look_s", label)
+        act = shifts.means("exposure_s") - shifts.means("exposure_look_s")
         words = caption(
             "trade",
             follow=f"{shifts.follow:g}",
             baseline=shifts.baseline,
-            act=f"{_act(shifts):.0f}",
+            act=f"{float(np.nanmedian(act)):.0f}",
         )
         return self.finish(figure, words, _scatter_numbers(shifts, "exposure_look_s"))
 
@@ -94,7 +95,7 @@ def _scatter(shifts: Shifts, column: str, label: str) -> Figure:
         ax.margins(0.1)
     axes[0].set_ylabel("Restricted mean time to response [s]")
     axes[len(axes) // 2].set_xlabel(label)
-    _key(figure, axes[0])
+    key(figure, *axes[0].get_legend_handles_labels())
     return figure
 
 
@@ -110,11 +111,6 @@ def _scatter_numbers(shifts: Shifts, column: str) -> Numbers:
         at_stop: dict[str, Any] = {name: values[:, stop] for name, values in columns.items()}
         numbers.add({"at": title}, at_stop | {"dispatch.policy": shifts.policies})
     return numbers
-
-
-def _act(shifts: Shifts) -> float:
-    """Median extra exposure of containing an event, over all cells [s per event]."""
-    return float(np.nanmedian(shifts.means("exposure_s") - shifts.means("exposure_look_s")))
 
 
 def _half_widths(shifts: Shifts, column: str) -> Any:
@@ -181,8 +177,3 @@ def _policy_axis(ax: Axes, names: tuple[str, ...], title: str) -> None:
     ax.set_ylim(len(names) - 0.5, -0.5)
     ax.grid(True, axis="both")
     ax.set_title(title)
-
-
-def _key(figure: Any, ax: Axes) -> None:
-    handles, names = ax.get_legend_handles_labels()
-    key(figure, handles, names)

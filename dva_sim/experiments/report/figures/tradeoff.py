@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dva_sim.experiments.analysis.run_grid import Floats, Setting, person_means, present
+from dva_sim.experiments.analysis.run_grid import Floats, person_means, present
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.csv_numbers import Numbers, with_unit
@@ -39,7 +39,9 @@ class TradeOff(style.ReportFigure):
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
-        columns = _columns(view)
+        measured = [c for c in (view.measure, *EXPOSURES) if c in EXPOSURES and _varies(view, c)]
+        responses = [c for c in (view.measure, *RESPONSES) if c in RESPONSES and _varies(view, c)]
+        columns = (measured[0], responses[0]) if measured and responses else None
         if columns is None:
             return None
         figure, axes = style.panel_grid(view, 3.6)
@@ -48,7 +50,8 @@ class TradeOff(style.ReportFigure):
         bars = list[Bars]()
         for ax, panel in zip(axes, view.shown, strict=True):
             for level in view.lines:
-                bands = [_band(view, column, panel, level) for column in columns]
+                grids = (view.curve(view.part.grid(column), panel, level) for column in columns)
+                bands = [band(person_means(grid)) for grid in grids]
                 bars += _line(ax, view, level, *bands)
                 ends.append((ax, bands[0].mean, bands[1].mean))
                 values = {
@@ -79,21 +82,9 @@ class TradeOff(style.ReportFigure):
 _EDGES = {"mean": "mean", "low": "pointwise_low", "high": "pointwise_high"}
 
 
-def _columns(view: StudyView) -> tuple[str, str] | None:
-    """The exposure that varies, and the response beside it."""
-    measured = [c for c in (view.measure, *EXPOSURES) if c in EXPOSURES and _varies(view, c)]
-    responses = [c for c in (view.measure, *RESPONSES) if c in RESPONSES and _varies(view, c)]
-    return (measured[0], responses[0]) if measured and responses else None
-
-
 def _varies(view: StudyView, column: str) -> bool:
     values = present(view.part.grid(column)) if view.part.has(column) else np.array([])
     return len(values) > 1 and bool(np.ptp(values) > 0)
-
-
-def _band(view: StudyView, column: str, panel: Setting, level: Level) -> Band:
-    means: Floats = person_means(view.curve(view.part.grid(column), panel, level))
-    return band(means)
 
 
 def _fit(ax: Axes, view: StudyView, columns: tuple[str, str]) -> None:

@@ -55,7 +55,8 @@ def trial_figure(scenario: TaskScenario, row: Row, trace: Trace) -> Figure:
         row: Measures of the trial.
         trace: Recorded motion of the trial.
     """
-    unit = _unit_of(trace)
+    shown = [*trace.places, *((x, y) for x, y, _ in trace.marks)]
+    unit = LengthUnit("mm", 1000.0) if np.ptp(shown, axis=0).max() < 1.0 else LengthUnit("m", 1.0)
     with styled():
         figure, ((way, speed),) = panels(1, 2, 3.8)
         _speed(speed, trace, unit)
@@ -67,12 +68,6 @@ def trial_figure(scenario: TaskScenario, row: Row, trace: Trace) -> Figure:
             speed.set_xlim(way.get_xlim())
         figure.suptitle(_title(scenario, row), x=0.01, ha="left", fontsize=9.5, color=INK)
     return figure
-
-
-def _unit_of(trace: Trace) -> LengthUnit:
-    """Millimetres for what is smaller than a metre."""
-    shown = [*trace.places, *((x, y) for x, y, _ in trace.marks)]
-    return LengthUnit("mm", 1000.0) if np.ptp(shown, axis=0).max() < 1.0 else LengthUnit("m", 1.0)
 
 
 def _title(scenario: TaskScenario, row: Row) -> str:
