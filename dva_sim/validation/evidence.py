@@ -22,6 +22,7 @@ SUBJECTS: Final[tuple[Subject, ...]] = get_args(Subject)
 RULE: Final = "Rule"
 HEADS: Final = ("line", "claim", "measured", "predicted", "band", "verdict")
 NORMAL_95: Final = 1.96  # standard errors of half a 95 % interval
+MOST_NAMED: Final = 20  # conditions in a head; more would hide whether the rule holds
 
 
 @dataclass(frozen=True)
@@ -141,9 +142,13 @@ def share_rule(
 
 def headline(lines: Sequence[Evidence]) -> str:
     """Present state of a subject: how many lines hold, which do not, and whether its rule holds."""
-    listed = names_of_misses(lines)
-    misses = f"; these do not: {listed}" if listed else ""
-    return f"{count_of(lines)}{misses}. {state_of_rule(lines)}"
+    misses = names_of_misses(lines)
+    missed = ""
+    if len(misses) > MOST_NAMED:
+        missed = f"; those that do not, of {len(misses)} conditions, are in the tables"
+    elif misses:
+        missed = f"; these do not: {'; '.join(misses)}"
+    return f"{count_of(lines)}{missed}. {state_of_rule(lines)}"
 
 
 def count_of(lines: Iterable[Evidence]) -> str:
@@ -154,14 +159,14 @@ def count_of(lines: Iterable[Evidence]) -> str:
     return f"{verdicts.count('holds')} of {len(verdicts)} lines hold{more}"
 
 
-def names_of_misses(lines: Iterable[Evidence]) -> str:
-    """Names of all lines that miss, measures of one condition together; empty without any."""
+def names_of_misses(lines: Iterable[Evidence]) -> list[str]:
+    """Names of all lines that miss, measures of one condition together."""
     names: dict[str, list[str]] = {}
     for line in judged(lines):
         if line.verdict == "misses":
             condition, _, measure = line.line.rpartition(" ")
             names.setdefault(condition, []).append(measure)
-    return "; ".join(f"{key} {', '.join(own)}".strip() for key, own in names.items())
+    return [f"{key} {', '.join(own)}".strip() for key, own in names.items()]
 
 
 def state_of_rule(lines: Iterable[Evidence]) -> str:

@@ -83,6 +83,12 @@ def test_the_head_counts_judged_lines_and_names_all_that_miss_condition_by_condi
     assert not unnamed(text, "without loss (0.5, 1 of 2; asked for: at least 1)")
 
 
+def test_of_many_conditions_that_miss_the_head_gives_the_number():
+    many = [replace(LATE, line=f"pub{n} age_p95") for n in range(30)]
+    text = headline([AGE, *many])
+    assert text.startswith("1 of 31 lines hold; those that do not, of 30 conditions, are in the ")
+
+
 def test_lines_that_are_too_rough_are_counted_apart():
     text = headline([AGE, replace(AGE, verdict="too rough")])
     assert text.startswith("1 of 2 lines hold, 1 are too rough to say.")

@@ -241,14 +241,14 @@ def reading(folder: Path, rows: Rows, facts: dict[str, Any], **tables: Rows) -> 
 
 def write_shifts(folder: Path, shifts: int) -> Path:
     """Results of hour-long shifts, which ARE simulated: three policies at two loads."""
-    from dva_sim.simulation.measures import shifts
+    from dva_sim.simulation.measures.shifts import tables as shift_tables
     from dva_sim.simulation.timed import build, simulate_timed
 
     tables: dict[str, Rows] = {"runs": [], "events": []}
     policies, rates = ["random", "nearest_idle", "min_eta"], [1, 3]
     for policy, rate, shift in itertools.product(policies, rates, range(shifts)):
         changes = {"dispatch.policy": policy, "intensity": rate}
-        made = shifts.tables(simulate_timed(build(SHIFT, changes), shift))
+        made = shift_tables(simulate_timed(build(SHIFT, changes), shift))
         design = {"part": "shift", "person": shift, "trial": 0, "seed": shift, "cell": 0}
         for name, rows in tables.items():
             rows += [design | changes | {"is_reference": False} | row for row in made[name]]

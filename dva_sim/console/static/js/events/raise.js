@@ -84,7 +84,7 @@ function Rooms({ refuse }) {
   if (!names.length) return null;
   const go = (/** @type {string} */ name) => {
     const room = rooms().find((each) => each.name === name);
-    if (room?.place_m) place.value = room.place_m;
+    if (room?.place_m) place.value = [room.place_m[0], room.place_m[1]];
     refuse(room && !room.place_m ? `No robot gets into ${name}: click on the map where it is.` : '');
   };
   const options = /** @type {[string, string][]} */ ([['', 'choose a room'], ...names.map((n) => [n, n])]);
