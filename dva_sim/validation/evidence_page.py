@@ -216,7 +216,7 @@ def _csv(rows: Sequence[Row]) -> str:
 
 
 def _write_parquet(path: Path, rows: Sequence[Row]) -> None:
-    """One thread, rows in their order: the same bytes each time."""
+    """Write with one thread and rows in order, so that the bytes are the same each time."""
     import duckdb  # late: start-up
 
     columns = ", ".join(f'"{name}" {_kind(rows, name)}' for name in rows[0])

@@ -17,7 +17,7 @@ from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.attached.people import AttachedPeople
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.events.alarm_actions import AlarmActions
-from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, report_of
+from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, place_of, report_of
 from dva_sim.console.events.missions import inspection_of, send_on_mission
 from dva_sim.console.events.takeover import Takeover
 from dva_sim.console.wire.actions import ActionPlace, Asked
@@ -59,7 +59,9 @@ class AttachedDecisions:
 
     @does("event_raise")
     def _raise(self, _: str, line: ReportAsked, on_result: OnResult) -> None:
-        place = self._system.place_of(line["x_m"], line["y_m"])
+        site = self._system.site
+        x, y = (line["x_m"], line["y_m"]) if site is None else place_of(line, site)
+        place = self._system.place_of(x, y)
         self._ask(*report_of(line, place), on_result)
 
     @does(*DECISIONS)

@@ -1,4 +1,4 @@
-"""One go at a study's runs: workers, journal, lock and tables, whatever goes wrong meanwhile.
+"""Runs of a study until they are done or interrupted: its workers, journal, lock and tables.
 
 A kill loses no run that is in the journal, two processes never write into one folder, a file that
 changes under way ends the study, and a Ctrl-C says how far it came.

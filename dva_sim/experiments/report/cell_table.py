@@ -228,7 +228,7 @@ def _text(summary: _Summarise, cell: Floats, text: Callable[[float], str]) -> st
 
 
 def tuned_table(manifest: Mapping[str, Any]) -> CellTable | None:
-    """All that a tuning saw, as a report prints it; None where nothing was tuned."""
+    """Return the table of everything that a tuning tried; None where nothing was tuned."""
     if not manifest.get("tuned"):
         return None
     tuned = validate(TunedValues, manifest["tuned"])

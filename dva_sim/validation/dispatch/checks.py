@@ -210,7 +210,7 @@ def _line(
     found: Estimate,
     precision: float | None = None,
 ) -> Evidence:
-    """One comparison; its note is the deviation in standard errors, with and without controls."""
+    """Return the line of a comparison; its note gives the deviation in standard errors."""
     half = half_band(found.error, exact, found.batches)
     spread = NORMAL_95 * found.error if found.error > 0 else None
     note = ""

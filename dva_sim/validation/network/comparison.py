@@ -23,8 +23,6 @@ from dva_sim.validation.network.pooling import (
 from dva_sim.validation.network.prediction import WITHOUT, Depth, depth_for, predict
 from dva_sim.validation.network.reference import NUMBERS
 from dva_sim.validation.network.verdicts import (
-    KINDS,
-    MIN_INSIDE,
     CellVerdict,
     ComparedCell,
     ConditionGroup,
@@ -32,7 +30,6 @@ from dva_sim.validation.network.verdicts import (
     Row,
     cells_of,
     judge,
-    share_inside,
 )
 
 CHUNK = 10  # runs of one job
@@ -182,17 +179,6 @@ class NetworkComparison:
         """The verdicts on conditions of a kind."""
         return [v for v in self.verdicts if v.cell.group.kind == kind]
 
-    def passes_bands(self, kind: ConditionKind) -> bool:
-        """True if enough lies inside: everything, but nine of ten single runs under loss."""
-        inside, judged = share_inside(self.of_kind(kind))
-        return inside >= (MIN_INSIDE if kind == "single" else 1.0) * judged
-
-    @property
-    def cells(self) -> list[ComparedCell]:
-        """All that is compared."""
-        pooled = [scored.cell for scored in self.pooled.scored]
-        return [*(v.cell for v in self.verdicts), *pooled, *self.rarely]
-
     @property
     def outside(self) -> set[int]:
         """The ids of those that lie outside, or are significantly off."""
@@ -203,17 +189,6 @@ class NetworkComparison:
     def variants(self) -> dict[str, Pooled]:
         """The model as it is, what is too simple, and with a mechanism left out."""
         return {"nothing": self.pooled, **self.controls, **self.ablated}
-
-    @property
-    def fooled(self) -> list[str]:
-        """The models that are too simple and were not found out."""
-        return [name for name, pooled in self.controls.items() if pooled.passes]
-
-    @property
-    def passes(self) -> bool:
-        """True if something is judged, all bands hold and every oversimplified control fails."""
-        bands = bool(self.judged) and all(self.passes_bands(kind) for kind in KINDS)
-        return bands and (self.pooled.passes or not self.pooled.scored) and not self.fooled
 
     @property
     def missing(self) -> tuple[int, int]:

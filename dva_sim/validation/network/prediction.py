@@ -136,7 +136,7 @@ def make_links(condition: Condition, streams: Streams) -> tuple[Link, Link]:
 
 
 class PredictedRun:
-    """One run: the operator's program, a virtual network, and a robot's queue.
+    """A predicted run of the operator's program, a virtual network, and a robot's queue.
 
     Args:
         streams: Random streams of the link.

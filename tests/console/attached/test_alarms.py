@@ -102,3 +102,10 @@ def test_nobody_is_left_to_send_once_all_were_sent(monkeypatch, tmp_path):
             page.until(lambda number=number: len(page.events()) > number)
             nobody = any("nobody is left to send" in text for text in page.alarms())
             assert nobody == (label == everybody[-1])
+
+
+def test_an_event_beyond_the_site_is_refused_as_at_a_console_of_its_own(tmp_path, monkeypatch):
+    with attached(monkeypatch, tmp_path) as page:
+        answer = page.ask("event_raise", kind="fire", severity="low", x_m=100.0, y_m=12.0)
+    assert not answer["ok"]
+    assert "a place on the site" in answer["text"]

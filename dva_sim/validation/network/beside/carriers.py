@@ -201,7 +201,8 @@ class StreamCarrier(Carrier):
     Args:
         between: Both programs.
         tcp: TCP options of both ends.
-        header: Size of the frame around a message of so many bytes [B], by whether it goes up.
+        header: Function that gives the size of a message's frame [B] from the size of the message
+            [B] and whether it goes to the robot.
         exchanges: Before the first message.
     """
 
