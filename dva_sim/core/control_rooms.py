@@ -29,6 +29,7 @@ NEEDS: Final[dict[type, tuple[ControlRoomRole, str]]] = {
     m.GetEventList: (R.LOOK, "look"),
     m.GetDispatch: (R.LOOK, "look"),
     m.GetProposal: (R.LOOK, "look"),
+    m.GetRequestLog: (R.DRIVE, "read_requests"),
     m.Acknowledge: (R.DISPATCH, "acknowledge"),
     m.Assign: (R.DISPATCH, "assign"),
     m.TakeOff: (R.DISPATCH, "take_off"),
@@ -40,6 +41,7 @@ NEEDS: Final[dict[type, tuple[ControlRoomRole, str]]] = {
     m.Revoke: (R.SUPERVISE, "revoke"),
 }
 """Role that each message needs, and its effect in the words of a `Fact`."""
+_ASKS = m.GetEventList | m.GetDispatch | m.GetProposal | m.GetRequestLog  # and decides nothing
 LISTED_CLOSED = 50  # events that are over, of the last
 Decision = m.Acknowledge | m.Assign | m.TakeOff | m.FalseAlarm | m.Escalate | m.AddNote
 
@@ -97,6 +99,8 @@ class ControlRooms:
                 return DvaAnswer(content=self._list(body.event_id or 0, now))
             case m.GetDispatch():
                 return DvaAnswer(content=self.status(now, sender))
+            case m.GetRequestLog():
+                return DvaAnswer()  # who carries the messages has their log
             case m.SetDispatch():
                 return self._set_dispatch(body, sender, now)
             case m.Revoke():
@@ -454,7 +458,7 @@ class ControlRooms:
         advised: Advised | None = None,
     ) -> DvaAnswer:
         fact = self._fact(body, sender, action, advised, now)
-        if not isinstance(body, m.GetEventList | m.GetDispatch | m.GetProposal):
+        if not isinstance(body, _ASKS):
             self._orders.trail.note(replace(fact, code=code, outcome=text))
         return DvaAnswer(code, text)
 

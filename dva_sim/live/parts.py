@@ -112,6 +112,7 @@ class DvaPart:
             memory = Store(options.state)
         self._agent = add_dva(stage, permissions, memory, keep_events=False)
         self._agent.core.registry.most = devices_that_fit()
+        self._agent.stopwatch = time.perf_counter
         trace = _trace_of("dva", stage, options)
         if trace is not None:
             self._agent.core = traced(self._agent.core, trace, stage, memory)

@@ -349,8 +349,52 @@ class AuditRecord:
     advised_in: float | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class GetRequestLog:
+    """Ask for the requests above this number, or from the first on; answered with `RequestLog`."""
+
+    request_number: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedRequest:
+    """A request that the DVA has received, and its answer.
+
+    Attributes:
+        request_number: The DVA's number of the request, in the order of arrival.
+        ago: Time since its arrival [s], up to 1e6.
+        size: Its size [B].
+        request: Its first 4096 bytes in Base64, with each session shown without its random half.
+        service_time: Time until the answer [s]; None: there is none.
+        code: Code of the answer.
+        text: Text of the answer.
+    """
+
+    request_number: int
+    ago: float
+    size: int
+    request: str
+    service_time: float | None = None
+    code: int | None = None
+    text: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RequestLog:
+    """Requests by number; no more than fit into one message: ask for those above.
+
+    Attributes:
+        newest: Number of the newest request; 0: there was none.
+        requests: Requests that the DVA still keeps; missing numbers are kept no more.
+    """
+
+    newest: int
+    requests: tuple[LoggedRequest, ...] = ()
+
+
 ControlRoomBody = (
     GetEventList
+    | GetRequestLog
     | GetDispatch
     | SetDispatch
     | Acknowledge
@@ -366,4 +410,4 @@ ControlRoomBody = (
     | DispatchStatus
     | AuditRecord
 )
-ControlRoomContent = EventList | EventStatus | Proposal | DispatchStatus
+ControlRoomContent = EventList | RequestLog | EventStatus | Proposal | DispatchStatus

@@ -30,6 +30,7 @@ _FORMS: Final = {
     "Name": "printable characters",
     "Text": "printable characters",
     "Url": "ASCII characters without spaces",
+    "Base64": "characters of Base64",
 }
 """Texts of each type in words, without their length."""
 

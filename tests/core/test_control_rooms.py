@@ -74,6 +74,7 @@ NEEDED = [
     (m.GetProposal(1), "look"),
     (m.EventReport(None, "flood", east(70), 0.5, 0.9, "detected"), "drive"),
     (m.PermissionRequest(ROBOT, "missions"), "drive"),
+    (m.GetRequestLog(), "drive"),
     (m.Acknowledge(1), "dispatch"),
     (m.Assign(1, OTHER_GUARD, decisions=1), "dispatch"),
     (m.TakeOff(1, ROBOT), "dispatch"),

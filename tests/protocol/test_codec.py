@@ -1,4 +1,5 @@
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -251,7 +252,9 @@ def test_a_schema_in_the_working_folder_does_not_replace_the_programs(tmp_path, 
     assert tmp_path not in schema_file().parents
 
 
-@pytest.mark.parametrize("kind", [m.DeviceList, m.EventList, m.SensorList])
+@pytest.mark.parametrize(
+    "kind", [m.DeviceList, m.EventList, m.SensorList, partial(m.RequestLog, 0)]
+)
 def test_a_list_of_nothing_is_a_list(kind):
     said = message(m.Reply(1, m.OK, "", kind(())))
     assert decode(encode(said)) == said

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import partial
 from typing import Final
 
@@ -28,10 +29,13 @@ from dva_sim.core.registry import (
     ROBOT,
     RegistrationLimit,
 )
+from dva_sim.core.request_log import SHOWN_BYTES, KeptRequest, RequestLog
 from dva_sim.core.sessions import Send
 from dva_sim.core.store import Store
 from dva_sim.network.messaging import Request, Subscription
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode
+from dva_sim.protocol.errors import ProtocolError
 
 MOST_REPORTED = 20_000  # events whose last word is remembered, so that none is said twice
 FIRST_BEAT = 1.27  # after the start, when hardly anything else happens at the same moment [s]
@@ -39,7 +43,7 @@ MOST_TURNED_AWAY = 1000  # devices that were not registered, of which that was t
 TICK = 1.0  # how often the core looks at deadlines [s]
 NOTHING_TO_KEEP: Final = (
     *(m.Registration, m.TaskBid, m.GetGrant, m.GetDeviceList, m.GetSensorInfo, m.RobotEmergency),
-    *(m.GetEventList, m.GetDispatch, m.GetProposal),
+    *(m.GetEventList, m.GetDispatch, m.GetProposal, m.GetRequestLog),
 )
 """Requests that are answered with OK even while nothing can be written: a registration is renewed
 every 10 s, and the others only ask."""
@@ -59,6 +63,7 @@ class DvaAgent:
         facts: Decisions; only the latest ones, unless `keep_events`.
         on_fact: Callback for each fact as it is taken from the core.
         is_gone: True once it has crashed; another one may take its place.
+        stopwatch: Time by which the log of requests measures answers [s]; default: the run's clock.
     """
 
     def __init__(
@@ -82,6 +87,8 @@ class DvaAgent:
         self._heard: dict[str, tuple[str, list[Subscription]]] = {}  # address, at which heard
         self._attended = 0
         self._registrations = RegistrationLimit()
+        self._requests = RequestLog()
+        self.stopwatch: Callable[[], float] = lambda: device.clock.now
         device.network.serve(device.id_tag, self._on_arrival)
 
     def start(self) -> None:
@@ -145,6 +152,41 @@ class DvaAgent:
         self._carry_out(sends)
 
     def _on_arrival(self, request: Request) -> None:
+        """Take a request, and log it if a control room wants to see it."""
+        log = self._requests
+        if _reads_log(request.data):  # else each look at the log would add to it
+            self._take(request)
+        elif log.is_wanted(self.device.clock.now):
+            self._take_logged(request)
+        else:
+            log.count()
+            self._take(request)
+
+    def _take_logged(self, request: Request) -> None:
+        """Take a request; all are answered within that, or never."""
+        number = self._requests.count()
+        arrived = self.device.clock.now
+        begun = self.stopwatch()
+        answered: list[tuple[float, m.Reply | None]] = []
+
+        def answer(data: bytes) -> None:
+            answered.append((self.stopwatch() - begun, _reply_in(data)))
+            request.answer(data)
+
+        self._take(request._replace(answer=answer))
+        took, reply = answered[0] if answered else (None, None)
+        self._requests.keep(
+            KeptRequest(
+                number=number,
+                arrived=arrived,
+                size=len(request.data),
+                data=request.data[:SHOWN_BYTES],
+                service_time=took,
+                reply=reply,
+            )
+        )
+
+    def _take(self, request: Request) -> None:
         """Take a request, unless its peer registers too many devices at once."""
         registers = request.origin is not None and b"<RegMsg>" in request.data
         now = self.device.clock.now
@@ -161,6 +203,9 @@ class DvaAgent:
         reply, sends = self.core.handle(message, self.device.clock.now)
         if isinstance(message.body, m.Registration) and reply.code != m.OK:
             self._tell_refused(message.source, message.body, reply.text)
+        if isinstance(message.body, m.GetRequestLog) and reply.code == m.OK:
+            above = message.body.request_number or 0
+            reply = replace(reply, content=self._requests.above(above, self.device.clock.now))
         self._attend()
         self._carry_out(sends)
         return self._confirmed(message, reply)
@@ -350,3 +395,17 @@ class DvaAgent:
         if event.state is State.ASSIGNED and event.holder:
             text += f" to {self.device.label_of(event.holder)}"
         self.device.tell(text)
+
+
+def _reads_log(data: bytes) -> bool:
+    if b"<GetRequestLog" not in data:
+        return False
+    try:
+        return isinstance(decode(data).body, m.GetRequestLog)
+    except ProtocolError:
+        return False
+
+
+def _reply_in(data: bytes) -> m.Reply | None:
+    body = decode(data).body
+    return body if isinstance(body, m.Reply) else None

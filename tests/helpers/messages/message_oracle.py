@@ -42,6 +42,7 @@ NAMES = {
     "mission_id": "MissionID",
     "name": "SensorName",
     "operator": "OperatorID",
+    "requests": "LoggedRequest",
     "responder": "ResponderID",
     "sensor": "SensorName",
     "source": "SourceID",

@@ -1,5 +1,6 @@
 """One strategy per body, by the types and names of its fields: all the protocol can say."""
 
+from base64 import b64encode
 from typing import Any, get_args, get_origin, get_type_hints
 
 from hypothesis import strategies as st
@@ -33,7 +34,7 @@ STRATEGIES: dict[str, st.SearchStrategy[Any]] = {
     "action activity device_type label name policy sensor sensors unit": characters(1, 64),
     "note reason text": characters(0, 256),
     "age ago advised_in arrival_in bid_within closed_for decide_within held_for": real(0, 1e6),
-    "state_for stopped_for": real(0, 1e6),
+    "service_time state_for stopped_for": real(0, 1e6),
     "confidence severity": real(0, 1),
     "speed turn_rate": real(-100, 100),
     "frequency": real(0, 1000),
@@ -41,10 +42,11 @@ STRATEGIES: dict[str, st.SearchStrategy[Any]] = {
     "latitude": real(-90, 90),
     "longitude": real(-180, 180),
     "values": real(-1e8, 1e8),
-    "event_id": numbers,
-    "answers decisions mission_id": st.integers(0, UINT32),
+    "event_id request_number": numbers,
+    "answers decisions mission_id newest size": st.integers(0, UINT32),
     "code": st.integers(0, 999),
     "laps": st.integers(0, 1000),
+    "request": st.binary(max_size=300).map(lambda data: b64encode(data).decode()),
     "seen_tick tick": st.integers(0, 2**53 - 1),
     "session": st.integers(1, UINT64),
     "waypoints_left": st.integers(0, 64),

@@ -1,6 +1,7 @@
 """Control rooms in a run: their messages, priority, and driving a robot themselves."""
 
 import json
+from base64 import b64decode
 from collections.abc import Callable
 from typing import Any
 
@@ -9,9 +10,10 @@ import pytest
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.core.events import Cause, State
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode
 from dva_sim.simulation.full.dva_trace import replay_dva, traced
 from dva_sim.simulation.full.run import Run
-from dva_sim.simulation.full.stage import id_of
+from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.simulation.scenario import build
 
 ROBOT, GUARD, OPERATOR = id_of("robot", 1), id_of("guard", 1), id_of("operator", 1)
@@ -154,3 +156,42 @@ def test_after_a_lost_publication_the_list_tells(staffed):
     room.events.clear()
     staffed.until(25.0)
     assert 1 in room.events
+
+
+def requests_seen(staffed: Staffed, room: int = 0) -> list[m.LoggedRequest]:
+    (reply,) = staffed.ask(room, m.GetRequestLog())
+    assert isinstance(reply.content, m.RequestLog)
+    return list(reply.content.requests)
+
+
+def test_requests_are_logged_once_a_control_room_has_asked_for_them(staffed):
+    assert requests_seen(staffed) == []
+    staffed.ask(1, m.Acknowledge(1), m.GetProposal(99))
+    seen = [(decode(b64decode(entry.request)), entry) for entry in requests_seen(staffed)]
+    own = [(one.body, entry.code) for one, entry in seen if one.source == id_of("control-room", 2)]
+    assert (m.Acknowledge(1), m.OK) in own
+    assert (m.GetProposal(99), m.UNKNOWN_EVENT) in own
+    assert not any(isinstance(one.body, m.GetRequestLog) for one, _ in seen)
+    assert [entry.service_time for _, entry in seen] == [0.0] * len(seen)  # the run's clock stands
+
+
+def test_the_log_shows_requests_that_cannot_be_read(staffed):
+    requests_seen(staffed)
+    network = staffed.run.network
+    wire = network.connect(id_of("control-room", 2), DVA, lambda *_: None, pipelined=False)
+    wire.send(1, b"hello")
+    staffed.until(staffed.run.clock.now + 1.0)
+    unread = [entry for entry in requests_seen(staffed) if entry.size == 5]
+    assert [(b64decode(e.request), e.code) for e in unread] == [(b"hello", m.BAD_MESSAGE)]
+
+
+def test_a_run_whose_log_was_read_is_replayed_from_its_trace(tmp_path):
+    lines: list[str] = []
+    staffed = Staffed(lines.append)
+    staffed.until(8.0)
+    requests_seen(staffed)
+    staffed.ask(0, m.Acknowledge(1))
+    assert requests_seen(staffed)
+    again = list(replay_dva(lines, tmp_path / "dva.jsonl"))
+    assert len(again) > 10
+    assert [one for one in again if one.then != one.now] == []

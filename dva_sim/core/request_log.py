@@ -1,0 +1,118 @@
+"""The log of requests to the DVA: the newest are kept while a control room asks for them.
+
+Requests are logged as they arrived, readable or not. A session is shown without its random half:
+readers can tell sessions apart, and act in none of them.
+"""
+
+from __future__ import annotations
+
+import re
+from base64 import b64encode
+from collections import deque
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Final
+
+from dva_sim.core.wire_size import LIST_BYTES, xml_size
+from dva_sim.protocol import limits
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.exchange import LOW_BITS
+
+MOST_LOGGED: Final = 256  # requests that are kept
+MOST_LISTED: Final = 32  # of one answer
+KEPT_FOR: Final = 60.0  # after the last question for them, as a `DevSub` [s]
+SHOWN_BYTES: Final = 4096  # of a request [B]
+ENTRY_BYTES: Final = 280  # of one request without its bytes and the text of its answer, at most [B]
+LONGEST: Final = 1e6  # no longer time is told [s]
+_NAMES: Final = "|".join(
+    sorted(name for name in limits.names() if limits.types_of(name) & {"Session", "SessionID"})
+)
+MOST_DIGITS: Final = 20  # of a session
+_DIGIT: Final = re.compile(rb"\d")
+_SESSION: Final = re.compile(rf"(<(?:{_NAMES})\s*>)([^<]*)".encode())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeptRequest:
+    """A request and its answer.
+
+    Attributes:
+        number: Number in the order of arrival, from 1.
+        arrived: Arrival time [s].
+        size: Size of the request [B].
+        data: Its first bytes.
+        service_time: Time until the answer [s]; None: there was none.
+        reply: The answer, if there was one.
+    """
+
+    number: int
+    arrived: float
+    size: int
+    data: bytes
+    service_time: float | None = None
+    reply: m.Reply | None = None
+
+
+@dataclass
+class RequestLog:
+    """The newest requests, and the number of all.
+
+    Attributes:
+        newest: Number of the newest request.
+    """
+
+    newest: int = 0
+    _wanted_until: float = -1.0
+    _kept: deque[KeptRequest] = field(default_factory=lambda: deque(maxlen=MOST_LOGGED))
+
+    def count(self) -> int:
+        """Return the number of a request that has just arrived."""
+        self.newest += 1
+        return self.newest
+
+    def is_wanted(self, now: float) -> bool:
+        """Return True if somebody has asked for requests lately."""
+        return now < self._wanted_until
+
+    def keep(self, request: KeptRequest) -> None:
+        """Keep a request; the oldest makes room."""
+        self._kept.append(request)
+
+    def above(self, number: int, now: float) -> m.RequestLog:
+        """Return the requests above a number, as many as fit into a message, and keep more."""
+        self._wanted_until = now + KEPT_FOR
+        listed = list[m.LoggedRequest]()
+        room = LIST_BYTES
+        found = (request for request in self._kept if request.number > number)
+        for request in islice(found, MOST_LISTED):
+            entry = _entry(request, now)
+            room -= ENTRY_BYTES + len(entry.request) + xml_size(entry.text or "")
+            if listed and room < 0:
+                break
+            listed.append(entry)
+        return m.RequestLog(self.newest, tuple(listed))
+
+
+def _entry(request: KeptRequest, now: float) -> m.LoggedRequest:
+    reply = request.reply
+    took = request.service_time
+    return m.LoggedRequest(
+        request_number=request.number,
+        ago=max(0.0, min(now - request.arrived, LONGEST)),
+        size=request.size,
+        request=b64encode(without_sessions(request.data)).decode(),
+        service_time=None if took is None else max(0.0, min(took, LONGEST)),
+        code=None if reply is None else reply.code,
+        text=None if reply is None else reply.text or None,
+    )
+
+
+def without_sessions(data: bytes) -> bytes:
+    """Return a message whose sessions end in zeros in place of their random half."""
+    return _SESSION.sub(lambda found: found[1] + _public_half(found[2]), data)
+
+
+def _public_half(session: bytes) -> bytes:
+    if session.isdigit() and len(session) <= MOST_DIGITS:
+        return str(int(session) >> LOW_BITS << LOW_BITS).encode()
+    return _DIGIT.sub(b"0", session)  # as wrong as it was
