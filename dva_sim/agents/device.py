@@ -72,6 +72,8 @@ class AgentDevice:
         withdrawn: True if it publishes nothing and lets its registration lapse, so that the DVA
             counts it as silent and sends nobody to it; it still replies.
         meanwhile: Description of what it does while the DVA is silent.
+        other_id: Description of how to give it another id, if its own is in use.
+        dva_address: Address at which it looks for the DVA; empty where that is no matter.
         dva_watch: Watch on the DVA's heartbeats.
     """
 
@@ -91,6 +93,8 @@ class AgentDevice:
     silent: bool = False
     withdrawn: bool = False
     meanwhile: str = ""
+    other_id: str = ""
+    dva_address: str = ""
     dva_watch: DvaWatch = field(default_factory=DvaWatch)
     clock: Clock = field(init=False)
     outbox: Outbox = field(init=False)
@@ -186,9 +190,10 @@ class AgentDevice:
                 then()
                 self.clock.call_after(RENEW_PERIOD, self._register, do_nothing, life)
                 return
-            if reply.text != self._refusal:  # report a repeated refusal once
-                self.tell(f"is not registered: {reply.text}", "link")
-            self._refusal = reply.text
+            refusal = self.why_refused(reply)
+            if refusal != self._refusal:  # report a repeated refusal once
+                self.tell(f"is not registered: {refusal}", "link")
+            self._refusal = refusal
             failed()
 
         def failed() -> None:
@@ -198,6 +203,11 @@ class AgentDevice:
             failed()
             return
         self.ask(self.dva, self._registration, answered, failed)
+
+    def why_refused(self, reply: m.Reply) -> str:
+        """Return why it was not registered, and what people can do about it."""
+        advice = self.other_id if reply.code == m.BUSY else ""
+        return f"{reply.text}; {advice}" if advice else reply.text
 
     @property
     def _registration(self) -> m.Registration:
@@ -496,8 +506,8 @@ class AgentDevice:
             return
         if watch.silent:
             self.recorder.counters["the DVA was silent to a device"] += 1
-            meanwhile = self.meanwhile and f"; {self.meanwhile}"
-            self.tell(f"{self.dva_alert}{meanwhile}", "link")
+            meanwhile = self.meanwhile and watch.heard is not None and f"; {self.meanwhile}"
+            self.tell(f"{self.dva_alert}{meanwhile or ''}", "link")
         else:
             self.tell("hears the DVA again", "link")
 
@@ -505,8 +515,12 @@ class AgentDevice:
     def dva_alert(self) -> str:
         """The alert for a person while the DVA is silent; empty while it is there."""
         watch = self.dva_watch
-        silence = f"{watch.silence(self.clock.now):.0f} s"
-        return f"the DVA is silent for {silence}" if watch.silent else ""
+        if not watch.silent:
+            return ""
+        if watch.heard is None:
+            where = self.dva_address and f" at {self.dva_address}"
+            return f"no DVA has answered{where} yet: it was never registered"
+        return f"the DVA is silent for {watch.silence(self.clock.now):.0f} s"
 
     def _bad_message(self, error: ProtocolError) -> bytes:
         body = m.Reply(0, error.code, error.reason[:256])

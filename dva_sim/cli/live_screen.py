@@ -225,7 +225,12 @@ def run_one(part: str, options: LiveOptions) -> None:
             if console.is_terminal:
                 screen.update(board.table())
 
-        found = run_part(part, options, say, options.number)
+        beside = None
+        if options.serves_page:
+            from dva_sim.console.attached.beside import PageBeside  # late: start-up
+
+            beside = PageBeside(options, partial(_print, screen.console))
+        found = run_part(part, options, say, options.number, beside=beside)
     console.print(board.table())
     _print_rules(console, found)
     refuse_unheld(found)

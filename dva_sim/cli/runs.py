@@ -91,7 +91,7 @@ def live(options: LiveOptions, quiet: Quiet = False, verbose: Verbose = False) -
         dva-sim live drive-to-event --operators scripted  # fixed commands, an emergency
         dva-sim live drive-to-event --record run.mcap  # for `dva-sim replay` and `check`
         dva-sim live drive-to-event --link delay_s=0.2 --link loss=0.02  # over a bad link
-        dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600  # one part here
+        dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600  # a DVA and its page
     """
     from dva_sim.cli import exposure, live_screen  # late: start-up
     from dva_sim.network.addresses import problem_of  # late: start-up
@@ -108,6 +108,8 @@ def live(options: LiveOptions, quiet: Quiet = False, verbose: Verbose = False) -
         exposure.warn_of_pictures([options.host])
     if options.rosbridge is not None:
         exposure.warn_of_clients([options.host], has_token=not options.no_token)
+    if options.serves_page:
+        exposure.warn_of_pages([options.host], has_token=not options.no_token)
     with loudness(quiet, verbose):
         if only is None:
             live_screen.run_all(options)

@@ -97,6 +97,10 @@ class Rate:
 class DvaPart:
     """The DVA core.
 
+    Attributes:
+        agent: The DVA.
+        aside: Devices beside it, which are no company: nobody waits for them.
+
     Raises:
         ConfigError: the file for its memory cannot be used.
     """
@@ -110,25 +114,26 @@ class DvaPart:
         memory = None
         if options.state is not None:
             memory = Store(options.state)
-        self._agent = add_dva(stage, permissions, memory, keep_events=False)
-        self._agent.core.registry.most = devices_that_fit()
-        self._agent.stopwatch = time.perf_counter
+        self.agent = add_dva(stage, permissions, memory, keep_events=False)
+        self.agent.core.registry.most = devices_that_fit()
+        self.agent.stopwatch = time.perf_counter
         trace = _trace_of("dva", stage, options)
         if trace is not None:
-            self._agent.core = traced(self._agent.core, trace, stage, memory)
+            self.agent.core = traced(self.agent.core, trace, stage, memory)
         if isinstance(stage.recorder, LiveRecorder):
             self._observe(stage.recorder, stage)
-        self._agent.start()
+        self.agent.start()
         self._dispatcher = add_dispatcher(stage)
         self._stage = stage
-        events = self._agent.core.events
+        events = self.agent.core.events
         self._scripted = options.operators == "scripted"  # who follows a script settles no event
         self._settled_before = 0 if events.open else events.total
         self._beats: dict[str, Rate] = {}
+        self.aside: set[str] = set()
 
     def _observe(self, recorder: LiveRecorder, stage: Stage) -> None:
         """Let the recorder have what is decided, and what the book shows, twice a second."""
-        agent = self._agent
+        agent = self.agent
         clock = stage.clock
         agent.on_fact = lambda fact: recorder.put("fact", fact.row())
         page = partial(page_of, agent)
@@ -143,20 +148,20 @@ class DvaPart:
 
     def rows(self) -> list[Row]:
         """See `LivePart`: what the first so many told the DVA, who is there before who is not."""
-        known = self._agent.core.registry.entries
+        known = self.agent.core.registry.entries
         first = islice(sorted(known, key=lambda i: known[i].silent), MOST_ROWS)
         self._beats = {i: self._beats.get(i) or Rate() for i in first}
         return [self._row(i, known[i], rate) for i, rate in self._beats.items()]
 
     def _row(self, id_tag: str, entry: DeviceEntry, beats: Rate) -> Row:
         now = self._stage.clock.now
-        engaged = self._agent.core.orders.engaged
+        engaged = self.agent.core.orders.engaged
         return {
             "label": entry.device.label,
             "type": entry.device.device_type,
             "address": entry.device.address,
             "heard_s": now - entry.last_heard,
-            "beats_hz": beats.of(self._agent.beats[id_tag], now),
+            "beats_hz": beats.of(self.agent.beats[id_tag], now),
             "silent": entry.silent,
             "order": next((event.number for event in engaged.all(id_tag)), None),
         }
@@ -167,21 +172,21 @@ class DvaPart:
 
     def settled(self) -> bool:
         """Implement `LivePart`."""
-        events = self._agent.core.events
+        events = self.agent.core.events
         return self._scripted or (events.total > self._settled_before and not events.open)
 
     def _events(self) -> list[Event]:
         """The last that were closed, and all that are open."""
-        events = self._agent.core.events
+        events = self.agent.core.events
         return [*events.closed.values(), *events.open.values()]
 
     def has_company(self) -> bool:
         """See `LivePart`: some device has registered."""
-        return bool(self._agent.core.registry.entries)
+        return not self.agent.core.registry.entries.keys() <= self.aside
 
     def finish(self) -> None:
         """See `LivePart`: nobody drives any longer by our permission."""
-        self._agent.close()
+        self.agent.close()
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from dva_sim.agents.observation import OVER_ZMQ, Cameras, topic_in
 from dva_sim.cameras.screens import topic_of
 from dva_sim.cameras.service import CameraService
+from dva_sim.core.roles import ControlRoomRole
 from dva_sim.kernel.errors import DvaSimError, RunsFailed
 from dva_sim.live.options import CAMERA_PORT, scenario_of
 from dva_sim.live.parts import DvaPart, LivePart, WorldPart, make_part
@@ -26,12 +27,50 @@ from dva_sim.options.runs import LiveOptions
 from dva_sim.serving.open_port import OpenPort
 from dva_sim.serving.pipes import PipeEnd
 from dva_sim.serving.signals import caught_signals
+from dva_sim.simulation.full.dva_server import DvaAgent
 from dva_sim.simulation.full.stage import DVA, Stage, id_of, team_of
 from dva_sim.simulation.full.verdicts import Verdict
 
 REPORT_PERIOD = 1.0  # [s]
 LAST_WORDS = 0.5  # between the end and closing the sockets [s]
 PATIENCE = 30.0  # of a part that is alone, with a DVA that does not answer [s]
+
+
+@dataclass(frozen=True)
+class ServedDva:
+    """A DVA that this process runs, for what is beside it.
+
+    Attributes:
+        agent: The DVA.
+        network: Network that it takes part in.
+        aside: Devices that are no company for it; see `DvaPart`.
+        tell: Adds a line to the timeline.
+    """
+
+    agent: DvaAgent
+    network: SocketNetwork
+    aside: set[str]
+    tell: Callable[[str], object]
+
+    @property
+    def address(self) -> str:
+        """Address at which it listens."""
+        return str(self.network.address(DVA))
+
+    def appoint(self, room: str, role: ControlRoomRole) -> None:
+        """Give the control room beside it a role."""
+        self.aside.add(room)
+        self.agent.core.roles.appoint(room, role)
+
+
+class Beside(Protocol):
+    """Something that runs beside a DVA."""
+
+    def begin(self, dva: ServedDva) -> None:
+        """Begin once the DVA listens."""
+
+    def end(self) -> None:
+        """End."""
 
 
 class NobodyThere(RunsFailed):
@@ -76,6 +115,7 @@ def run_part(
     supervised: bool = False,
     outlet: int | None = None,
     door: OpenPort | None = None,
+    beside: Beside | None = None,
 ) -> list[Verdict]:
     """Be one part until the end of the run, Ctrl-C, SIGTERM, SIGHUP, or the end of standard input.
 
@@ -92,6 +132,7 @@ def run_part(
         outlet: Number of the open file that takes what is recorded, and judged. None: this part
             does both alone.
         door: Port for clients of other makes, if this part serves them.
+        beside: What runs beside a DVA.
 
     Returns:
         How the safety rules have fared, as far as this part can tell; none with an outlet.
@@ -114,6 +155,7 @@ def run_part(
             supervised=supervised,
             out=out,
             door=door,
+            beside=beside,
         )
     finally:
         out.close()
@@ -132,6 +174,7 @@ def _run_part(
     supervised: bool,
     out: PipeEnd,
     door: OpenPort | None,
+    beside: Beside | None,
 ) -> None:
     scenario = scenario_of(options)
     ring = None if options.keys is None else KeyRing(options.keys)
@@ -169,9 +212,14 @@ def _run_part(
         if options.dva is not None and name != "dva":
             network.introduce(DVA, options.dva)
         part = make_part(name, stage, options, number, door)
+        for device in stage.devices:
+            device.dva_address = options.dva or ""
         recorder.here(d.id_tag for d in stage.devices if recorder.is_own(d.id_tag))
         if service is not None and isinstance(part, WorldPart):
             part.film(service)
+        if beside is not None and isinstance(part, DvaPart):
+            at_end.callback(beside.end)
+            beside.begin(ServedDva(part.agent, network, part.aside, tell))
         gc.freeze()  # what stays for the whole run is not looked through again and again
         reporter = _Reporter(name, number, stage, part, network)
         clock.every(REPORT_PERIOD, lambda: say(reporter.report()))

@@ -29,6 +29,7 @@ from dva_sim.simulation.scenario import Scenario
 from dva_sim.simulation.scenario.lone_robot import lone_robot
 
 MOST_WAITING: Final = 1000  # lines; what is more is not told
+OTHER_NUMBER: Final = "--number gives the robot another id"
 LAST_LINES: Final = 0.5  # for what waits when all is over [s]
 
 
@@ -107,6 +108,8 @@ def run_ros_robot(options: RobotOptions, say: Say) -> None:
             pictures.serve(robot.agent.device.label)
             robot.on_picture = pictures.show
         network.introduce(DVA, options.dva)
+        robot.agent.device.dva_address = options.dva
+        robot.agent.device.other_id = OTHER_NUMBER
         writer(f"Robot: {robot.agent.device.address}")
         clock.every(TELL_PERIOD, lambda: _say_news(recorder, writer))
         robot.begin()

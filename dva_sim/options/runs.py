@@ -157,10 +157,15 @@ class LiveOptions:
     link: Annotated[
         tuple[str, ...], OptionForm(_LINK, metavar="KEY=VALUE|FILE", is_repeated=True)
     ] = ()
+    page: Annotated[
+        int | None,
+        port_form("With --only dva: port of its page; default: 8765, or any that is free. 0: any."),
+    ] = None
+    no_page: Annotated[bool, OptionForm("With --only dva: serve no page.")] = False
     rosbridge: Rosbridge = None
     foxglove: Foxglove = None
     no_token: Annotated[
-        bool, OptionForm("Let any client use --rosbridge and --foxglove without a token.")
+        bool, OptionForm("Disable the access token of the page, --rosbridge and --foxglove.")
     ] = False
     seed: RunSeed = 1
     set: Changes = ()
@@ -168,6 +173,11 @@ class LiveOptions:
         bool,
         OptionForm(also="True if parts write all lines even without a recording, for viewers."),
     ] = False
+
+    @property
+    def serves_page(self) -> bool:
+        """True if a page is served: beside a DVA that runs alone."""
+        return self.only == "dva" and not self.no_page
 
     @property
     def shows_pictures(self) -> bool:

@@ -275,7 +275,7 @@ def test_parts_may_start_before_the_dva(programs, address):
     operator = programs.start(*SCRIPTED, "--only", "operator", *at)
     world = programs.start(*SCRIPTED, "--only", "world", *at)
     world.wait_to_say("breaks out")  # both have found nobody so far
-    programs.start(*SCRIPTED, "--only", "dva", *at)
+    programs.start(*SCRIPTED, "--only", "dva", "--no-page", *at)
     world.wait_to_say("mode Teleoperation", "mode Idle")
     assert (operator.process.poll(), world.process.poll()) == (None, None)
 
@@ -292,7 +292,7 @@ def sessions_of_drives(trace: Path) -> set[int | None]:
 def test_devices_register_again_at_a_dva_that_was_killed_and_is_back(programs, address, tmp_path):
     """The world is the same all the time; only a DVA that knows the robot can permit to drive."""
     at = ("--dva", address, "--set", "request.timeout_s=1")
-    dva = programs.start(*SCRIPTED, "--only", "dva", *at)
+    dva = programs.start(*SCRIPTED, "--only", "dva", "--no-page", *at)
     world = programs.start(*SCRIPTED, "--only", "world", *at, "--record", "traces")
     operator = programs.start(*SCRIPTED, "--only", "operator", *at)
     world.wait_to_say("mode Teleoperation")
@@ -312,7 +312,7 @@ def test_a_dva_that_was_killed_remembers_its_events_and_goes_on_with_them(
 ):
     """The fire is reported once, to the first DVA; the second hears that it is confirmed."""
     live = ("live", "drive-to-event", *NEAR, "--dva", address)
-    keeps = ("--only", "dva", "--state", "dva.sqlite")
+    keeps = ("--only", "dva", "--no-page", "--state", "dva.sqlite")
     dva = programs.start(*live, *keeps, "--record", "first")
     world = programs.start(*live, "--only", "world")
     programs.start(*live, "--only", "operator")

@@ -36,7 +36,8 @@ def address(program, name):
 
 def test_a_robot_of_ros_is_driven_by_a_script_at_a_dva_and_stands_in_the_end(programs, machine):
     where = f"127.0.0.1:{two_free_ports('127.0.0.1')}"
-    dva = programs.start("live", "drive-to-event", "--only", "dva", "--dva", where, "--for", "200")
+    words = ("--dva", where, "--for", "200", "--no-page")
+    dva = programs.start("live", "drive-to-event", "--only", "dva", *words)
     dva.wait_to_say("DVA: ")
     robot = programs.start("robot", "--ros", machine.url, "--dva", where)
     robot.wait_to_say("is connected to its bridge", "can be driven again")

@@ -6,8 +6,9 @@ The DVA decides if that is allowed: it alone knows the role of each control room
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, Final
+from typing import Any
 
+from dva_sim.agents.device import do_nothing
 from dva_sim.console.asking.answers import BYE
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import NO_ANSWER, OnResult, Refused, unanswered
@@ -16,6 +17,7 @@ from dva_sim.console.attached.lines import emergency_of
 from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.attached.people import AttachedPeople
 from dva_sim.console.attached.system import AttachedSystem
+from dva_sim.console.bench import NOT_HERE, ServerActions
 from dva_sim.console.events.alarm_actions import AlarmActions
 from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, place_of, report_of
 from dva_sim.console.events.missions import inspection_of, send_on_mission
@@ -54,6 +56,7 @@ class AttachedDecisions:
         if not self._system.answers:
             raise Refused(NO_ANSWER)
         name = line["name"].strip()
+        self._system.let_decide(do_nothing)
         name = self._people.join(client, str(line.get("role", "look")), name)
         on_result(True, f"you are {name}, and may {self._system.role}")
 
@@ -98,7 +101,7 @@ class AttachedDecisions:
             else:
                 self._send(robot, event, on_result)
 
-        Takeover(
+        takeover = Takeover(
             agent=agent,
             robot=robot,
             reason=line["reason"],
@@ -106,7 +109,8 @@ class AttachedDecisions:
             seat=None,
             take=take,
             on_result=on_result,
-        ).begin()
+        )
+        self._system.let_decide(takeover.begin)
 
     def _robot(self, number: Any) -> str:
         """The id of a robot that pages know by a number.
@@ -128,7 +132,7 @@ class AttachedDecisions:
             more = answer_of(reply, lambda device: device in robots()) if ok else {}
             on_result(ok, done if ok else words, **more)
 
-        self._system.agent.ask(body, answered, partial(unanswered, on_result))
+        self._system.decide(body, answered, partial(unanswered, on_result))
 
     def _seen(self, event: int) -> int | None:
         """Return how many decisions on an event are known here."""
@@ -146,9 +150,6 @@ class AttachedDecisions:
         if found is None:
             raise Refused(f"there is no device {label!r}")
         return found
-
-
-NOT_HERE: Final = "this console is attached to a DVA that runs elsewhere: that cannot be done here"
 
 
 class AttachedActions:
@@ -169,7 +170,7 @@ class AttachedActions:
         alarms = AlarmActions(pages.alarms, author, lambda *given: dispatcher.do(*given))
         dispatcher = ActionDispatcher(
             ActionPlace.ATTACHED,
-            holders=(self, decisions, alarms),
+            holders=(self, decisions, alarms, ServerActions(self._system.bench)),
             tell=self._tell,
             elsewhere=NOT_HERE,
             audited=lambda: pages.audited,
@@ -178,7 +179,7 @@ class AttachedActions:
 
     @does("look")
     def _look(self, _: str, line: LogsLooked) -> None:
-        self._pages.looked = "devices" in line["tables"]
+        self._pages.look(line)
 
     @does("watch")
     def _watch(self, _: str, line: RobotsWatched) -> None:
@@ -192,6 +193,7 @@ class AttachedActions:
         """Nothing is in hand; but a page may be gone for good."""
         if str(line["id"]).startswith(BYE):
             self._pages.people.leave(client)
+            self._pages.let_go()
         on_result(True, "released")
 
     @does("emergency")
@@ -234,7 +236,7 @@ class AttachedActions:
         if not robots:
             raise Refused(NOBODY_STOPPED)
         labels = {robot: system.label_of(robot) for robot in robots}
-        release_robots(robots, labels, system.agent.ask, on_result)
+        release_robots(robots, labels, system.decide, on_result)
 
     @does("revoke")
     def _revoke(self, _: str, line: OfDevice, on_result: OnResult) -> None:
@@ -246,7 +248,7 @@ class AttachedActions:
             done = f"the permission for {self._system.label_of(robot)} is revoked"
             on_result(reply.code == m.OK, reply.text or done)
 
-        self._system.agent.ask(m.Revoke(robot), answered, partial(unanswered, on_result))
+        self._system.decide(m.Revoke(robot), answered, partial(unanswered, on_result))
 
     @does("fake_add")
     def _add_fake(self, _: str, line: FakeAsked, on_result: OnResult) -> None:

@@ -41,8 +41,12 @@ class AttachedLinks:
         self.recorder.tell(self.clock.now, "console", text, "link")
 
 
-def over_sockets(options: ConsoleOptions) -> AttachedLinks:
+def over_sockets(options: ConsoleOptions, own: str | None = None) -> AttachedLinks:
     """Open a place by ZeroMQ, with keys if there are any.
+
+    Args:
+        options: Address of the DVA, and keys.
+        own: Id of the console's own device; default: that of a key, or a random one.
 
     Raises:
         ConfigError: keys cannot be read.
@@ -50,7 +54,7 @@ def over_sockets(options: ConsoleOptions) -> AttachedLinks:
     """
     ring = None if options.keys is None else KeyRing(options.keys)
     dva = str(options.dva)
-    own = own_id(ring)
+    own = own or own_id(ring)
     clock = PacedClock()
     recorder = Recorder()
 

@@ -5,7 +5,7 @@ While the DVA does not answer, what it last said stays shown, with a word that s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final
 
 from dva_sim.agents.robot.controller import Mode
@@ -14,6 +14,7 @@ from dva_sim.console.attached import lines
 from dva_sim.console.attached.audit import AttachedAudit
 from dva_sim.console.attached.lines import SILENT_AFTER
 from dva_sim.console.attached.people import AttachedPeople
+from dva_sim.console.attached.requests import LOG, RequestReader
 from dva_sim.console.attached.sensing import WatchedSensors
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import AuditKeeper
@@ -22,14 +23,20 @@ from dva_sim.console.events.decisions import about_event, dispatch_shown
 from dva_sim.console.run.lag import LagRule
 from dva_sim.console.views.feed import story_of
 from dva_sim.console.views.news import News, clock_shown
+from dva_sim.console.wire.arguments import LogsLooked
 from dva_sim.console.wire.events import SiteEventShown
 from dva_sim.console.wire.lines import Tell
-from dva_sim.console.wire.rows import DoingShown, RobotRow, ServerShown
+from dva_sim.console.wire.rows import DoingShown, Hearing, RobotRow, ServerShown
 from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.protocol import messages as m
 
 POSITIONS, ROWS, DEVICES, SOON = 0.2, 0.5, 1.0, 0.1  # from one line to the next, real time [s]
 NEVER_LATE: Final = LagRule()  # nothing runs here that could be
+HEARD: Final[Mapping[Hearing, str]] = {
+    "answers": "answers",
+    "silent": "is silent: what is shown is old",
+    "never": "has not answered since the start",
+}
 FIRST_SCENE: Final = 1.5  # so long a position is waited for, where no site is known [s]
 
 
@@ -45,6 +52,7 @@ class AttachedPages:
         people: People at the pages.
         alarms: Alarms that need action.
         sensors: Sensors that somebody looks at.
+        requests: Reader of the DVA's log of requests.
         audited: Keeps who did what.
     """
 
@@ -57,10 +65,11 @@ class AttachedPages:
         self.looked = False
         self.people = AttachedPeople()
         self.sensors = WatchedSensors(system.device, system.state, system.id_of)
+        self.requests = RequestReader(system.agent, lambda line: self.tell(line))
         self.alarms = ConsoleAlarms(RemoteAlarmFacts(system))
         self.audited = AttachedAudit(audit, system, self.people.author)
         system.on_record = self.audited.heard
-        self._answers = False
+        self._hearing: Hearing = "never"
         self._news = News(lambda: self.tell)
         self._is_shown = False
         system.on_devices = self._tell_scene
@@ -88,6 +97,17 @@ class AttachedPages:
         clock.pulse(SOON, self._tell_news)
         clock.pulse(DEVICES, self._tell_devices)
         clock.pulse(DEVICES, self.sensors.go_on)
+        clock.pulse(SOON, self.requests.go_on)
+
+    def look(self, line: LogsLooked) -> None:
+        """Tell what pages look at now, and nothing else."""
+        self.looked = "devices" in line["tables"]
+        self.requests.is_looked = LOG in line["logs"]
+
+    def let_go(self) -> None:
+        """Let the DVA rely on nobody here if no person has stayed."""
+        if self.system.bench is not None and not self.people.by_client:
+            self.system.bench.let_nobody_decide()
 
     # --- what is told ----------------------------------------------------------------------
 
@@ -99,7 +119,8 @@ class AttachedPages:
             return
         things = lines.things_of(system.state.devices.values(), system.numbers)
         self._is_shown = True
-        self.tell(lines.attached_scene(things, str(system.options.dva), system.site, system.frame))
+        scene = lines.attached_scene(things, system.dva, system.site, system.frame)
+        self.tell(scene if system.bench is None else {**scene, "begins_at": "main"})
 
     def _tell_positions(self) -> None:
         system = self.system
@@ -111,10 +132,6 @@ class AttachedPages:
 
     def _tell_rows(self) -> None:
         system = self.system
-        if system.answers is not self._answers:
-            self._answers = system.answers
-            word = "answers" if self._answers else "does not answer: what is shown is old"
-            system.recorder.tell(self.clock.now, "dva", word, "link")
         self.tell(
             {
                 "k": "rows",
@@ -158,18 +175,29 @@ class AttachedPages:
 
     def _server(self) -> ServerShown:
         system = self.system
-        return {
+        elsewhere: ServerShown = {
             "listens": system.answers,
-            "address": str(system.options.dva),
+            "address": system.dva,
             "port": None,
             "modelled": False,
             "own": False,
+        }
+        server = elsewhere if system.bench is None else system.bench.server()
+        return {
+            **server,
             "role": system.role,
+            "console": system.device.id_tag,
+            "hearing": system.hearing,
+            "log": self.requests.shown,
         }
 
     def _tell_news(self) -> None:
-        """Events, how orders are given, and the story, as soon as they change."""
+        """Whether the DVA is heard, events, how orders are given, and the story, on change."""
         system = self.system
+        if (hearing := system.hearing) != self._hearing:
+            self._hearing = hearing
+            system.recorder.tell(self.clock.now, "dva", HEARD[hearing], "link")
+            self._tell_rows()
         now_ms = self.system.now_ms
         if system.has_all_events:
             self._news.tell({"k": "events", "t": now_ms, "events": self._events()})

@@ -8,6 +8,7 @@ from dva_sim.console.attached.actions import AttachedActions
 from dva_sim.console.attached.links import over_sockets
 from dva_sim.console.attached.options import check
 from dva_sim.console.attached.pages import AttachedPages
+from dva_sim.console.attached.piped_bench import PipedBench
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import auditing
 from dva_sim.console.pages.processes import ConsoleProcesses, Say
@@ -17,12 +18,16 @@ from dva_sim.options.runs import ConsoleOptions
 from dva_sim.serving.processes import ChildFailed
 
 
-def attach(options: ConsoleOptions, say: Say) -> None:
+def attach(
+    options: ConsoleOptions, say: Say, bench: PipedBench | None = None, own: str | None = None
+) -> None:
     """Show what runs at a DVA until Ctrl-C, SIGTERM, SIGHUP, or the end of the web process.
 
     Args:
         options: Addresses of the DVA and of the page.
         say: Prints a line.
+        bench: Bench on which the DVA runs; None: it runs elsewhere.
+        own: Id of the console's own device; default: that of a key, or a random one.
 
     Raises:
         ConfigError: address, keys, site or audit log are not as they should be.
@@ -30,12 +35,12 @@ def attach(options: ConsoleOptions, say: Say) -> None:
         ChildFailed: the web process could not begin, or has ended by itself.
     """
     check(options)
-    system = AttachedSystem(options, over_sockets(options))
+    system = AttachedSystem(options, over_sockets(options, own), bench)
     processes = ConsoleProcesses(options, say)
     about = {"dva": options.dva, "scenario": options.scenario}
     try:
         with auditing(options.audit, system.clock, about, say) as audit:
-            _show(AttachedPages(system, audit), processes, say)
+            _show(AttachedPages(system, audit), processes, say, bench)
     finally:
         processes.end()
         with suppress(DvaSimError):
@@ -44,12 +49,17 @@ def attach(options: ConsoleOptions, say: Say) -> None:
         raise ChildFailed(processes.failed)
 
 
-def _show(pages: AttachedPages, processes: ConsoleProcesses, say: Say) -> None:
+def _show(
+    pages: AttachedPages, processes: ConsoleProcesses, say: Say, bench: PipedBench | None
+) -> None:
     system = pages.system
     with ending_when_asked(system.clock, supervised=False) as ending:
+        if bench is not None:
+            bench.follow(system.clock, system.move)
         path = pages.audited.keeper.path
         processes.start(pages, AttachedActions(pages).take, audit=path)
-        say(f"Attached to: {system.options.dva}")
+        if bench is None:
+            say(f"Attached to: {system.dva}")
         if not ending.is_asked:
             system.clock.go()
             system.clock.run()

@@ -13,8 +13,10 @@ from dva_sim.agents.device import AgentDevice, do_nothing
 from dva_sim.console.attached.links import AttachedLinks
 from dva_sim.console.attached.options import site_shown
 from dva_sim.console.attached.system_state import SystemState
+from dva_sim.console.bench import Bench
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.run.real_links import start_of_day
+from dva_sim.console.wire.rows import Hearing
 from dva_sim.core.registry import CONTROL_ROOM, ROBOT
 from dva_sim.options.runs import ConsoleOptions
 from dva_sim.protocol import messages as m
@@ -23,8 +25,10 @@ from dva_sim.worlds.geo import GeoFrame
 
 TIMEOUT, ATTEMPTS = 1.0, 2  # of what the DVA is asked [s]
 POLL: Final = 2.0  # from one question who is there to the next [s]
-ASK_SENSORS: Final = 10.0  # the same about sensors and cameras [s]
-UNHEARD: Final = 2 * POLL + TIMEOUT * ATTEMPTS  # without a word the DVA counts as gone [s]
+QUIET: Final = 1.0  # without a word, as half-way between two heartbeats, it is asked at once [s]
+UNHEARD: Final = 1.6  # without a word the DVA counts as silent; on slow links later [s]
+LOOK: Final = 0.1  # from one look whether it is time to ask to the next [s]
+ASK_SENSORS: Final = 10.0  # between questions about sensors and cameras [s]
 SOMEWHERE: Final = GeoFrame(0.0, 0.0)
 
 
@@ -34,8 +38,10 @@ class AttachedSystem:
     Args:
         options: Address of the DVA, and other options.
         links: Connections to the DVA.
+        bench: Bench on which the DVA runs; None: it runs elsewhere.
 
     Attributes:
+        dva: Address of the DVA.
         clock: Real time.
         recorder: Keeps the story.
         note: Function that notifies people of a failure.
@@ -52,8 +58,12 @@ class AttachedSystem:
         ConfigError: the site cannot be read.
     """
 
-    def __init__(self, options: ConsoleOptions, links: AttachedLinks) -> None:
+    def __init__(
+        self, options: ConsoleOptions, links: AttachedLinks, bench: Bench | None = None
+    ) -> None:
         self.options = options
+        self.bench = bench
+        self.dva = str(options.dva)
         self._links = links
         self.clock = links.clock
         self.recorder = links.recorder
@@ -68,7 +78,9 @@ class AttachedSystem:
         self.state = SystemState(self.device, lambda: self.on_devices())
         self.fakes = FakeDevices(self._make, self._is_known, _identity, self._drop)
         self.has_all_events = False
-        self._heard = -UNHEARD
+        self._asked = -POLL
+        self._is_asking = self._was_silent = False
+        self._round_trip = 0.0  # of the latest question who is there [s]
 
     def start(self) -> None:
         """Take part, and ask again and again."""
@@ -76,7 +88,7 @@ class AttachedSystem:
         self.agent.on_record = self._note_record
         self.agent.start()
         clock = self.clock
-        clock.every(POLL, self._ask_who, start=clock.now + 0.05)
+        clock.every(LOOK, self._look, start=clock.now + 0.05)
         clock.every(ASK_SENSORS, self._ask_sensors, start=clock.now + POLL)
 
     def close(self) -> None:
@@ -87,26 +99,77 @@ class AttachedSystem:
     # --- what is asked ---------------------------------------------------------------------
 
     @property
+    def hearing(self) -> Hearing:
+        """Whether the DVA answers, is silent, or was never heard since the start."""
+        if (heard := self.device.dva_watch.heard) is None:
+            return "never"
+        is_there = self.clock.now - heard < UNHEARD + self._round_trip
+        return "answers" if is_there else "silent"
+
+    @property
     def answers(self) -> bool:
         """True if the DVA has been heard recently."""
-        return self.clock.now - self._heard < UNHEARD
+        return self.hearing == "answers"
 
     @property
     def role(self) -> str:
-        """Role that the DVA grants this console: `look`, `drive`, `dispatch` or `supervise`."""
+        """Role that the DVA grants this console: `look`, `drive`, `dispatch` or `supervise`.
+
+        On a bench, any: the DVA is told as soon as somebody decides.
+        """
+        if self.bench is not None:
+            return "supervise"
         dispatch = self.agent.dispatch
         return (dispatch.role if dispatch is not None else None) or "look"
 
+    def decide(
+        self,
+        body: m.Body,
+        then: Callable[[m.Reply], object] = do_nothing,
+        failed: Callable[[], object] = do_nothing,
+    ) -> None:
+        """Ask the DVA for what a person here has decided."""
+        self.let_decide(lambda: self.agent.ask(body, then, failed))
+
+    def let_decide(self, then: Callable[[], object]) -> None:
+        """Call `then` once the DVA takes this console for one where people decide."""
+        if self.bench is None:
+            then()
+        else:
+            self.bench.let_decide(then)
+
+    def move(self, address: str) -> None:
+        """The DVA listens elsewhere."""
+        self.dva = address
+        self.device.introduce(DVA, address)
+        self.on_devices()
+
+    def _look(self) -> None:
+        """Ask who is there every 2 s, and as soon as the DVA has been quiet for a while."""
+        self._was_silent |= not self.answers
+        now = self.clock.now
+        heard = self.device.dva_watch.heard or 0.0
+        is_due = now - self._asked >= POLL or now - max(heard, self._asked) >= QUIET
+        if is_due and not self._is_asking:
+            self._ask_who()
+
     def _ask_who(self) -> None:
+        asked = self._asked = self.clock.now
+        self._is_asking = True
+
         def answered(reply: m.Reply) -> None:
-            was_gone = not self.answers
-            self._heard = self.clock.now
-            if reply.code == m.NOT_REGISTERED or (was_gone and self.has_all_events):
+            self._is_asking = False
+            self._round_trip = min(self.clock.now - asked, TIMEOUT)
+            if reply.code == m.NOT_REGISTERED or (self._was_silent and self.has_all_events):
                 self._ask_again()  # it may know nothing of an earlier life
+            self._was_silent = False
             if isinstance(reply.content, m.DeviceList):
                 self.state.list(reply.content.devices)
 
-        self.agent.ask(m.GetDeviceList(), answered)
+        def failed() -> None:
+            self._is_asking = False
+
+        self.agent.ask(m.GetDeviceList(), answered, failed)
 
     def _ask_again(self) -> None:
         """Nothing of what was told of events counts until the DVA has told all there are."""

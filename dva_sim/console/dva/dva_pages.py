@@ -3,104 +3,84 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from typing import Any, cast
+from typing import cast
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import OnResult, Refused
+from dva_sim.console.bench import ServerActions
 from dva_sim.console.dva.device_rows import DeviceRows
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.run.real_links import ConsoleSockets
-from dva_sim.console.wire.actions import Asked
-from dva_sim.console.wire.arguments import FakeAsked, OfDevice, PortAsked
+from dva_sim.console.wire.arguments import FakeAsked, OfDevice
 from dva_sim.console.wire.rows import DevicesLine, ServerShown
-from dva_sim.kernel.recorder import Recorder
+from dva_sim.live.dva_port import DvaPort
 from dva_sim.network.real_network import NetworkError
-from dva_sim.network.sockets import split_address
 from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA, address_of, id_of
 
 
-class DvaPort:
-    """Port of a run's DVA, which can be opened and closed.
-
-    On real links the port is closed and opened; on modelled ones no port ever opens: the DVA takes
-    part in the modelled network, or does not.
+class RunBench:
+    """Bench of a run in this process; see `Bench`.
 
     Args:
-        recorder: Recorder of the run, which notes opening and closing.
-        address: Address of the DVA, real or displayed.
+        run: The run.
+        address: Address of its DVA, real or displayed.
         sockets: Sockets of the messages, if the links are real.
+        moved: Called when the DVA listens elsewhere.
 
     Attributes:
-        address: Current or future address.
-        listens: True while it listens.
+        port: Port of the DVA.
     """
 
     def __init__(
-        self, run: Run, recorder: Recorder, address: str, sockets: ConsoleSockets | None
+        self,
+        run: Run,
+        address: str,
+        sockets: ConsoleSockets | None,
+        moved: Callable[[str], object],
     ) -> None:
-        self._run = run
-        self._recorder = recorder
-        self._sockets = sockets
-        self.address = address
-        self.listens = True
+        network = cast(VirtualNetwork, run.network) if sockets is None else sockets.network
+        self.port = DvaPort(lambda: run.dva, network, address)
+        self._is_modelled = sockets is None
+        self._moved = moved
 
-    def line(self) -> ServerShown:
-        """Return its state for a page."""
+    def server(self) -> ServerShown:
+        """Implement `Bench`."""
         return {
-            "listens": self.listens,
-            "address": self.address,
-            "port": split_address(self.address)[1],
-            "modelled": self._sockets is None,
+            "listens": self.port.listens,
+            "address": self.port.address,
+            "port": self.port.number,
+            "modelled": self._is_modelled,
         }
 
-    def stop(self) -> None:
-        """Take no more requests and say nothing; the devices find out by their time-outs.
+    def start_server(self, port: int, on_result: OnResult) -> None:
+        """Implement `Bench`."""
+        try:
+            self.port.open(port)
+        except NetworkError as error:
+            raise Refused(str(error)) from None
+        self._moved(self.port.address)
+        on_result(True, f"the server listens on {self.port.address}")
 
-        Raises:
-            Refused: it does not listen.
-        """
-        if not self.listens:
-            raise Refused("The server is already stopped.")
-        self._network.leave(DVA)
-        self._run.dva.silence(True)
-        self.listens = False
-        self._tell(f"listens on port {split_address(self.address)[1]} no more")
+    def stop_server(self, on_result: OnResult) -> None:
+        """Implement `Bench`."""
+        try:
+            self.port.close()
+        except NetworkError as error:
+            raise Refused(str(error)) from None
+        on_result(True, "the server is stopped")
 
-    def start(self, port: int) -> None:
-        """Take requests on a port.
+    def let_decide(self, then: Callable[[], object]) -> None:
+        """See `Bench`: each person has a control room with a role of its own."""
+        then()
 
-        Raises:
-            Refused: it listens already, or the port cannot be had.
-        """
-        if self.listens:
-            raise Refused(f"The server is already listening on {self.address}.")
-        host = split_address(self.address)[0]
-        if self._sockets is None:
-            self._network.come_back(DVA)
-            self.address = f"{host}:{port}"
-        else:
-            try:
-                self.address = self._sockets.network.join(DVA, host, port)
-            except NetworkError as error:
-                raise Refused(str(error)) from None
-        self._run.dva.silence(False)
-        self.listens = True
-        self._tell(f"listens on port {split_address(self.address)[1]}")
-
-    @property
-    def _network(self) -> Any:
-        if self._sockets is not None:
-            return self._sockets.network
-        return cast(VirtualNetwork, self._run.network)
-
-    def _tell(self, what: str) -> None:
-        self._recorder.tell(self._run.clock.now, "dva", what, "link")
+    def let_nobody_decide(self) -> None:
+        """See `Bench`: a person who leaves takes the control room along."""
 
 
-class DvaPages:
+class DvaPages(ServerActions):
     """The DVA of a run as people see and serve it.
 
     Args:
@@ -109,7 +89,7 @@ class DvaPages:
         moved: Called when the DVA listens elsewhere.
 
     Attributes:
-        port: Port of the DVA.
+        bench: Bench on which the DVA runs.
         looked: True while somebody looks at the table of devices.
     """
 
@@ -120,10 +100,10 @@ class DvaPages:
         sockets: ConsoleSockets | None,
         moved: Callable[[str], object],
     ) -> None:
+        self.bench = RunBench(run, address, sockets, moved)
+        super().__init__(self.bench)
         self._run = run
         self._is_real = sockets is not None
-        self._moved = moved
-        self.port = DvaPort(run, run.recorder, address, sockets)
         self.looked = False
         self._rows = DeviceRows(run)
         entries = run.dva.core.registry.entries
@@ -142,17 +122,6 @@ class DvaPages:
             return None
         rows = self._rows.rows(self._fakes.devices)
         return {"k": "devices", "t": now_ms, "devices": rows}
-
-    @does("server_start")
-    def _start(self, _: str, line: PortAsked, on_result: OnResult) -> None:
-        self.port.start(line["port"])
-        self._moved(self.port.address)
-        on_result(True, f"the server listens on {self.port.address}")
-
-    @does("server_stop")
-    def _stop(self, _: str, __: Asked, on_result: OnResult) -> None:
-        self.port.stop()
-        on_result(True, "the server is stopped")
 
     @does("revoke")
     def _revoke(self, _: str, line: OfDevice, on_result: OnResult) -> None:

@@ -74,6 +74,7 @@ class OwnStation:
         self._asking = True
         self._problem = ""
         self._network.introduce(device.dva, dva)
+        device.dva_address = dva
         device.come_back()
         device.register_once(
             lambda reply: self._answered(reply, then), lambda: self._unanswered(then)
@@ -85,7 +86,8 @@ class OwnStation:
             return
         self._asking = False
         if reply.code != m.OK:
-            self._fail(f"{self.dva}: {m.CODE_NAMES.get(reply.code, reply.code)}: {reply.text}")
+            why = self._robot.device.why_refused(reply)
+            self._fail(f"{self.dva}: {m.CODE_NAMES.get(reply.code, reply.code)}: {why}")
             then(False, self._problem)
             return
         self.state = REGISTERED

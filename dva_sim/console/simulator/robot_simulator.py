@@ -22,6 +22,7 @@ from dva_sim.console.wire.arguments import (
 )
 from dva_sim.console.wire.seats import DoneLine
 from dva_sim.live.process import ending_when_asked
+from dva_sim.live.ros_robot import OTHER_NUMBER
 from dva_sim.network.addresses import check_address
 from dva_sim.network.keys import KeyRing
 from dva_sim.options.runs import RobotOptions
@@ -172,6 +173,7 @@ class RobotSimulator:
             host=host,
             port=options.listen,
         )
+        world.robot.device.other_id = OTHER_NUMBER
         try:
             self._run(world)
         finally:

@@ -87,7 +87,7 @@ class MessageLog:
 
 
 def _line_of(exchange: Exchange) -> list[Any]:
-    """Number, time [ms], request, reply, service time [us], published; bytes as latin-1."""
+    """Describe an exchange; see `ExchangesLine`."""
     reply = exchange.reply
     took = exchange.service_s
     return [

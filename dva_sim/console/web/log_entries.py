@@ -39,6 +39,7 @@ class Entry:
         label: Label of a device that registers.
         code: Code of the reply; None without one.
         text: Text of the reply.
+        sent: Size of the request [B]; greater than that of `data` if the rest is not known.
     """
 
     number: int
@@ -53,13 +54,16 @@ class Entry:
     label: str = ""
     code: int | None = None
     text: str = ""
+    sent: int = 0
 
     @classmethod
     def of(cls, line: list[Any]) -> Entry:
-        """Build an entry from an exchange; see `dva_sim.console.views.logs`."""
-        number, time, data, reply, took, published = line
+        """Build an entry from an exchange; see `ExchangesLine`."""
+        number, time, data, reply, took, published, *known = line
         answer = None if reply is None else str(reply).encode("latin-1")
-        entry = cls(number, time, str(data).encode("latin-1"), answer, took, bool(published))
+        request = str(data).encode("latin-1")
+        entry = cls(number, time, request, answer, took, bool(published))
+        entry.code, entry.text, entry.sent = known or (None, "", len(request))
         entry._read()
         return entry
 
@@ -67,6 +71,11 @@ class Entry:
     def size(self) -> int:
         """So many bytes it keeps."""
         return len(self.data) + len(self.reply or b"")
+
+    @property
+    def is_cut(self) -> bool:
+        """Return True if only the first bytes of the request are known."""
+        return self.sent > len(self.data)
 
     def _read(self) -> None:
         self.header = header_of(self.data)
@@ -76,7 +85,7 @@ class Entry:
             self.label = visible(body.label) if isinstance(body, m.Registration) else ""
         except ProtocolError as error:
             self.kind = kind_of(self.data)
-            self.payload = error.reason[:_SHOWN]
+            self.payload = f"{self.sent} bytes" if self.is_cut else error.reason[:_SHOWN]
         if self.reply is not None:
             try:
                 answer = decode(self.reply).body

@@ -16,7 +16,7 @@ from starlette.responses import JSONResponse, Response
 
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.log_entries import Entry
-from dva_sim.console.web.logs import AT_ONCE, KEPT, KeptLog, LogFilter, Looks
+from dva_sim.console.web.logs import AT_ONCE, KEPT, WORDS, KeptLog, LogFilter, Looks
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, problem
 from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.console.wire.roles import Role
@@ -95,7 +95,7 @@ def _given(request: Request) -> dict[str, Any]:
     """A filter out of the address."""
     asked = request.query_params
     given: dict[str, Any] = {
-        key: asked[key] for key in ("device", "kind", "code", "text") if key in asked
+        key: asked[key] for key in WORDS if key in asked
     }
     since = asked.get("since", "0")
     given["since"] = int(since) if since.isascii() and since.isdigit() else since
@@ -111,7 +111,7 @@ def whole(entry: Entry) -> dict[str, Any]:
         "kind": entry.kind,
         "header": entry.header,
         "request": request,
-        "problems": problems,
+        "problems": [] if entry.is_cut else problems,
         "reply": None if entry.reply is None else laid_out(entry.reply)[0],
         "code": entry.code,
         "word": m.CODE_NAMES.get(entry.code, "") if entry.code is not None else "",
@@ -119,6 +119,7 @@ def whole(entry: Entry) -> dict[str, Any]:
         "service_us": entry.service_us,
         "published": entry.published,
         "bytes": len(entry.data),
+        "sent": entry.sent,
     }
 
 
@@ -174,7 +175,8 @@ def archive(entries: Iterable[Entry], names: dict[str, str]) -> bytes:
             name = f"{entry.number:06}-{entry.kind.replace('?', 'unknown')}"
             for part, data in (("request", entry.data), ("reply", entry.reply)):
                 if data is not None:
-                    folder = "refused" if check_message(data) else "messages"
+                    is_whole = data is not entry.data or not entry.is_cut
+                    folder = "messages" if is_whole and not check_message(data) else "refused"
                     files.writestr(f"{folder}/{name}-{part}.xml", data)
         files.writestr("log.csv", table.getvalue())
     return made.getvalue()

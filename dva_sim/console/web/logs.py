@@ -31,6 +31,7 @@ Line = dict[str, Any]
 KEPT: Final = 10_000  # exchanges of a log
 KEPT_BYTES: Final = 32 << 20  # of them
 AT_ONCE: Final = 200  # entries told to a page
+WORDS: Final = ("device", "kind", "code", "text", "without")  # of a filter
 TABLES: Final = ("devices",)
 MOST_LOGS: Final = 8  # that a page looks at
 MOST_KNOWN: Final = 256  # logs of which anything is kept
@@ -46,6 +47,7 @@ class LogFilter:
         kind: Kind of message.
         code: Code of the reply, `none` for those without, or `refused` for all but OK.
         text: Text that occurs in a message or its reply.
+        without: Id of a device whose messages are left out.
         publications: True to include publications.
         since: Only entries of a higher number: what came before was cleared.
     """
@@ -54,6 +56,7 @@ class LogFilter:
     kind: str = ""
     code: str = ""
     text: str = ""
+    without: str = ""
     publications: bool = False
     since: int = 0
 
@@ -66,7 +69,7 @@ class LogFilter:
         """
         if not isinstance(given, dict):
             raise BadMessage("a log's filter should be an object")
-        words = {key: given.get(key, "") for key in ("device", "kind", "code", "text")}
+        words = {key: given.get(key, "") for key in WORDS}
         for key, value in words.items():
             if not isinstance(value, str) or len(value) > 200:
                 raise BadMessage(f"{key} should be a text of at most 200 characters")
@@ -81,6 +84,8 @@ class LogFilter:
         if entry.number <= self.since or (entry.published and not self.publications):
             return False
         if self.kind and entry.kind != self.kind:
+            return False
+        if self.without and entry.header.get("SourceID") == self.without:
             return False
         return self._is_of_device(entry, names) and self._has_code(entry) and self._says(entry)
 

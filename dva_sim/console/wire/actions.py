@@ -268,8 +268,8 @@ _LIST = (
     ),
     Action("guard_report", "reports an event", ReportAsked, over_link=True),
     # --- the DVA's server and devices
-    Action("server_start", "starts the DVA's server", PortAsked, role=Role.DRIVE),
-    Action("server_stop", "stops the DVA's server", role=Role.DRIVE),
+    Action("server_start", "starts the DVA's server", PortAsked, at=_RUN, role=Role.DRIVE),
+    Action("server_stop", "stops the DVA's server", at=_RUN, role=Role.DRIVE),
     Action("revoke", "ends the permission for a robot", OfDevice, at=_RUN, role=Role.SUPERVISE),
     Action(
         "fake_add",

@@ -6,7 +6,12 @@ from typing_extensions import TypedDict
 
 
 class ExchangesLine(TypedDict):
-    """Exchanges of a device, see `shown/logs.py`; the flag says to discard earlier lines."""
+    """Exchanges of a device; the flag says to discard earlier lines.
+
+    Each has a number, time [ms], request, reply, service time [us] and 1 for a publication; bytes
+    as latin-1. Where the reply itself is not known, its code and text follow, and the size of the
+    request [B], of which the first bytes may be known alone.
+    """
 
     k: Literal["log"]
     log: str

@@ -26,8 +26,17 @@ class ClockShown(TypedDict):
     jumps: NotRequired[int]
 
 
+# Whether the DVA shows its log of requests, and whether it is heard.
+LogShown = Literal["unknown", "kept", "not_kept", "not_permitted"]
+Hearing = Literal["answers", "silent", "never"]
+
+
 class ServerShown(TypedDict):
-    """Address of the DVA, and whether it listens; `role`: what it lets this console do."""
+    """Address of the DVA, and whether it listens.
+
+    An attached console adds what it knows by messages: `own` is False if it can neither start nor
+    stop the server, `role` is what the DVA lets it do, and `console` the id of its own device.
+    """
 
     listens: bool
     address: str
@@ -35,6 +44,9 @@ class ServerShown(TypedDict):
     modelled: bool
     own: NotRequired[bool]
     role: NotRequired[str]
+    console: NotRequired[str]
+    hearing: NotRequired[Hearing]
+    log: NotRequired[LogShown]
 
 
 class EmergencyShown(TypedDict):

@@ -178,7 +178,7 @@ class ReplayAbout(TypedDict):
 
 
 class SceneShown(TypedDict):
-    """Scene, which does not change while something is shown."""
+    """Scene, which does not change while something is shown; `begins_at` is the first page."""
 
     scenario: str
     title: str
@@ -196,6 +196,7 @@ class SceneShown(TypedDict):
     link: LinkShown
     attached: NotRequired[bool]
     dva_address: NotRequired[str]
+    begins_at: NotRequired[str]
     pages: NotRequired[list[str]]
     phone: NotRequired[PhoneOffer]
     replay: NotRequired[ReplayAbout]

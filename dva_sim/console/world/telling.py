@@ -133,7 +133,7 @@ class PublishingWorld:
             "clock": clock_shown(self.clock, self.lag),
             "link": self.sliders.line(),
             "dropped": self.dropped(),
-            "server": self.dva.port.line(),
+            "server": self.dva.bench.server(),
             "robots": [
                 *self.feed.robots(self.lag.held),
                 *self.foreign.robots(),

@@ -135,7 +135,7 @@ class Attached:
 
 
 def live(programs: Programs, dva: str, part: str, *words: str) -> Program:
-    more = ("--for", "1000", *words)
+    more = ("--for", "1000", *(("--no-page",) if part == "dva" else ()), *words)
     return programs.start("live", "hands-on", "--only", part, "--dva", dva, *more)
 
 
@@ -168,7 +168,7 @@ def test_it_shows_what_runs_there_and_outlives_the_dva(programs):
     assert console.act("fake_remove", device=id_of("fake", 1))["ok"]
 
     first.process.send_signal(signal.SIGKILL)
-    assert becomes(lambda: any("dva does not answer" in line for line in console.story()))
+    assert becomes(lambda: any("dva is silent" in line for line in console.story()))
     assert robots()  # what was told last stays
     live(programs, dva, "dva")
     assert becomes(lambda: console.story().count("dva answers") == 2)

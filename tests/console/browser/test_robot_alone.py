@@ -24,7 +24,8 @@ CLIENT = ROOT / "protocol" / "clients" / "client.py"
 def a_dva(programs: Programs) -> str:
     """The address of a DVA on its own."""
     address = f"127.0.0.1:{two_free_ports('127.0.0.1')}"
-    programs.start("live", "hands-on", "--only", "dva", "--dva", address, "--for", "600")
+    words = ("--dva", address, "--for", "600", "--no-page")
+    programs.start("live", "hands-on", "--only", "dva", *words)
     return address
 
 

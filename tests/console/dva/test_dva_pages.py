@@ -154,7 +154,7 @@ def test_over_sockets_a_port_that_is_taken_is_told_and_the_server_stays_stopped(
         ok, text = real.do("server_start", port=taken.getsockname()[1])
     assert not ok
     assert "cannot listen" in text
-    assert real.world.dva.port.listens is False
+    assert real.world.dva.bench.port.listens is False
 
 
 # --- fake devices ------------------------------------------------------------------------------

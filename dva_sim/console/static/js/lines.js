@@ -67,12 +67,12 @@
  *   audit: boolean}} ReplayAbout
  */
 /**
- * Scene, which does not change while something is shown.
+ * Scene, which does not change while something is shown; `begins_at` is the first page.
  * @typedef {{scenario: string, title: string, seed: number | null, site: Site, things: Thing[],
  *   patterns: Pattern[], link_limits: Record<string, number[]>, pace_limits: number[],
  *   watchdog_s: number | null, stale_s: number | null, lag_limit_s: number, rules: Record<string,
  *   string>, legend: LegendEntry[], link: Link, attached?: boolean, dva_address?: string,
- *   pages?: string[], phone?: PhoneOffer, replay?: ReplayAbout}} Scene
+ *   begins_at?: string, pages?: string[], phone?: PhoneOffer, replay?: ReplayAbout}} Scene
  */
 /**
  * Something has happened.
@@ -111,9 +111,10 @@
  * @typedef {{i: number, doing: string}} Doing
  */
 /**
- * Address of the DVA, and whether it listens; `role`: what it lets this console do.
+ * Address of the DVA, and whether it listens.
  * @typedef {{listens: boolean, address: string, port: number | null, modelled: boolean,
- *   own?: boolean, role?: string}} Server
+ *   own?: boolean, role?: string, console?: string, hearing?: 'answers' | 'silent' | 'never',
+ *   log?: 'unknown' | 'kept' | 'not_kept' | 'not_permitted'}} Server
  */
 /**
  * States of clock, link, robots and people.

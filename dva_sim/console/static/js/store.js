@@ -71,6 +71,8 @@ export const link = computed(() => rows.value?.link ?? scene.value?.link ?? null
 export const isModelled = computed(() => (link.value?.kind ?? 'modelled') === 'modelled');
 /** True if the console shows a DVA running elsewhere, known only from its messages. */
 export const isAttached = computed(() => Boolean(scene.value?.attached));
+/** True if that DVA is on the bench of the console, which starts and stops its server. */
+export const isBeside = computed(() => isAttached.value && rows.value?.server?.own !== false);
 /** Minimum latency of a command [ms], from the known delay and processing time. */
 export const floorMs = computed(
   () => 1000 * ((link.value?.delay_s ?? 0) + (link.value?.processing_s ?? 0)),

@@ -1,7 +1,7 @@
 /** Details of a request: its header, its XML with errors marked, and the reply. */
 import { html, useEffect, useState } from '../../vendor/preact.js';
 import { mayDrive } from '../store.js';
-import { serviceText, timeText } from './request_table.js';
+import { countText, serviceText, timeText } from './request_table.js';
 
 const HEADER = ['DestinationID', 'MessageID', 'SourceID', 'Timestamp', 'SessionID'];
 
@@ -53,6 +53,7 @@ function Whole({ found }) {
     ${found.problems.map(
       (/** @type {any} */ one) => html`<p class="wrong">Line ${one.line}, column ${one.column}: ${one.text}</p>`,
     )}
+    ${found.sent > found.bytes && html`<p class="soft">The log has the first ${countText(found.bytes)} of ${countText(found.sent)} bytes.</p>`}
     <h3>XML</h3>
     <${Source} text=${found.request} problems=${found.problems} name="XML of the request" />
     <h3>Reply</h3>

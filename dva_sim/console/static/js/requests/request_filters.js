@@ -1,17 +1,17 @@
 /** Filters of the requests by device, kind, reply and text; and actions on the list. */
 import { html } from '../../vendor/preact.js';
-import { mayDrive } from '../store.js';
+import { isAttached, mayDrive } from '../store.js';
 import { Choice, Field, Tick } from '../ui/fields.js';
 
 const CODES = /** @type {[string, string][]} */ ([
   ['', 'all'], ['0', 'ok'], ['refused', 'refused'], ['none', 'no answer'],
 ]);
 
-/** @typedef {{device: string, kind: string, code: string, text: string, publications: boolean,
- *   since: number}} LogFilter */
+/** @typedef {{device: string, kind: string, code: string, text: string, without: string,
+ *   publications: boolean, since: number}} LogFilter */
 
 /** @type {LogFilter} */
-export const ALL = { device: '', kind: '', code: '', text: '', publications: false, since: 0 };
+export const ALL = { device: '', kind: '', code: '', text: '', without: '', publications: false, since: 0 };
 
 /** @param {LogFilter} filter */
 export const isNarrow = (filter) =>
@@ -19,9 +19,9 @@ export const isNarrow = (filter) =>
 
 /**
  * @param {{filter: LogFilter, kinds: string[], onFilter: (more: Partial<LogFilter>) => void,
- *   isPaused: boolean, onPause: () => void, onClear: () => void, exported: string}} props
+ *   isPaused: boolean, onPause: () => void, onClear: () => void, exported: string, own: boolean, onOwn: (own: boolean) => void}} props
  */
-export function RequestFilters({ filter, kinds, onFilter, isPaused, onPause, onClear, exported }) {
+export function RequestFilters({ filter, kinds, own, onOwn, onFilter, isPaused, onPause, onClear, exported }) {
   const options = /** @type {[string, string][]} */ ([
     ['', 'all'], ...[...new Set([...kinds, filter.kind])].filter(Boolean).sort().map((kind) => [kind, kind]),
   ]);
@@ -30,7 +30,9 @@ export function RequestFilters({ filter, kinds, onFilter, isPaused, onPause, onC
     <${Choice} name="Kind" value=${filter.kind} options=${options} onInput=${(/** @type {string} */ kind) => onFilter({ kind })} />
     <${Choice} name="Code" value=${filter.code} options=${CODES} onInput=${(/** @type {string} */ code) => onFilter({ code })} />
     ${mayDrive.value && html`<${Field} name="Search" value=${filter.text} onInput=${(/** @type {string} */ text) => onFilter({ text })} />`}
-    <${Tick} name="Publications" value=${filter.publications} onInput=${(/** @type {boolean} */ publications) => onFilter({ publications })} />
+    ${isAttached.value
+      ? html`<${Tick} name="This console's" value=${own} onInput=${onOwn} />`
+      : html`<${Tick} name="Publications" value=${filter.publications} onInput=${(/** @type {boolean} */ publications) => onFilter({ publications })} />`}
     <div class="buttons">
       <button type="button" aria-pressed=${isPaused} onClick=${onPause}>${isPaused ? 'Resume log' : 'Pause log'}</button>
       <button type="button" onClick=${onClear}>Clear log</button>

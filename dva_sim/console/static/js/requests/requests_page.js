@@ -13,32 +13,42 @@ const WAIT_MS = 250;
 
 /** @typedef {import('./request_filters.js').LogFilter} LogFilter */
 
+/** Why a DVA's log is not shown, by the state of it. */
+const WITHOUT = /** @type {Record<string, (server: any) => string>} */ ({
+  unknown: () => 'Waiting for the log of the DVA …',
+  not_kept: () => 'This DVA keeps no log for control rooms.',
+  not_permitted: ({ role }) => `This DVA shows its log to control rooms with the role drive. This console has the role ${role}.`,
+});
+
 /** The page. */
 export function RequestsPage() {
-  const [filter, setFilter] = useState(ALL);
+  const [asked, setFilter] = useState(ALL);
+  const [own, showOwn] = useState(false);
+  const server = worldRows.value?.server;
+  const filter = { ...asked, without: own ? '' : (server?.console ?? '') };
   const rows = useLog(LOG, useSettled(filter));
   const [paused, setPaused] = useState(/** @type {any[] | null} */ (null));
   const [older, setOlder] = useState(/** @type {any[]} */ ([]));
   const [chosen, choose] = useState(/** @type {number | null} */ (null));
   const change = (/** @type {Partial<LogFilter>} */ more) => {
-    setFilter({ ...filter, ...more });
+    setFilter({ ...asked, ...more });
     setOlder([]);
     setPaused(null);
   };
   const shown = paused ?? [...older, ...rows.slice(-SHOWN)];
   const newest = rows.filter((row) => !row.gap).at(-1)?.n ?? filter.since;
   const first = shown.find((row) => !row.gap)?.n;
+  const without = WITHOUT[server?.log ?? 'kept']?.(server);
   const more = async () => setOlder([...(await ask(filter, first)), ...older]);
   return html`<main class="page requests-page" id="main" tabindex="-1">
     <h1 class="hidden">Main</h1>
     ${!isPast.value && html`<${ServerBar} />`}
     <section class="panel requests" aria-label="Log">
-      <${RequestFilters} filter=${filter} kinds=${kindsOf(shown)} onFilter=${change}
+      <${RequestFilters} own=${own} onOwn=${(/** @type {boolean} */ show) => (change({}), showOwn(show))} filter=${filter} kinds=${kindsOf(shown)} onFilter=${change}
         isPaused=${paused !== null} onPause=${() => setPaused(paused ? null : shown)}
         onClear=${() => change({ since: newest })} exported=${`/api/logs/${LOG}/export?${query(filter)}`} />
-      ${worldRows.value?.server?.own === false
-        ? html`<p class="soft">This console is a device like others: what the DVA is asked by others, and answers, is
-            unknown here.</p>`
+      ${without
+        ? html`<p class="soft empty">${without}</p>`
         : html`<${RequestTable} rows=${shown} chosen=${chosen} onChoose=${choose}
             older=${shown.length >= SHOWN && !paused && html`<button type="button" class="wide" onClick=${more}>Show older</button>`} />`}
       <${Counts} shown=${shown} paused=${paused} rows=${rows} filter=${filter} />
@@ -56,7 +66,7 @@ function useSettled(filter) {
   useEffect(() => {
     const timer = window.setTimeout(() => setSettled(filter), WAIT_MS);
     return () => window.clearTimeout(timer);
-  }, [filter]);
+  }, [JSON.stringify(filter)]);
   return settled;
 }
 

@@ -12,12 +12,13 @@ export function ServerBar() {
   const [port, setPort] = useState(/** @type {string | null} */ (null));
   if (!server) return null;
   const { listens, modelled } = server;
+  const answers = listens && (server.hearing ?? 'answers') === 'answers';
   const shown = port ?? String(server.port ?? '');
   const wrong = listens || server.port === null ? '' : wrongNumber(shown, 1, MOST_PORT, '');
   const start = () => act('server_start', { port: Number(shown) });
   return html`<section class="panel server" aria-label="Server">
-    <p role="status" aria-label="Server state" class=${listens ? 'state reported' : 'state stopped reported'}>
-      <i class=${listens ? 'lamp on' : 'lamp'} aria-hidden="true"></i>${stateText(server)}</p>
+    <p role="status" aria-label="Server state" class=${answers ? 'state reported' : 'state stopped reported'}>
+      <i class=${answers ? 'lamp on' : 'lamp'} aria-hidden="true"></i>${stateText(server)}</p>
     ${server.own !== false &&
     html`<div class="server-controls">
       <${Field} name="Port" value=${shown} mode="numeric" most=${5} disabled=${listens || !maySteer.value}
@@ -29,8 +30,10 @@ export function ServerBar() {
   </section>`;
 }
 
-/** @param {{listens: boolean, address: string, own?: boolean}} server */
-function stateText({ listens, address, own }) {
-  if (own === false) return listens ? `The DVA at ${address} answers` : `The DVA at ${address} does not answer`;
+/** @param {{listens: boolean, address: string, own?: boolean, hearing?: string}} server */
+function stateText({ listens, address, own, hearing }) {
+  if (hearing === 'never' && (own === false || listens)) return `No DVA at ${address} yet`;
+  if (hearing === 'silent' && (own === false || listens)) return `The DVA at ${address} is silent`;
+  if (own === false) return `The DVA at ${address} answers`;
   return listens ? `Listening on ${address}` : 'Stopped: requests are not answered';
 }

@@ -128,8 +128,18 @@ function Warnings() {
     ${connection.value === 'lost' &&
     html`<p class="warning">The connection to the simulation is lost. What you see is out of date. Robots you were driving
       have been stopped. Retrying …</p>`}
-    ${rows.value?.server?.own === false && !rows.value.server.listens &&
-    html`<p class="warning">The DVA at ${rows.value.server.address} does not answer. What you see is out of date. Retrying …</p>`}
+    <${Silence} server=${rows.value?.server} />
     ${ended && html`<p class="warning">The simulation has ended: ${connection.value}</p>`}
   </div>`;
+}
+
+/** Says of a DVA elsewhere that it does not answer. @param {{server: any}} props */
+function Silence({ server }) {
+  if ((server?.hearing ?? 'answers') === 'answers') return null;
+  const text = server.own !== false && !server.listens
+    ? "The DVA's server is stopped. What you see is out of date. Start it on the page Main."
+    : server.hearing === 'never'
+      ? `No DVA has answered at ${server.address} since this console was started. Retrying …`
+      : `The DVA at ${server.address} is silent. What you see is out of date. Retrying …`;
+  return html`<p class="warning">${text}</p>`;
 }

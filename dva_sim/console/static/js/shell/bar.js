@@ -1,7 +1,7 @@
 /** Top bar: time, link, age of the data, alarms, the person's role, emergency stop. */
 import { html } from '../../vendor/preact.js';
 import {
-  clock, isAttached, isModelled, isPast, link, maySteer, replay, scene, you,
+  clock, isAttached, isBeside, isModelled, isPast, link, maySteer, replay, scene, you,
 } from '../store.js';
 import { act } from '../net/actions.js';
 import { emergencyStop } from '../net/emergency.js';
@@ -34,7 +34,7 @@ function Time() {
   return html`<span class="item time" title="Simulation time and speed">
     <span class="figure reported">${clockText(shownTime())}</span>
     <span class="soft">${paused ? 'paused' : `×${Number(factor.toFixed(1))}`}</span>
-    ${!isPast.value && html`<button type="button" class="plain" disabled=${!maySteer.value || !isModelled.value}
+    ${!isPast.value && !isAttached.value && html`<button type="button" class="plain" disabled=${!maySteer.value || !isModelled.value}
       aria-label=${name} title=${isModelled.value ? name : 'With real sockets the simulation runs in real time'}
       onClick=${() => act('pace', { paused: !paused })}>
       <${Icon} name=${paused ? 'play' : 'pause'} /></button>`}
@@ -57,8 +57,8 @@ function Link() {
   }
   if (!isModelled.value) {
     return html`<span class="item link" role="status" aria-label="Link"
-      title=${isAttached.value ? 'This console shows a remote system and only knows what its messages say.' : 'The console reaches the robots through real sockets, not through a simulated link.'}>
-      ${isAttached.value ? `attached to ${scene.value?.dva_address}` : 'real'}</span>`;
+      title=${isBeside.value ? 'This page runs beside its DVA and only knows what messages say.' : isAttached.value ? 'This console shows a remote system and only knows what its messages say.' : 'The console reaches the robots through real sockets, not through a simulated link.'}>
+      ${isBeside.value ? `DVA ${scene.value?.dva_address}` : isAttached.value ? `attached to ${scene.value?.dva_address}` : 'real'}</span>`;
   }
   const trace = setting?.trace ? `, ${setting.trace}` : '';
   return html`<span class="item link modelled" role="status"

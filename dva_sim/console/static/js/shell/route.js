@@ -38,7 +38,7 @@ function decoded(text) {
   }
 }
 
-export const page = computed(() => (PAGES.includes(parts.value.path) ? parts.value.path : (scene.value?.pages?.[0] ?? 'map')));
+export const page = computed(() => (PAGES.includes(parts.value.path) ? parts.value.path : (scene.value?.begins_at ?? scene.value?.pages?.[0] ?? 'map')));
 
 /** Robots being watched or driven: those in the address, else the first one. */
 export const driven = computed(() => {

@@ -1,0 +1,71 @@
+"""What only a bench can do with the system that it shows; all else goes by the protocol."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from dva_sim.console.asking.dispatcher import does
+from dva_sim.console.asking.refusal import OnResult, Refused
+from dva_sim.console.wire.actions import Asked
+from dva_sim.console.wire.arguments import PortAsked
+from dva_sim.console.wire.rows import ServerShown
+
+
+class Bench(Protocol):
+    """A system whose DVA runs on this bench, so that more can be done than messages can.
+
+    A DVA that runs elsewhere has no bench. A recording can be looked at and cannot act: a bench of
+    one refuses everything.
+    """
+
+    def server(self) -> ServerShown:
+        """Return the address of the DVA's server, and whether it listens."""
+
+    def start_server(self, port: int, on_result: OnResult) -> None:
+        """Let the server listen on a port.
+
+        Raises:
+            Refused: it cannot.
+        """
+
+    def stop_server(self, on_result: OnResult) -> None:
+        """Let the server take no more requests.
+
+        Raises:
+            Refused: it takes none already.
+        """
+
+    def let_decide(self, then: Callable[[], object]) -> None:
+        """Appoint the console to decide, as somebody at a page is about to, and call `then`."""
+
+    def let_nobody_decide(self) -> None:
+        """Let the DVA rely on no person here: nobody is at a page any more."""
+
+
+NOT_HERE = "this console is attached to a DVA that runs elsewhere: that cannot be done here"
+
+
+class ServerActions:
+    """Does what pages ask of the DVA's server.
+
+    Args:
+        bench: Bench on which the DVA runs; None: it runs elsewhere.
+    """
+
+    def __init__(self, bench: Bench | None) -> None:
+        self._bench = bench
+
+    @does("server_start")
+    def _start_server(self, _: str, line: PortAsked, on_result: OnResult) -> None:
+        self._own_bench.start_server(line["port"], on_result)
+
+    @does("server_stop")
+    def _stop_server(self, _: str, __: Asked, on_result: OnResult) -> None:
+        self._own_bench.stop_server(on_result)
+
+    @property
+    def _own_bench(self) -> Bench:
+        if self._bench is None:
+            raise Refused(NOT_HERE)
+        return self._bench
