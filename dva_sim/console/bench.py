@@ -1,4 +1,4 @@
-"""What only a bench can do with the system that it shows; all else goes by the protocol."""
+"""Acts that need a bench, beside all that goes by the protocol."""
 
 from __future__ import annotations
 

@@ -99,7 +99,7 @@ class DvaPart:
 
     Attributes:
         agent: The DVA.
-        aside: Devices beside it, which are no company: nobody waits for them.
+        aside: Devices beside it that do not count as company.
 
     Raises:
         ConfigError: the file for its memory cannot be used.

@@ -43,7 +43,7 @@ class ServedDva:
     Attributes:
         agent: The DVA.
         network: Network that it takes part in.
-        aside: Devices that are no company for it; see `DvaPart`.
+        aside: Devices that do not count as its company; see `DvaPart`.
         tell: Adds a line to the timeline.
     """
 
@@ -132,7 +132,7 @@ def run_part(
         outlet: Number of the open file that takes what is recorded, and judged. None: this part
             does both alone.
         door: Port for clients of other makes, if this part serves them.
-        beside: What runs beside a DVA.
+        beside: Program that runs beside a DVA, such as its page.
 
     Returns:
         How the safety rules have fared, as far as this part can tell; none with an outlet.

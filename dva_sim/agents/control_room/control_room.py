@@ -31,6 +31,7 @@ class ControlRoomAgent:
         on_list: Callback once the DVA has sent all current events.
         on_dispatch: Callback for each change of the dispatch mode.
         on_record: Callback for each decision.
+        on_forgotten: Callback when the DVA does not know this room: it may have lost its memory.
         gives_up: True if it gives up a robot that somebody else asks for.
         on_message: Callback for messages of the DVA to it: a session has ended, an order is over.
     """
@@ -46,6 +47,7 @@ class ControlRoomAgent:
         self.on_list: Callable[[], object] = do_nothing
         self.on_dispatch: Callable[[m.DispatchStatus], object] = do_nothing
         self.on_record: Callable[[m.AuditRecord], object] = do_nothing
+        self.on_forgotten: Callable[[], object] = do_nothing
         self.on_message: Callable[[m.Message], object] = do_nothing
         self.gives_up: Callable[[m.HandoverRequest], bool] = lambda _: False
 
@@ -75,6 +77,8 @@ class ControlRoomAgent:
         """Send something to the DVA; what the answer holds is known before `then` is called."""
 
         def answered(reply: m.Reply) -> None:
+            if reply.code == m.NOT_REGISTERED:
+                self.on_forgotten()
             self._take(reply.content)
             then(reply)
 

@@ -51,7 +51,7 @@ class PageBeside:
         self._close: Callable[[], object] = do_nothing
 
     def begin(self, dva: ServedDva) -> None:
-        """Start the page's process; without a key for it there is no page, which is said."""
+        """Start the page's process; without a key it is not served, and a line says so."""
         keys = self._options.keys
         try:
             own = own_id(None if keys is None else KeyRing(keys))

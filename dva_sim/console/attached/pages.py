@@ -192,7 +192,7 @@ class AttachedPages:
         }
 
     def _tell_news(self) -> None:
-        """Whether the DVA is heard, events, how orders are given, and the story, on change."""
+        """Tell hearing of the DVA, events, the mode of dispatch and the story as they change."""
         system = self.system
         if (hearing := system.hearing) != self._hearing:
             self._hearing = hearing

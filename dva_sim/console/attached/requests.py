@@ -26,7 +26,7 @@ class RequestReader:
 
     Attributes:
         is_looked: True while a page looks at the log.
-        shown: Whether the DVA shows its log.
+        shown: State of the log: unknown, kept by the DVA, not kept, or not permitted.
     """
 
     def __init__(self, agent: ControlRoomAgent, tell: Callable[[ExchangesLine], object]) -> None:

@@ -86,6 +86,7 @@ class AttachedSystem:
         """Take part, and ask again and again."""
         self.agent.on_list = self._note_all_events
         self.agent.on_record = self._note_record
+        self.agent.on_forgotten = self._ask_again
         self.agent.start()
         clock = self.clock
         clock.every(LOOK, self._look, start=clock.now + 0.05)
@@ -100,7 +101,7 @@ class AttachedSystem:
 
     @property
     def hearing(self) -> Hearing:
-        """Whether the DVA answers, is silent, or was never heard since the start."""
+        """Return `answers`, `silent`, or `never` for a DVA unheard since the start."""
         if (heard := self.device.dva_watch.heard) is None:
             return "never"
         is_there = self.clock.now - heard < UNHEARD + self._round_trip
@@ -115,7 +116,7 @@ class AttachedSystem:
     def role(self) -> str:
         """Role that the DVA grants this console: `look`, `drive`, `dispatch` or `supervise`.
 
-        On a bench, any: the DVA is told as soon as somebody decides.
+        On a bench it is `supervise`: the DVA learns of it as soon as somebody decides.
         """
         if self.bench is not None:
             return "supervise"
@@ -160,7 +161,7 @@ class AttachedSystem:
         def answered(reply: m.Reply) -> None:
             self._is_asking = False
             self._round_trip = min(self.clock.now - asked, TIMEOUT)
-            if reply.code == m.NOT_REGISTERED or (self._was_silent and self.has_all_events):
+            if self._was_silent and self.has_all_events:
                 self._ask_again()  # it may know nothing of an earlier life
             self._was_silent = False
             if isinstance(reply.content, m.DeviceList):

@@ -94,9 +94,7 @@ class LogRequests:
 def _given(request: Request) -> dict[str, Any]:
     """A filter out of the address."""
     asked = request.query_params
-    given: dict[str, Any] = {
-        key: asked[key] for key in WORDS if key in asked
-    }
+    given: dict[str, Any] = {key: asked[key] for key in WORDS if key in asked}
     since = asked.get("since", "0")
     given["since"] = int(since) if since.isascii() and since.isdigit() else since
     return given | {"publications": asked.get("publications") == "true"}

@@ -13,7 +13,7 @@ const WAIT_MS = 250;
 
 /** @typedef {import('./request_filters.js').LogFilter} LogFilter */
 
-/** Why a DVA's log is not shown, by the state of it. */
+/** Reasons why a DVA's log cannot be shown, by its state. */
 const WITHOUT = /** @type {Record<string, (server: any) => string>} */ ({
   unknown: () => 'Waiting for the log of the DVA …',
   not_kept: () => 'This DVA keeps no log for control rooms.',
