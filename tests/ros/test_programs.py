@@ -1,11 +1,14 @@
 """The commands as users start them: a robot of ROS, a live run and a console for its clients."""
 
 import json
+import re
 import signal
+import urllib.request
 
 import pytest
 from helpers.foxglove.viewer import Viewer
-from helpers.processes.patience import becomes
+from helpers.paths import ROOT
+from helpers.processes.patience import PATIENCE_S, becomes
 from helpers.processes.programs import all_gone_after
 from helpers.ros.ros_machine import RosMachine
 from helpers.ros.served_world import ScriptedRosClient
@@ -83,3 +86,47 @@ def test_clients_of_ros_and_foxglove_see_what_runs(programs, command):
     run.send(signal.SIGINT)
     assert run.ends() == 0
     assert becomes(lambda: client.closed)
+
+
+def test_the_commands_of_the_guide_connect_a_robot_of_ros_to_a_console(programs, machine, tmp_path):
+    """As they stand, but for the addresses and the ports, which are free ones."""
+    guide = (ROOT / "docs/how-to/own-robot-ros.md").read_text(encoding="utf-8")
+    profile = re.search(r"`mine\.yaml`:\n\n```yaml\n(.*?)```", guide, re.DOTALL)
+    start = re.search(r"dva-sim console --links real.*", guide)
+    connect = re.search(r"dva-sim robot mine\.yaml.*", guide)
+    assert profile
+    assert start
+    assert connect
+    (tmp_path / "mine.yaml").write_text(profile[1], encoding="utf-8")
+    port = str(two_free_ports("127.0.0.1"))
+
+    def words(command: str) -> list[str]:
+        here = command.replace("5600", port).replace("ws://192.168.1.20:9090", machine.url)
+        return here.split()[1:]
+
+    console = programs.start(*words(start[0]), "--no-open", "--port", "0")
+    console.wait_to_say(f"DVA: 127.0.0.1:{port}")
+    robot = programs.start(*words(connect[0]))
+    robot.wait_to_say("is connected to its bridge")
+    page = address(console, "Console")
+    base, _, token = page.partition("?token=")
+    asked = urllib.request.Request(f"{base}api/state", headers={"Authorization": f"Bearer {token}"})
+
+    def listed() -> list[str]:
+        with urllib.request.urlopen(asked, timeout=PATIENCE_S) as answer:
+            return [one["label"] for one in json.load(answer)["robots"]]
+
+    assert becomes(lambda: "robot-3" in listed())
+    assert "is not registered" not in robot.output
+
+
+def test_a_robot_whose_id_is_in_use_is_told_of_the_option_that_gives_it_another(programs, machine):
+    where = f"127.0.0.1:{two_free_ports('127.0.0.1')}"
+    words = ("--dva", where, "--for", "200", "--no-page")
+    programs.start("live", "drive-to-event", "--only", "dva", *words).wait_to_say("DVA: ")
+    first = programs.start("robot", "--ros", machine.url, "--dva", where)
+    first.wait_to_say("can be driven again")
+    second = programs.start("robot", "--ros", machine.url, "--dva", where)
+    second.wait_to_say("is not registered", "--number")
+    lone = programs.start("robot", "--dva", where, "--no-open", "--port", "0")
+    lone.wait_to_say("busy", "--number")

@@ -403,3 +403,73 @@ def test_people_at_an_attached_console_decide_see_alarms_and_read_what_they_did(
     console.send(signal.SIGINT)
     assert console.ends() == 0
     assert verify(audit).is_ended
+
+
+@pytest.fixture
+def bare(programs: Programs) -> tuple[str, str]:
+    """The address of a DVA that runs alone, and that of its page."""
+    dva = f"127.0.0.1:{free_port()}"
+    words = ("--dva", dva, "--for", "1000", "--page", "0")
+    program = programs.start("live", "hands-on", "--only", "dva", *words)
+    program.wait_to_say("Look only:")
+    return dva, re.findall(r"^Console: +(\S+)$", program.output, re.MULTILINE)[0]
+
+
+def registered(dva: str) -> None:
+    """A client registers, and sends something that is no message."""
+    body = m.Registration("tablet", "TeleOp", "127.0.0.1:9")
+    said = encode(m.Message(DVA, 1, "56:2B:04:E4:56:D8", "12:00:00", 0, body))
+    with zmq.Context() as context, context.socket(zmq.REQ) as socket:
+        socket.linger = 0
+        socket.connect(f"tcp://{dva}")
+        for data in (said, b"<msg>hello"):
+            socket.send(data)
+            assert socket.poll(1000 * PATIENCE_S)
+            socket.recv()
+
+
+def test_a_dva_alone_has_a_page_as_the_simulator_of_the_dissertation_had(bare, visit):
+    dva, address = bare
+    page = visit.open(address, "")
+    state = page.get_by_role("status", name="Server state")
+    expect(state).to_have_text(f"Listening on {dva}", timeout=SLOW)  # Main is shown first
+    registered(dva)
+    table = page.get_by_role("table", name="Requests")
+    line = table.get_by_role("row").filter(has_text="tablet")
+    expect(line).to_have_count(1, timeout=SLOW)
+    expect(line).to_contain_text("0 ok")
+    refused = table.get_by_role("row").filter(has_text="1 bad message")
+    refused.get_by_role("button").click()
+    message = page.get_by_role("region", name="Message")
+    expect(message).to_contain_text("<msg>hello")
+    expect(message).to_contain_text(re.compile(r"Line \d+, column \d+"))
+    line.get_by_role("button").click()
+    expect(message).to_contain_text("56:2B:04:E4:56:D8")
+
+    assert table.get_by_role("row").filter(has_text="GetDeviceList").count() == 0
+    page.get_by_role("checkbox", name="This console's").check()
+    expect(table.get_by_role("row").filter(has_text="GetDeviceList").first).to_be_visible()
+    page.get_by_label("Kind").select_option("RegMsg")
+    expect(table.get_by_role("row").filter(has_text="GetDeviceList")).to_have_count(0)
+    for scheme, width in (("light", 1024), ("dark", 360)):
+        page.emulate_media(color_scheme=scheme)
+        page.set_viewport_size({"width": width, "height": 768})
+        assert faults(page) == []
+
+    page.set_viewport_size({"width": 1440, "height": 900})
+    page.get_by_role("button", name="Stop server").click()
+    expect(state).to_contain_text("Stopped", timeout=SLOW)
+    page.get_by_role("link", name="Devices").click()
+    expect(page.get_by_role("alert")).to_contain_text("DVA's server is stopped")
+    page.get_by_role("link", name="Main").click()
+    other = free_port()
+    page.get_by_label("Port").fill(str(other))
+    page.get_by_role("button", name="Start server").click()
+    expect(state).to_have_text(f"Listening on 127.0.0.1:{other}", timeout=SLOW)
+    expect(page.get_by_text("The DVA's server is stopped")).to_have_count(0, timeout=SLOW)
+
+    page.get_by_role("link", name="Devices").click()
+    page.get_by_role("button", name="Add fake device").click()
+    page.get_by_label("Label", exact=True).fill("ghost")
+    page.get_by_role("button", name="Add", exact=True).click()
+    expect(page.get_by_role("row", name=re.compile("ghost"))).to_be_visible(timeout=SLOW)
