@@ -73,7 +73,7 @@ class AgentDevice:
             counts it as silent and sends nobody to it; it still replies.
         meanwhile: Description of what it does while the DVA is silent.
         other_id: Description of how to give it another id, if its own is in use.
-        dva_address: Address at which it looks for the DVA; empty where that is no matter.
+        dva_address: Address at which it looks for the DVA; empty if people need not know it.
         dva_watch: Watch on the DVA's heartbeats.
     """
 

@@ -22,14 +22,14 @@ class Bench(Protocol):
     def server(self) -> ServerShown:
         """Return the address of the DVA's server, and whether it listens."""
 
-    def start_server(self, port: int, on_result: OnResult) -> None:
+    def open_server(self, port: int, on_result: OnResult) -> None:
         """Let the server listen on a port.
 
         Raises:
             Refused: it cannot.
         """
 
-    def stop_server(self, on_result: OnResult) -> None:
+    def close_server(self, on_result: OnResult) -> None:
         """Let the server take no more requests.
 
         Raises:
@@ -57,12 +57,12 @@ class ServerActions:
         self._bench = bench
 
     @does("server_start")
-    def _start_server(self, _: str, line: PortAsked, on_result: OnResult) -> None:
-        self._own_bench.start_server(line["port"], on_result)
+    def _open(self, _: str, line: PortAsked, on_result: OnResult) -> None:
+        self._own_bench.open_server(line["port"], on_result)
 
     @does("server_stop")
-    def _stop_server(self, _: str, __: Asked, on_result: OnResult) -> None:
-        self._own_bench.stop_server(on_result)
+    def _close(self, _: str, __: Asked, on_result: OnResult) -> None:
+        self._own_bench.close_server(on_result)
 
     @property
     def _own_bench(self) -> Bench:

@@ -54,7 +54,7 @@ class KeptRequest:
 
 
 @dataclass
-class RequestLog:
+class KeptRequests:
     """The newest requests, and the number of all.
 
     Attributes:

@@ -10,7 +10,7 @@ from dva_sim.core.request_log import (
     KEPT_FOR,
     MOST_LOGGED,
     KeptRequest,
-    RequestLog,
+    KeptRequests,
     without_sessions,
 )
 from dva_sim.protocol import messages as m
@@ -20,9 +20,9 @@ DVA, ROOM = "02:00:00:00:00:01", "02:00:00:07:00:01"
 SESSION = 17 << 32 | 0xDEAD_BEEF
 
 
-def filled(count: int, data: bytes = b"<msg>", reply: m.Reply | None = None) -> RequestLog:
+def filled(count: int, data: bytes = b"<msg>", reply: m.Reply | None = None) -> KeptRequests:
     """A log of so many requests, one a second, for which somebody has asked at 0 s."""
-    log = RequestLog()
+    log = KeptRequests()
     log.above(0, 0.0)
     for second in range(1, count + 1):
         request = KeptRequest(
@@ -32,12 +32,12 @@ def filled(count: int, data: bytes = b"<msg>", reply: m.Reply | None = None) -> 
     return log
 
 
-def numbers(log: RequestLog, above: int) -> list[int]:
+def numbers(log: KeptRequests, above: int) -> list[int]:
     return [entry.request_number for entry in log.above(above, 300.0).requests]
 
 
 def test_requests_are_wanted_for_60_s_after_each_question():
-    log = RequestLog()
+    log = KeptRequests()
     assert not log.is_wanted(0.0)
     log.above(0, 5.0)
     assert log.is_wanted(5.0 + KEPT_FOR - 0.1)
@@ -66,7 +66,7 @@ def test_each_answer_fits_into_a_message(size, text):
 
 
 def test_an_entry_tells_age_size_answer_and_how_long_it_took():
-    log = RequestLog()
+    log = KeptRequests()
     reply = m.Reply(9, m.NOT_REGISTERED, "who are you?")
     log.keep(
         KeptRequest(number=3, arrived=2.0, size=9000, data=b"abc", service_time=0.25, reply=reply)

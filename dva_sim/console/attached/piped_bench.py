@@ -64,11 +64,11 @@ class PipedBench:
             "modelled": False,
         }
 
-    def start_server(self, port: int, on_result: OnResult) -> None:
+    def open_server(self, port: int, on_result: OnResult) -> None:
         """Implement `Bench`."""
         self._ask("start", on_result, port=port)
 
-    def stop_server(self, on_result: OnResult) -> None:
+    def close_server(self, on_result: OnResult) -> None:
         """Implement `Bench`."""
         self._ask("stop", on_result)
 

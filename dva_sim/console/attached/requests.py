@@ -39,15 +39,15 @@ class RequestReader:
         self._is_asking = False
 
     def go_on(self) -> None:
-        """Ask if it is time to."""
+        """Ask if it is time to, unless this console's role does not allow it."""
+        dispatch = self._agent.dispatch
+        if dispatch is not None and dispatch.role == "look":
+            self.shown = "not_permitted"
+            return
         refused = self.shown in ("not_kept", "not_permitted")
         pause = REFUSED if refused else LOOKED if self.is_looked else UNLOOKED
         if not self._is_asking and self._now - self._asked >= pause:
             self._ask()
-
-    def ask_soon(self) -> None:
-        """Ask at the next look: the DVA may show its log to this console now."""
-        self._asked = -REFUSED
 
     @property
     def _now(self) -> float:

@@ -55,7 +55,7 @@ class RunBench:
             "modelled": self._is_modelled,
         }
 
-    def start_server(self, port: int, on_result: OnResult) -> None:
+    def open_server(self, port: int, on_result: OnResult) -> None:
         """Implement `Bench`."""
         try:
             self.port.open(port)
@@ -64,7 +64,7 @@ class RunBench:
         self._moved(self.port.address)
         on_result(True, f"the server listens on {self.port.address}")
 
-    def stop_server(self, on_result: OnResult) -> None:
+    def close_server(self, on_result: OnResult) -> None:
         """Implement `Bench`."""
         try:
             self.port.close()

@@ -29,7 +29,7 @@ from dva_sim.core.registry import (
     ROBOT,
     RegistrationLimit,
 )
-from dva_sim.core.request_log import SHOWN_BYTES, KeptRequest, RequestLog
+from dva_sim.core.request_log import SHOWN_BYTES, KeptRequest, KeptRequests
 from dva_sim.core.sessions import Send
 from dva_sim.core.store import Store
 from dva_sim.network.messaging import Request, Subscription
@@ -87,7 +87,7 @@ class DvaAgent:
         self._heard: dict[str, tuple[str, list[Subscription]]] = {}  # address, at which heard
         self._attended = 0
         self._registrations = RegistrationLimit()
-        self._requests = RequestLog()
+        self._requests = KeptRequests()
         self.stopwatch: Callable[[], float] = lambda: device.clock.now
         device.network.serve(device.id_tag, self._on_arrival)
 
