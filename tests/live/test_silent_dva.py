@@ -1,4 +1,4 @@
-"""What is said of a DVA that does not answer: that it never did, or that it is silent now."""
+"""Reports about a DVA that does not answer: it never did, or it is silent now."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack

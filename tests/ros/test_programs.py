@@ -89,7 +89,7 @@ def test_clients_of_ros_and_foxglove_see_what_runs(programs, command):
 
 
 def test_the_commands_of_the_guide_connect_a_robot_of_ros_to_a_console(programs, machine, tmp_path):
-    """As they stand, but for the addresses and the ports, which are free ones."""
+    """Only addresses are replaced, and ports by free ones."""
     guide = (ROOT / "docs/how-to/own-robot-ros.md").read_text(encoding="utf-8")
     profile = re.search(r"`mine\.yaml`:\n\n```yaml\n(.*?)```", guide, re.DOTALL)
     start = re.search(r"dva-sim console --links real.*", guide)

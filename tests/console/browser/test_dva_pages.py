@@ -416,7 +416,7 @@ def bare(programs: Programs) -> tuple[str, str]:
 
 
 def registered(dva: str) -> None:
-    """A client registers, and sends something that is no message."""
+    """A client registers, and sends a broken message."""
     body = m.Registration("tablet", "TeleOp", "127.0.0.1:9")
     said = encode(m.Message(DVA, 1, "56:2B:04:E4:56:D8", "12:00:00", 0, body))
     with zmq.Context() as context, context.socket(zmq.REQ) as socket:
