@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -12,6 +12,7 @@ from dva_sim.console.audit.audit_keeper import auditing
 from dva_sim.console.options import kept_results, motion_folder, scenario_of, sockets
 from dva_sim.console.pages.processes import ConsoleProcesses
 from dva_sim.console.people.actions import Actions
+from dva_sim.console.people.seating import leave_seats
 from dva_sim.console.run.recorder import keep_run
 from dva_sim.console.world.kept_results import KeptResults
 from dva_sim.console.world.world import ConsoleWorld
@@ -31,8 +32,6 @@ from dva_sim.simulation.scenario import Scenario
 
 if TYPE_CHECKING:
     from dva_sim.live.foxglove_server import FoxgloveServer
-
-LAST_WORDS = 0.2  # of virtual time, for robots that are told to stop [s]
 
 Say = Callable[[str], object]
 
@@ -215,9 +214,5 @@ class ConsoleSupervisor:
 
     def _leave(self, world: ConsoleWorld) -> None:
         """Everybody who drives is stopped, and a moment is left for the word of it."""
-        for person in world.persons:
-            person.release(lambda *_: None)
-        world.clock.pace(paused=False)
-        with suppress(DvaSimError):
-            world.clock.run(world.clock.now + LAST_WORDS)
+        leave_seats(world.seating, world.clock)
         world.tell({"k": "bye", "t": world.feed.now_ms, "why": "the console was ended"})

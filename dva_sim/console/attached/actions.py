@@ -6,10 +6,8 @@ The DVA decides if that is allowed: it alone knows the role of each control room
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 from dva_sim.agents.device import do_nothing
-from dva_sim.console.asking.answers import BYE
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import NO_ANSWER, OnResult, Refused, unanswered
 from dva_sim.console.asking.releases import NOBODY_STOPPED, release_robots
@@ -21,7 +19,7 @@ from dva_sim.console.bench import NOT_HERE, ServerActions
 from dva_sim.console.events.alarm_actions import AlarmActions
 from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, place_of, report_of
 from dva_sim.console.events.missions import inspection_of, send_on_mission
-from dva_sim.console.events.takeover import Takeover
+from dva_sim.console.people.driving import LOOK, Driving, is_gone_for_good
 from dva_sim.console.wire.actions import ActionPlace, Asked
 from dva_sim.console.wire.arguments import (
     FakeAsked,
@@ -29,6 +27,7 @@ from dva_sim.console.wire.arguments import (
     MissionAsked,
     OfDevice,
     OfSome,
+    PagesHere,
     ReportAsked,
     RobotsWatched,
     RoomName,
@@ -44,11 +43,13 @@ class AttachedDecisions:
     Args:
         system: System to which the console is attached.
         people: People at the pages.
+        driving: Seats, and drives from pages.
     """
 
-    def __init__(self, system: AttachedSystem, people: AttachedPeople) -> None:
+    def __init__(self, system: AttachedSystem, people: AttachedPeople, driving: Driving) -> None:
         self._system = system
         self._people = people
+        self._driving = driving
 
     @does("room_join")
     def _join(self, client: str, line: RoomName, on_result: OnResult) -> None:
@@ -80,48 +81,28 @@ class AttachedDecisions:
         status = self._system.agent.events.get(line["event"])
         if status is None:
             raise Refused(f"there is no event {line['event']}")
-        self._send(self._robot(line["robot"]), status, on_result)
+        self._send(self._driving.robot(line["robot"]), status, on_result)
 
     def _send(self, robot: str, status: m.EventStatus, on_result: OnResult) -> None:
         label = self._system.label_of(robot)
         send_on_mission(self._system.device, robot, label, inspection_of(status), on_result)
 
     @does("take_over")
-    def _take_over(self, _: str, line: TakeoverAsked, on_result: OnResult) -> None:
-        """Take a robot from its driver; it drives itself to where it was sent."""
-        robot = self._robot(line["robot"])
+    def _take_over(self, client: str, line: TakeoverAsked, on_result: OnResult) -> None:
+        """Take a robot and its task from its driver into the client's own seat."""
+        robot = self._driving.robot(line["robot"])
         agent = self._system.agent
-        label = self._system.label_of(robot)
         sent = (e for e in agent.events.values() if e.closed_for is None and e.responder == robot)
-        event = next(sent, None)
-
-        def take(on_result: OnResult) -> None:
-            if event is None:
-                on_result(True, f"{label} is nobody's now, and stands")
-            else:
-                self._send(robot, event, on_result)
-
-        takeover = Takeover(
+        take_over = partial(
+            self._driving.take_over,
+            client,
             agent=agent,
             robot=robot,
             reason=line["reason"],
-            event=event,
-            seat=None,
-            take=take,
+            event=next(sent, None),
             on_result=on_result,
         )
-        self._system.let_decide(takeover.begin)
-
-    def _robot(self, number: Any) -> str:
-        """The id of a robot that pages know by a number.
-
-        Raises:
-            Refused: the DVA has listed none.
-        """
-        found = self._system.id_of(number)
-        if found is None or found not in self._system.robots():
-            raise Refused(f"the DVA has listed no robot {number!r}")
-        return found
+        self._system.let_decide(take_over)
 
     def _ask(self, body: m.Body, done: str, on_result: OnResult) -> None:
         robots = self._system.robots
@@ -165,17 +146,19 @@ class AttachedActions:
     def __init__(self, pages: AttachedPages) -> None:
         self._pages = pages
         self._system = pages.system
-        decisions = AttachedDecisions(self._system, pages.people)
+        self._driving = driving = Driving(pages.driven)
+        decisions = AttachedDecisions(self._system, pages.people, driving)
         author = pages.people.author
         alarms = AlarmActions(pages.alarms, author, lambda *given: dispatcher.do(*given))
         dispatcher = ActionDispatcher(
             ActionPlace.ATTACHED,
-            holders=(self, decisions, alarms, ServerActions(self._system.bench)),
+            holders=(self, driving, decisions, alarms, ServerActions(self._system.bench)),
             tell=self._tell,
             elsewhere=NOT_HERE,
             audited=lambda: pages.audited,
         )
         self.take = dispatcher.take
+        pages.clock.pulse(LOOK, driving.look)
 
     @does("look")
     def _look(self, _: str, line: LogsLooked) -> None:
@@ -190,49 +173,27 @@ class AttachedActions:
 
     @does("release")
     def _release(self, client: str, line: Asked, on_result: OnResult) -> None:
-        """Nothing is in hand; but a page may be gone for good."""
-        if str(line["id"]).startswith(BYE):
+        if is_gone_for_good(line):
             self._pages.people.leave(client)
             self._pages.let_go()
-        on_result(True, "released")
+        self._driving.release(client, on_result)
 
-    @does("emergency")
-    def _emergency(self, _: str, line: OfSome, on_result: OnResult) -> None:
-        """Stop robots, each over its own connection; those that do not reply are named."""
-        system = self._system
-        wanted = line.get("robots", "all")
-        robots = system.robots()
-        if isinstance(wanted, list):
-            robots = [i for i in robots if system.numbers.get(i) in wanted]
-        if not robots:
-            raise Refused("the DVA has listed no robot")
-        left = set(robots)
-        deaf = list[str]()
+    @does("here")
+    def _here(self, _: str, line: PagesHere) -> None:
+        self._driving.attend(line)
 
-        def ended(robot: str, ok: bool) -> None:
-            left.discard(robot)
-            if not ok:
-                deaf.append(system.label_of(robot))
-            if not left and deaf:
-                unanswered(on_result, f"no answer of {', '.join(deaf)}")
-            elif not left:
-                on_result(True, "robots stop")
-
-        for robot in robots:
-            ok = partial(ended, robot, True)
-            failed = partial(ended, robot, False)
-            system.device.ask(robot, m.Emergency(), lambda _, ok=ok: ok(), failed)  # type: ignore[misc]
+    @does("gone")
+    def _gone(self, client: str, _: Asked) -> None:
+        self._driving.end_hidden(client)
 
     @does("release_emergency")
     def _release_emergency(self, _: str, line: OfSome, on_result: OnResult) -> None:
         """Release robots that an emergency holds; the DVA decides whether this console may."""
         system = self._system
-        wanted = line.get("robots", "all")
-        now = system.device.clock.now
+        now = system.clock.now
         devices = system.state.devices
-        robots = [i for i in system.robots() if emergency_of(devices[i], now, {}) is not None]
-        if isinstance(wanted, list):
-            robots = [i for i in robots if system.numbers.get(i) in wanted]
+        named = self._driving.robots_in(line)
+        robots = [i for i in named if emergency_of(devices[i], now, {}) is not None]
         if not robots:
             raise Refused(NOBODY_STOPPED)
         labels = {robot: system.label_of(robot) for robot in robots}
@@ -242,7 +203,7 @@ class AttachedActions:
     def _revoke(self, _: str, line: OfDevice, on_result: OnResult) -> None:
         robot = line["device"]
         if robot not in self._system.robots():
-            raise Refused(f"the DVA has listed no robot {robot}")
+            raise Refused(f"there is no robot {robot!r}")
 
         def answered(reply: m.Reply) -> None:
             done = f"the permission for {self._system.label_of(robot)} is revoked"

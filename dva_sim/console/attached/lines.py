@@ -12,7 +12,7 @@ from dva_sim.console.robots.shown_mode import EMERGENCY, EMERGENCY_LAPSES, emerg
 from dva_sim.console.run.lag import LIMIT
 from dva_sim.console.views.feed import SEVERITIES
 from dva_sim.console.views.foreign_devices import foreign_robot_row
-from dva_sim.console.views.scene import RULES, legend, site_of
+from dva_sim.console.views.scene import RULES, legend, patterns_of, site_of
 from dva_sim.console.views.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
 from dva_sim.console.wire.events import EventFacts
 from dva_sim.console.wire.rows import DeviceRow, EmergencyShown, RobotRow
@@ -45,7 +45,7 @@ def things_of(devices: Iterable[DeviceState], numbers: dict[str, int]) -> list[T
 
 
 def attached_scene(
-    things: list[ThingShown], address: str, site: Site | None, frame: GeoFrame
+    things: list[ThingShown], address: str, own_pattern: str, site: Site | None, frame: GeoFrame
 ) -> SceneLine:
     """The first line that a page gets."""
     return {
@@ -57,7 +57,7 @@ def attached_scene(
         "attached": True,
         "site": site_of(site) if site is not None else nowhere(frame),
         "things": things,
-        "patterns": [],
+        "patterns": patterns_of(own_pattern),
         "link": LINK,
         "link_limits": {},
         "pace_limits": [1.0, 1.0],
@@ -132,7 +132,7 @@ def robot_row(
             emergency_of(device_state, now, labels),
         ),
         "holder": holding.holder if holding is not None else None,
-        "holder_label": holding.label if holding is not None else None,
+        "holder_label": holder_named(holding, labels),
         "session_age_s": round(holding.held_for + now - since, 1) if holding and held else None,
         "camera": device_state.camera,
         "sensors": readings_of(device_state, now),
@@ -161,7 +161,21 @@ def _reading(sensor: m.Sensor, device_state: DeviceState, now: float) -> str:
     return f"{value.values[0]:.3g}{unit}"
 
 
-def device_row(device_state: DeviceState, now: float, is_fake: bool, may_revoke: bool) -> DeviceRow:
+def holder_named(holding: m.RobotHolder | None, labels: Mapping[str, str]) -> str | None:
+    """Return the label of a robot's holder: the robot's word for it, or the list's."""
+    if holding is None or holding.holder is None:
+        return None
+    return holding.label or labels.get(holding.holder)
+
+
+def device_row(
+    device_state: DeviceState,
+    now: float,
+    labels: Mapping[str, str],
+    *,
+    is_fake: bool,
+    may_revoke: bool,
+) -> DeviceRow:
     """A device, as the DVA lists it and as it is heard here."""
     is_stopped = emergency_of(device_state, now, {}) is not None
     device = device_state.device
@@ -190,7 +204,7 @@ def device_row(device_state: DeviceState, now: float, is_fake: bool, may_revoke:
         "level": None,
         "ends_s": None,
         "holder": holder.holder if holder is not None else None,
-        "holder_label": (holder.label if holder is not None else None) or "",
+        "holder_label": holder_named(holder, labels) or "",
         "holder_known": holder is not None or device.device_type != ROBOT,
         "revocable": may_revoke,
         "camera": device_state.camera,

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from dva_sim.agents.device import do_nothing
-from dva_sim.console.attached.options import listening_address, own_id
+from dva_sim.console.attached.options import listening_address, own_id, seat_ids
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.messaging import Transport
@@ -25,7 +25,9 @@ class AttachedLinks:
         recorder: Keeps the story.
         network: Carries messages to the DVA, and to whom it lists.
         own: Id of the console's own device.
-        address: Address of the DVA.
+        address: Address of the console's own device.
+        seat_id: Function that returns the id of the device of the n-th seat, from 1.
+        join: Function that lets a device take part, by its id, and returns its address.
         close: Ends what was opened.
     """
 
@@ -34,6 +36,8 @@ class AttachedLinks:
     network: Transport
     own: str
     address: str
+    seat_id: Callable[[int], str]
+    join: Callable[[str], str]
     close: Callable[[], object] = do_nothing
 
     def note(self, text: str) -> None:
@@ -63,12 +67,15 @@ def over_sockets(options: ConsoleOptions, own: str | None = None) -> AttachedLin
 
     network = SocketNetwork(clock, ring, note)
     network.introduce(DVA, dva)
-    address = network.join(own, listening_address(dva))
+    host = listening_address(dva)
+    address = network.join(own, host)
     return AttachedLinks(
         clock=clock,
         recorder=recorder,
         network=network,
         own=own,
         address=address,
+        seat_id=seat_ids(ring),
+        join=lambda device: network.join(device, host),
         close=network.close,
     )

@@ -1,10 +1,14 @@
-"""Checks of the options of a console at a DVA elsewhere, and its site and id."""
+"""Checks of the options of a console at a DVA elsewhere, and its scenario and ids."""
 
 from __future__ import annotations
 
 import secrets
 import socket
+from collections.abc import Callable
+from contextlib import suppress
 
+from dva_sim.console.asking.refusal import Refused
+from dva_sim.console.asking.seats import MOST_SEATS
 from dva_sim.console.audit.audit_keeper import check_target
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
@@ -14,10 +18,10 @@ from dva_sim.network.keys import KeyRing
 from dva_sim.network.sockets import split_address
 from dva_sim.options.runs import ConsoleOptions
 from dva_sim.simulation.full.stage import id_of, kind_of
-from dva_sim.simulation.scenario import build, load, site_of
-from dva_sim.worlds.site import Site
+from dva_sim.simulation.scenario import Scenario, build, load
 
 ROOM = "control-room"
+SEAT = "console"
 FIRST_FREE = 1001  # numbers of control rooms that no scenario gives, for who has no key
 
 
@@ -55,16 +59,15 @@ def check(options: ConsoleOptions) -> None:
         check_target(options.audit)
 
 
-def site_shown(options: ConsoleOptions) -> Site | None:
-    """Return the site, as far as it is known.
+def scenario_shown(options: ConsoleOptions) -> Scenario | None:
+    """Return the scenario that is named, whose site is shown.
 
     Raises:
-        ConfigError: the scenario, or its site, cannot be read.
+        ConfigError: the scenario cannot be read.
     """
     if options.scenario is None:
         return None
-    scenario = build(load(options.scenario), parse_changes(changes_of(options)))
-    return site_of(scenario, 1)
+    return build(load(options.scenario), parse_changes(changes_of(options)))
 
 
 def own_id(ring: KeyRing | None) -> str:
@@ -75,14 +78,36 @@ def own_id(ring: KeyRing | None) -> str:
     """
     if ring is None:
         return id_of(ROOM, FIRST_FREE + secrets.randbelow(0xFFFF - FIRST_FREE))
-    for device in ring.devices:
-        if kind_of(device)[0] == ROOM and (ring.folder / "secret").exists():
-            try:
-                ring.pair(device)
-            except ConfigError:
-                continue
-            return device
+    if own := _with_secret(ring, ROOM):
+        return own[0]
     raise ConfigError(
         f"no secret key of a control room; make one: dva-sim keys {ring.folder} {ROOM}-1",
         ring.folder,
     )
+
+
+def seat_ids(ring: KeyRing | None) -> Callable[[int], str]:
+    """Return what gives the n-th seat its id, from 1: that of a key, or one from random on."""
+    first = FIRST_FREE + secrets.randbelow(0xFFFF - FIRST_FREE - MOST_SEATS)
+
+    def seat_id(number: int) -> str:
+        if ring is None:
+            return id_of(SEAT, first + number)
+        own = _with_secret(ring, SEAT)
+        if number > len(own):
+            more = f"dva-sim keys {ring.folder} {SEAT}-{number}"
+            raise Refused(f"with --keys, who drives needs a key as well; make one: {more}")
+        return own[number - 1]
+
+    return seat_id
+
+
+def _with_secret(ring: KeyRing, kind: str) -> list[str]:
+    """Return the devices of a kind whose secret key is here."""
+    found = []
+    for device in ring.devices:
+        if kind_of(device)[0] == kind and (ring.folder / "secret").exists():
+            with suppress(ConfigError):
+                ring.pair(device)
+                found.append(device)
+    return found

@@ -12,6 +12,7 @@ from dva_sim.agents.robot.controller import Mode
 from dva_sim.cameras.lines import Show
 from dva_sim.console.attached import lines
 from dva_sim.console.attached.audit import AttachedAudit
+from dva_sim.console.attached.driven import DrivenAttached
 from dva_sim.console.attached.lines import SILENT_AFTER
 from dva_sim.console.attached.people import AttachedPeople
 from dva_sim.console.attached.requests import LOG, RequestReader
@@ -20,6 +21,7 @@ from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.events.console_alarms import ConsoleAlarms
 from dva_sim.console.events.decisions import about_event, dispatch_shown
+from dva_sim.console.people.seat_lines import SeatLines
 from dva_sim.console.run.lag import LagRule
 from dva_sim.console.views.feed import story_of
 from dva_sim.console.views.news import News, clock_shown
@@ -30,7 +32,12 @@ from dva_sim.console.wire.rows import DoingShown, Hearing, RobotRow, ServerShown
 from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.protocol import messages as m
 
-POSITIONS, ROWS, DEVICES, SOON = 0.2, 0.5, 1.0, 0.1  # from one line to the next, real time [s]
+# From one line to the next, real time [s].
+POSITIONS = 0.2
+ROWS = 0.5
+DEVICES = 1.0
+SOON = 0.1
+SEATS = 0.05
 NEVER_LATE: Final = LagRule()  # nothing runs here that could be
 HEARD: Final[Mapping[Hearing, str]] = {
     "answers": "answers",
@@ -70,6 +77,9 @@ class AttachedPages:
         self.audited = AttachedAudit(audit, system, self.people.author)
         system.on_record = self.audited.heard
         self._hearing: Hearing = "never"
+        self.driven = DrivenAttached(system, self.people.author)
+        self.driven.free_seat = self._free_seat
+        self._seat_lines = SeatLines(self.driven, {})
         self._news = News(lambda: self.tell)
         self._is_shown = False
         system.on_devices = self._tell_scene
@@ -95,6 +105,7 @@ class AttachedPages:
         clock.pulse(ROWS, self._tell_rows)
         clock.pulse(ROWS, self._tell_alarms)
         clock.pulse(SOON, self._tell_news)
+        clock.pulse(SEATS, self._tell_seats)
         clock.pulse(DEVICES, self._tell_devices)
         clock.pulse(DEVICES, self.sensors.go_on)
         clock.pulse(SOON, self.requests.go_on)
@@ -119,7 +130,13 @@ class AttachedPages:
             return
         things = lines.things_of(system.state.devices.values(), system.numbers)
         self._is_shown = True
-        scene = lines.attached_scene(things, system.dva, system.site, system.frame)
+        scene = lines.attached_scene(
+            things,
+            address=system.dva,
+            own_pattern=self.driven.own_pattern,
+            site=system.site,
+            frame=system.frame,
+        )
         self.tell(scene if system.bench is None else {**scene, "begins_at": "main"})
 
     def _tell_positions(self) -> None:
@@ -142,9 +159,17 @@ class AttachedPages:
                 "server": self._server(),
                 "robots": self._robots(),
                 "people": self._people(),
-                "order": None,
+                "order": self._seat_lines.waiting_order(),
             }
         )
+
+    def _tell_seats(self) -> None:
+        for client, line in self._seat_lines.lines():
+            self._news.tell(line, client)
+
+    def _free_seat(self, client: str) -> None:
+        self.tell(self._seat_lines.free(client), client)
+        self._news.forget("seat", client)
 
     def _tell_alarms(self) -> None:
         """Tell alarms; while the state of events is unknown, alarms stay as they are."""
@@ -157,13 +182,20 @@ class AttachedPages:
     def _robots(self) -> list[RobotRow]:
         now = self.clock.now
         numbers = self.system.numbers
-        labels = {i: entry.device.label for i, entry in self.system.state.devices.items()}
-        labels[self.system.device.id_tag] = self.system.device.label
+        labels = self.system.labels
         return [
-            lines.robot_row(entry, numbers[id_tag], now, labels)
+            {
+                **lines.robot_row(entry, numbers[id_tag], now, self._stopper_named(id_tag, labels)),
+                "pattern": self.driven.pattern_of(id_tag),
+            }
             for id_tag, entry in self.system.state.devices.items()
             if entry.device.device_type == ROBOT and id_tag in numbers
         ]
+
+    def _stopper_named(self, robot: str, labels: Mapping[str, str]) -> Mapping[str, str]:
+        """Return labels in which a device that stopped a robot from a page is its person."""
+        stopper = self.driven.stoppers.get(robot)
+        return labels if stopper is None else {**labels, stopper[0]: stopper[1]}
 
     def _people(self) -> list[DoingShown]:
         numbers = self.system.numbers
@@ -211,13 +243,12 @@ class AttachedPages:
     def _events(self) -> list[SiteEventShown]:
         system = self.system
         agent = self.system.agent
-        labels = {i: entry.device.label for i, entry in system.state.devices.items()}
         return [
             {
                 **lines.event_row(
                     status,
                     received_at=agent.received_at[number],
-                    labels=labels,
+                    labels=system.labels,
                     site=system.site,
                     frame=system.frame,
                 ),
@@ -231,7 +262,13 @@ class AttachedPages:
             now = self.clock.now
             may = self.system.role == "supervise"
             rows = [
-                lines.device_row(entry, now, self.system.is_fake(id_tag), may)
+                lines.device_row(
+                    entry,
+                    now,
+                    self.system.labels,
+                    is_fake=self.system.is_fake(id_tag),
+                    may_revoke=may,
+                )
                 for id_tag, entry in self.system.state.devices.items()
             ]
             self.tell({"k": "devices", "t": self.system.now_ms, "devices": rows})

@@ -12,6 +12,7 @@ from dva_sim.console.attached.piped_bench import PipedBench
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import auditing
 from dva_sim.console.pages.processes import ConsoleProcesses, Say
+from dva_sim.console.people.seating import leave_seats
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live.process import ending_when_asked
 from dva_sim.options.runs import ConsoleOptions
@@ -63,4 +64,5 @@ def _show(
         if not ending.is_asked:
             system.clock.go()
             system.clock.run()
+        leave_seats(pages.driven.seating, system.clock)
         pages.tell({"k": "bye", "t": system.now_ms, "why": "the console was ended"})

@@ -11,7 +11,7 @@ from typing import Final
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice, do_nothing
 from dva_sim.console.attached.links import AttachedLinks
-from dva_sim.console.attached.options import site_shown
+from dva_sim.console.attached.options import scenario_shown
 from dva_sim.console.attached.system_state import SystemState
 from dva_sim.console.bench import Bench
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
@@ -21,6 +21,7 @@ from dva_sim.core.registry import CONTROL_ROOM, ROBOT
 from dva_sim.options.runs import ConsoleOptions
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.stage import DVA, id_of
+from dva_sim.simulation.scenario import Scenario, site_of
 from dva_sim.worlds.geo import GeoFrame
 
 TIMEOUT, ATTEMPTS = 1.0, 2  # of what the DVA is asked [s]
@@ -50,6 +51,8 @@ class AttachedSystem:
         fakes: Devices that were added by hand.
         numbers: Stable numbers by which pages know devices.
         site: Site of the scenario, if one is named.
+        scenario: Scenario that is named, or one of defaults: equipment of who drives.
+        labels: Labels of all devices that were ever listed, by id.
         has_all_events: True once the DVA has sent all its events since its last restart.
         on_devices: Callback when a device appears or disappears.
         on_record: Callback for each decision that the DVA publishes.
@@ -68,14 +71,17 @@ class AttachedSystem:
         self.clock = links.clock
         self.recorder = links.recorder
         self.note = links.note
-        self.site = site_shown(options)
+        named = scenario_shown(options)
+        self.site = None if named is None else site_of(named, 1)
+        self.scenario = named or Scenario()
+        self.labels = dict[str, str]()
         self.numbers = dict[str, int]()
         self.frame = self.site.frame if self.site is not None else SOMEWHERE
         self.device = self._make(links.own, "control room", CONTROL_ROOM, links.address)
         self.agent = ControlRoomAgent(self.device)
         self.on_devices: Callable[[], object] = do_nothing
         self.on_record: Callable[[m.AuditRecord], object] = do_nothing
-        self.state = SystemState(self.device, lambda: self.on_devices())
+        self.state = SystemState(self.device, self.labels, lambda: self.on_devices())
         self.fakes = FakeDevices(self._make, self._is_known, _identity, self._drop)
         self.has_all_events = False
         self._asked = -POLL
@@ -239,7 +245,7 @@ class AttachedSystem:
     def label_of(self, id_tag: str) -> str:
         """Return the label of a device."""
         state = self.state.devices.get(id_tag)
-        return id_tag if state is None else state.device.label
+        return self.labels.get(id_tag, id_tag) if state is None else state.device.label
 
     def named(self, given: str) -> str:
         """The name of a device by its id, or of things by their numbers, as in `0, 1`."""
@@ -254,6 +260,16 @@ class AttachedSystem:
 
     # --- devices ---------------------------------------------------------------------------
 
+    def new_seat(self, number: int, kind: str) -> AgentDevice:
+        """Let the device of the n-th seat take part, from 1.
+
+        Raises:
+            Refused: there is no key for it.
+            NetworkError: no port can be had.
+        """
+        id_tag = self._links.seat_id(number)
+        return self._make(id_tag, f"console-{number}", kind, self._links.join(id_tag))
+
     def _make(self, id_tag: str, label: str, kind: str, address: str) -> AgentDevice:
         return AgentDevice(
             id_tag=id_tag,
@@ -264,6 +280,7 @@ class AttachedSystem:
             network=self._links.network,
             recorder=self.recorder,
             frame=self.frame,
+            labels=self.labels,
             timeout=TIMEOUT,
             attempts=ATTEMPTS,
             time_of_day=start_of_day(self.clock),

@@ -53,14 +53,18 @@ class SystemState:
 
     Args:
         device: Device that subscribes.
+        labels: Labels of devices by id, which it keeps up to date.
         on_news: Callback when a device appears or disappears.
 
     Attributes:
         devices: Devices by id.
     """
 
-    def __init__(self, device: AgentDevice, on_news: Callable[[], object]) -> None:
+    def __init__(
+        self, device: AgentDevice, labels: dict[str, str], on_news: Callable[[], object]
+    ) -> None:
         self._device = device
+        self._labels = labels
         self._on_news = on_news
         self.devices: dict[str, DeviceState] = {}
 
@@ -94,6 +98,7 @@ class SystemState:
 
     def _meet(self, device: m.Device) -> None:
         """Subscribe to a device, again if its address has changed."""
+        self._labels[device.id_tag] = device.label
         known = self.devices.get(device.id_tag)
         if known is not None and known.device.address == device.address:
             known.device = device

@@ -7,13 +7,11 @@ robot. What ends a drive ends it at once, and for good.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from typing import Any
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import NO_ANSWER, OnResult, Refused
-from dva_sim.console.asking.seats import Seats
+from dva_sim.console.people.driving import Driving
 from dva_sim.console.phones.phone_input import samples_of, settings_of
 from dva_sim.console.phones.phone_seat import PhoneSeat
 from dva_sim.console.wire.actions import Asked
@@ -31,22 +29,14 @@ class PhoneActions:
     """Does what phones ask for.
 
     Args:
-        seats: Seats and their clients.
-        robot: Function that returns the id of a robot by its name in a line.
-        stop: Ends the drive of a client, and says why.
+        driving: Seats, and drives from pages.
     """
 
-    def __init__(
-        self,
-        world: ConsoleWorld,
-        seats: Seats,
-        robot: Callable[[Any], str],
-        stop: Callable[[str, str], object],
-    ) -> None:
+    def __init__(self, world: ConsoleWorld, driving: Driving) -> None:
         self._world = world
-        self._seats = seats
-        self._robot = robot
-        self._stop = stop
+        self._driving = driving
+        self._seating = world.seating
+        self._seats = world.seating.seats
         self._phones = world.phones
 
     def sits(self, client: str) -> bool:
@@ -72,13 +62,12 @@ class PhoneActions:
         if phone is None:
             return
         if phone.person is None:
-            seat = self._seats.taken.get(client)
-            phone.lend(None if seat is None else self._world.person(seat.number))
+            phone.lend(self._seating.of_client(client))
         now = time.monotonic()
         if phone.driven is not None and not batch.hand:
-            self._stop(client, LIFTED)
+            self._driving.stop_client(client, LIFTED)
         elif phone.driven is not None and batch.orientation != phone.orientation:
-            self._stop(client, TURNED)
+            self._driving.stop_client(client, TURNED)
         phone.turn(batch.orientation)
         if phone.take(batch, now):  # a sensor that says the same again and again is silent
             self._seats.heard(client, now, batch.hand)
@@ -114,7 +103,7 @@ class PhoneActions:
             raise Refused("Too many phones have connected recently. Try again in two minutes.")
         person = phone.person
         assert person is not None
-        self._world.let_in(number, person)
+        self._seating.let_in(number, person)
         self._seats.sit_at(client, number)
 
         def answered(reply: m.Reply) -> None:
@@ -122,7 +111,7 @@ class PhoneActions:
                 on_result(False, "another registration has taken its place")
             elif reply.code == m.OK:
                 phone.registered = True
-                self._world.client_of[number] = client
+                self._seating.client_of[number] = client
                 for robot in self._world.run.field.robots:
                     person.device.connect(robot)  # an emergency does not wait for a connection
                 on_result(True, f"{label} is registered", phone=phone.identity())
@@ -155,8 +144,10 @@ class PhoneActions:
         phone.registered = False
         number = self._seats.stand_up(client)
         if number is not None:
-            self._world.client_of.pop(number, None)
-            self._world.see_off(number)
+            self._seating.client_of.pop(number, None)
+            person = self._seating.persons.pop(number)
+            person.release(lambda *_: None)  # its robots are given back first
+            self._phones.retire(number, person.device)
 
     def _device(self, client: str) -> tuple[PhoneSeat, PersonAgent]:
         phone = self._phones.by_client.get(client)
@@ -193,8 +184,7 @@ class PhoneActions:
         person.alert = ""
 
         def answered(ok: bool, text: str) -> None:
-            held = {robot for one in self._world.persons for robot in one.robots}
-            self._world.screens.hold(held)
+            self._driving.hold()
             on_result(ok, text)
 
         person.take([robot], answered, level)
@@ -205,7 +195,7 @@ class PhoneActions:
         Raises:
             Refused: it is no device that anybody knows.
         """
-        return given if given in self._world.run.stage.labels else self._robot(given)
+        return given if given in self._world.run.stage.labels else self._driving.robot(given)
 
     @does("phone_calibrate")
     def _calibrate(self, client: str, line: CalibrationAsked, on_result: OnResult) -> None:

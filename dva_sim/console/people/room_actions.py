@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
-from typing import Any, Unpack
+from typing import Any
 
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.asking.releases import NOBODY_STOPPED, release_robots
-from dva_sim.console.asking.seats import Seats
 from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, place_of, report_of
 from dva_sim.console.events.missions import inspection_of, send_on_mission
 from dva_sim.console.events.rooms import ConsoleRoom
-from dva_sim.console.events.takeover import Takeover
+from dva_sim.console.people.driving import Driving
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import (
     MissionAsked,
-    OfRobots,
     OfSome,
     ReportAsked,
     RoomName,
@@ -32,23 +29,14 @@ class RoomActions:
     """Does what control rooms are asked for.
 
     Args:
-        seats: Seats and their clients.
-        robot: Finds the id of a robot that a line names.
-        take: Callback for a robot for a page's seat.
+        driving: Seats, and drives from pages.
     """
 
-    def __init__(
-        self,
-        world: ConsoleWorld,
-        seats: Seats,
-        robot: Callable[[Any], str],
-        take: Callable[[str, OfRobots, OnResult], object],
-    ) -> None:
+    def __init__(self, world: ConsoleWorld, driving: Driving) -> None:
         self._world = world
         self._rooms = world.rooms
-        self._seats = seats
-        self._robot = robot
-        self._take = take
+        self._driving = driving
+        self._seats = world.seating.seats
 
     def attend(self, pages: Mapping[str, str]) -> None:
         """Let rooms take part only while their pages are open."""
@@ -144,8 +132,8 @@ class RoomActions:
         status = self._rooms.listener.events.get(line["event"])
         if status is None:
             raise Refused(f"there is no event {line['event']}")
-        robot = self._robot(line["robot"])
-        label = self._world.run.stage.labels[robot]
+        robot = self._driving.robot(line["robot"])
+        label = self._world.driven.label_of(robot)
         body = inspection_of(status)
 
         def send(room: ConsoleRoom, on_result: OnResult) -> None:
@@ -176,33 +164,17 @@ class RoomActions:
     @does("take_over")
     def _take_over(self, client: str, line: TakeoverAsked, on_result: OnResult) -> None:
         """Take a robot and its task from its driver into the client's own seat."""
-        robot = self._robot(line["robot"])
-        reason = line["reason"]
+        robot = self._driving.robot(line["robot"])
+        event = self._rooms.event_of(robot)
 
         def begin(room: ConsoleRoom, on_result: OnResult) -> None:
-            number = self._seats.sit(client)
-            if number is None:
-                on_result(False, "All seats are taken.")
-                return
-            seat = self._world.person(number)
-            label = self._world.run.stage.labels[robot]
-            take = partial(self._take, client, OfRobots(robots=[label]))
-
-            def ended(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
-                if not ok and not seat.robots:
-                    self._seats.stand_up(client)
-                    seat.attended = client in self._world.client_of.values()
-                on_result(ok, text, **more)
-
-            event = self._rooms.event_of(robot)
-            Takeover(
+            self._driving.take_over(
+                client,
                 agent=room.agent,
                 robot=robot,
-                reason=reason,
+                reason=line["reason"],
                 event=event,
-                seat=seat.device.id_tag,
-                take=take,
-                on_result=ended,
-            ).begin()
+                on_result=on_result,
+            )
 
         self._room(client, line, on_result, begin)

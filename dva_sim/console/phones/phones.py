@@ -15,6 +15,7 @@ from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.tilt import PhoneProfile, known_filters, known_mappings
+from dva_sim.console.people.seating import FIRST_OF_PHONES
 from dva_sim.console.phones.phone_input import PIPELINES, PhoneSettings
 from dva_sim.console.phones.phone_seat import PhoneSeat
 from dva_sim.console.wire.arguments import DELAYS, STEPS
@@ -31,7 +32,6 @@ DVA_PORT: Final = 5555  # at which the modelled DVA is said to listen
 NOBODY: Final = "02:00:00:00:FF:FF"  # who listens at any other address
 MOST_PHONES: Final = 64
 MOST_IDS: Final = 250
-FIRST_SEAT: Final = 1000  # number of the seat of the first phone
 RESTS: Final = FORGET_AFTER + 60.0  # from the end of a phone until its id is given out again [s]
 TYPES: Final = {"Robot": ROBOT, "Remote Control": REMOTE, "Teleoperation": OPERATOR}
 """Device types on the wire, by the word on the screen."""
@@ -139,12 +139,12 @@ class Phones:
         device.dva = DVA if address == self.address else NOBODY
         seat.person = PersonAgent(device, self._console(), seat.new_tilt)
         seat.person.sit_down()
-        return FIRST_SEAT + number
+        return FIRST_OF_PHONES + number
 
     def retire(self, number: int, device: AgentDevice) -> None:
         """A phone is there no more; what it said last still goes out."""
         device.leave()
-        self._clock.call_after(RESTS, self._forget, number - FIRST_SEAT, device)
+        self._clock.call_after(RESTS, self._forget, number - FIRST_OF_PHONES, device)
 
     def _forget(self, number: int, device: AgentDevice) -> None:
         for peer in (DVA, NOBODY, *self._run.field.robots):

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from dva_sim.agents.operator.person_at_console import PersonAgent
-from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.run.real_links import EMULATED, TITLE
 from dva_sim.console.wire.arguments import LINK_LIMITS
 from dva_sim.console.wire.scenes import LinkShown
@@ -133,29 +131,3 @@ class LinkSliders:
         for robot in self._run.field.robots:
             self._set_usual(robot, seconds)
         self._run.slowed(seconds)
-
-
-def change_pattern(
-    run: Run,
-    persons: Sequence[PersonAgent],
-    robot: str,
-    name: str,
-    on_result: Callable[[bool, str], object],
-) -> None:
-    """Drive a robot by another pattern from the next drive on; a drive is stopped first."""
-    agent = run.field.robots[robot]
-
-    def change(ok: bool = True, text: str = "") -> None:
-        if agent.controller.mode is Mode.TELEOPERATION:
-            on_result(False, text or f"{agent.device.label} is driven: it has to be stopped first")
-            return
-        run.stage.pattern_names[robot] = name
-        agent.expect(run.stage.pattern_for(robot))
-        run.recorder.tell(run.clock.now, agent.device.label, f"is driven by {name}", "link")
-        on_result(True, "")
-
-    holder = next((p.robots[robot] for p in persons if robot in p.robots), None)
-    if holder is not None and holder.is_driven:
-        holder.stop("stopped", change)
-    else:
-        change()

@@ -76,6 +76,7 @@ class ForeignDevices:
         self._known[device.id_tag] = "robot" if is_robot else "guard"
         body = UNKNOWN_ROBOT if is_robot else {**UNKNOWN_PERSON, "person": True}
         label = distinct(device.label, device.id_tag, self._run.stage.labels.values())
+        self._run.stage.labels.setdefault(device.id_tag, label)
         self._feed.things.add_foreign(device.id_tag, label, self._known[device.id_tag], body)
 
     def positions(self) -> list[list[int]]:

@@ -183,11 +183,17 @@ _SILENT: Any = {"has_answer": False, "waits": Queueing.NEWEST, "audit": _OFTEN}
 
 _LIST = (
     Action(
-        "take", "takes control of robots", OfRobots, over_link=True, seats=True, role=Role.DRIVE
+        "take",
+        "takes control of robots",
+        OfRobots,
+        at=_RUN,
+        over_link=True,
+        seats=True,
+        role=Role.DRIVE,
     ),
     Action("release", "gives back all that one holds", at=_RUN | _HANDS, stops=True),
-    Action("start", "begins to drive", over_link=True),
-    Action("stop", "ends the drive", stops=True, over_link=True),
+    Action("start", "begins to drive", at=_RUN, over_link=True),
+    Action("stop", "ends the drive", at=_RUN, stops=True, over_link=True),
     Action(
         "emergency",
         "stops robots before all else; one's own, or all",
@@ -209,7 +215,11 @@ _LIST = (
     ),
     Action("link", "changes the link", LinkChange, role=Role.DRIVE),
     Action(
-        "pattern", "changes the pattern of a robot's next drive", PatternChoice, role=Role.DRIVE
+        "pattern",
+        "changes the pattern of a robot's next drive",
+        PatternChoice,
+        at=_RUN,
+        role=Role.DRIVE,
     ),
     Action(
         "pace",
@@ -218,9 +228,9 @@ _LIST = (
         at=ActionPlace.WORLD | ActionPlace.REPLAY,
         role=Role.DRIVE,
     ),
-    Action("confirm", "reports an event as real", over_link=True),
-    Action("refute", "reports an event as false", over_link=True),
-    Action("decline", "declines an order"),
+    Action("confirm", "reports an event as real", at=_RUN, over_link=True),
+    Action("refute", "reports an event as false", at=_RUN, over_link=True),
+    Action("decline", "declines an order", at=_RUN),
     Action("tour", "finds goals for the guided tour", audit=_LOOKS, role=Role.DRIVE),
     Action("tour_time", "notes how long a goal of the tour took", TourTime, role=Role.DRIVE),
     Action("mark", "marks this moment in the story", MarkAsked, role=Role.DRIVE),
@@ -330,7 +340,7 @@ _LIST = (
     Action("alarm_shelve", "takes an alarm out of the list for a while", ShelveAsked, **_ALARM),
     Action("alarm_unshelve", "puts an alarm back into the list", OfAlarm, **_ALARM),
     # --- without an answer
-    Action("input", "says what a hand wants", Wish, **_SILENT),
+    Action("input", "says what a hand wants", Wish, at=_RUN, **_SILENT),
     Action(
         "manual",
         "says what a hand at a robot's window wants",
@@ -349,7 +359,7 @@ _LIST = (
     Action(
         "gone",
         "says that the page is hidden",
-        at=_HANDS,
+        at=_RUN | _HANDS,
         stops=True,
         **_SILENT
         | {
@@ -365,7 +375,7 @@ OF_THE_WEB: Final[Mapping[str, Action]] = {
     for action in (
         Action("watch", "says whose pictures are looked at", RobotsWatched, at=_ALL, **_LOOKED),
         Action("look", "says which logs and tables are looked at", LogsLooked, at=_ALL, **_LOOKED),
-        Action("here", "says which clients are there", PagesHere, **_LOOKED),
+        Action("here", "says which clients are there", PagesHere, at=_RUN, **_LOOKED),
     )
 }
 

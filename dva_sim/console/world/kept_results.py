@@ -137,7 +137,7 @@ class KeptResults:
         seats = world.phones.by_client.values()
         phones = {seat.person.device.id_tag: seat for seat in seats if seat.person}
         phone = phones.get(log.operator)
-        at_page = {person.device.id_tag for person in world.persons}
+        at_page = {person.device.id_tag for person in world.seating.persons.values()}
         if phone is None and log.operator not in at_page:
             return
         number = self._persons.setdefault(log.operator, len(self._persons) + 1)

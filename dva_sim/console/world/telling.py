@@ -14,6 +14,7 @@ from dva_sim.console.events.console_alarms import ConsoleAlarms
 from dva_sim.console.events.decisions import about_event
 from dva_sim.console.events.rooms import ConsoleRooms
 from dva_sim.console.guards.played_guards import PlayedGuards
+from dva_sim.console.people.seat_lines import SeatLines
 from dva_sim.console.phones.phones import Phones
 from dva_sim.console.robots.robot_windows import RobotWindows
 from dva_sim.console.robots.stop_reasons import stop_reason
@@ -30,7 +31,6 @@ from dva_sim.console.wire.events import SiteEventShown
 from dva_sim.console.wire.limits import LOG_PERIOD
 from dva_sim.console.wire.lines import Tell
 from dva_sim.console.wire.rows import RobotRow, RowsLine
-from dva_sim.console.world.seat_lines import SeatLines
 from dva_sim.network.realtime import PacedClock
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.scenario import Scenario

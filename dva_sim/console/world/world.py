@@ -12,8 +12,6 @@ from typing import Any
 
 from dva_sim.agents.observation import Cameras
 from dva_sim.agents.operator.handheld import Console
-from dva_sim.agents.operator.held_robot import HeldRobot
-from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.cameras.lines import FrameLine, Show, contained_line, scene_line
 from dva_sim.cameras.screens import Screens, camera_url, topic_of
 from dva_sim.console.audit.audit_keeper import AuditKeeper
@@ -22,7 +20,8 @@ from dva_sim.console.dva.dva_pages import DvaPages
 from dva_sim.console.events.console_alarms import ConsoleAlarms, RunFacts
 from dva_sim.console.events.rooms import ConsoleRooms
 from dva_sim.console.guards.played_guards import PlayedGuards
-from dva_sim.console.phones.phones import FIRST_SEAT, Phones
+from dva_sim.console.people.seat_lines import SeatLines
+from dva_sim.console.phones.phones import Phones
 from dva_sim.console.robots.robot_windows import RobotWindows
 from dva_sim.console.run.lag import LagRule
 from dva_sim.console.run.real_links import MakeSockets
@@ -33,7 +32,7 @@ from dva_sim.console.views.fields import HazardFeed
 from dva_sim.console.views.foreign_devices import ForeignDevices
 from dva_sim.console.views.logs import Logs
 from dva_sim.console.wire.lines import Tell
-from dva_sim.console.world.seat_lines import SeatLines
+from dva_sim.console.world.driven_run import PEOPLE, DrivenRun
 from dva_sim.console.world.telling import PublishingWorld
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import PacedClock
@@ -43,7 +42,6 @@ from dva_sim.simulation.full.run import Run, Watched
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.simulation.scenario import Scenario
 
-PEOPLE = 1  # operators of the scenario whose places people take
 SCREEN = 0xFFFF  # number of the console's own screen among consoles
 
 
@@ -109,24 +107,29 @@ class ConsoleWorld(PublishingWorld):
         emulated = self.sockets is not None and self.sockets.crossing is not None
         self.sliders = LinkSliders(self.run, self.windows.set_usual, emulated)
         self.dropped: Callable[[], int] = lambda: 0
-        self._console = console_of(self.run.stage, scenario)
-        self._persons: dict[int, PersonAgent] = {}
         real = self.sockets.dva if self.sockets is not None else None
-        self.phones = Phones(self.run, self.clock, lambda: self._console, real)
-        self.client_of: dict[int, str] = {}
-        for number in range(max(PEOPLE, len(self.run.persons))):
-            self.person(number)
-        self.feed.things.add(DVA, "dva", "dva")
+        self.phones = Phones(self.run, self.clock, lambda: self.seating.console, real)
         if self.sockets is not None:
             self.sockets.join("console", SCREEN)
         self.screens = Screens(
             self.run, id_of("console", SCREEN), self.feed.numbers, self._show_frame
         )
-        self.seat_lines = SeatLines(
-            self.run, self.feed, self._persons, self.client_of, self.phones.by_client
-        )
-        self.guards = PlayedGuards(self.run, self.feed)
         self.foreign = ForeignDevices(self.run, self.feed)
+        self.driven = DrivenRun(
+            self.run,
+            clock=self.clock,
+            feed=self.feed,
+            lag=self.lag,
+            foreign=self.foreign,
+            screens=self.screens,
+            author=self.author,
+            is_fake=lambda robot: robot in self.dva.fakes,
+        )
+        self.driven.free_seat = self.free_seat
+        self.seating = self.driven.seating
+        self.feed.things.add(DVA, "dva", "dva")
+        self.seat_lines = SeatLines(self.driven, self.phones.by_client)
+        self.guards = PlayedGuards(self.run, self.feed)
         self.rooms = ConsoleRooms(self.run, self.run.dva.core.roles)
         self.alarms = ConsoleAlarms(RunFacts(self.run))
         self.audited: Audited | None = None
@@ -168,7 +171,7 @@ class ConsoleWorld(PublishingWorld):
     @property
     def console(self) -> Console:
         """Pattern, rate and limits of future drivers."""
-        return self._console
+        return self.seating.console
 
     def is_ours(self, device: str) -> bool:
         """Return True for a device of this console, whose messages are seen as they are sent."""
@@ -213,9 +216,9 @@ class ConsoleWorld(PublishingWorld):
             return room
         if (guard := self.guards.by_client.get(client)) is not None:
             return guard.device.label
-        seat = next((n for n, who in self.client_of.items() if who == client), None)
-        if seat is not None:
-            return self._persons[seat].device.label
+        person = self.seating.of_client(client)
+        if person is not None:
+            return person.device.label
         return name_of_page(client)
 
     def _named(self, device: str) -> str:
@@ -223,51 +226,6 @@ class ConsoleWorld(PublishingWorld):
         names = {str(thing["i"]): thing["label"] for thing in self.feed.things.all}
         found = [names.get(one, one) for one in device.split(", ")] if device else []
         return self.run.stage.labels.get(device, ", ".join(found))
-
-    @property
-    def persons(self) -> list[PersonAgent]:
-        """Those of all seats, with or without somebody in them."""
-        return list(self._persons.values())
-
-    def numbered_persons(self) -> list[tuple[int, PersonAgent]]:
-        """Those of all seats with the numbers of their seats."""
-        return list(self._persons.items())
-
-    def person(self, number: int) -> PersonAgent:
-        """Return the person of a seat, by its number; seats of the console are made from 0 on.
-
-        A new seat is unmanned.
-        """
-        while number < FIRST_SEAT and number not in self._persons:
-            place = sum(1 for known in self._persons if known < FIRST_SEAT)
-            device = self.run.stage.device("console", place + 1)
-            person = PersonAgent(device, self._console)
-            person.on_robot = self._watch_robot
-            device.withdrawn = True
-            for robot in self.run.field.robots:
-                device.connect(robot)  # an emergency does not wait for a connection
-            self.feed.things.add(device.id_tag, device.label, "operator")
-            self._persons[place] = person
-        return self._persons[number]
-
-    def seat_of_order(self, robots: Sequence[str]) -> int | None:
-        """Return an empty seat in which an order waits for one of these robots."""
-        for number, person in self._persons.items():
-            waits = person.order is not None and person.order.device in robots
-            if waits and not person.attended and number < FIRST_SEAT:
-                return number
-        return None
-
-    def let_in(self, number: int, person: PersonAgent) -> None:
-        """A phone takes part, with a seat of its own."""
-        person.on_robot = self._watch_robot
-        self._persons[number] = person
-
-    def see_off(self, number: int) -> None:
-        """A phone takes part no more; its robots are given back first."""
-        person = self._persons.pop(number)
-        person.release(lambda *_: None)
-        self.phones.retire(number, person.device)
 
     # --- in somebody's hands --------------------------------------------------------------
 
@@ -278,16 +236,6 @@ class ConsoleWorld(PublishingWorld):
 
     def _show_frame(self, line: FrameLine, robot: int) -> None:
         self.show(line, robot)
-
-    def _watch_robot(self, held: HeldRobot) -> None:
-        """Frames of a robot in somebody's hands are those that the seat gets."""
-        usual = held.on_frame
-
-        def on_frame(held: HeldRobot, frame: Any) -> None:
-            usual(held, frame)
-            self.screens.arrived(held.robot, frame)
-
-        held.on_frame = on_frame
 
     # --- lag -------------------------------------------------------------------------------
 
@@ -307,7 +255,5 @@ class ConsoleWorld(PublishingWorld):
             ConfigError: what cannot be.
         """
         text, scenario = self.sliders.change(given)
-        self._console = console_of(self.run.stage, scenario)
-        for person in self.persons:
-            person.console = self._console
+        self.seating.equip(console_of(self.run.stage, scenario))
         return text

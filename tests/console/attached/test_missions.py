@@ -83,34 +83,27 @@ def test_what_is_not_there_is_refused(page, about, words):
     assert words in page.ask("mission", **about)["text"]
 
 
-def test_a_robot_is_taken_from_its_driver_and_goes_on_by_itself(page):
+def test_a_robot_is_taken_from_its_driver_with_its_task(page):
     assert page.ask("event_assign", event=1, device="robot-1")["ok"]
     assert page.world.do("take", robots=["robot-1"])[0]
     assert page.world.do("start")[0]
     robot = page.world.robot()
     page.until(lambda: robot.controller.mode is Mode.TELEOPERATION)
-    taken = page.ask("take_over", robot=number(page, "robot-1"), reason="its driver is away")
+    taken = page.ask("take_over", robot="robot-1", reason="its driver is away")
 
     assert taken["ok"]
-    assert unnamed(taken["text"], "robot-1", "event 1") == []
-    assert robot.holder[0] == OWN
-    assert robot.controller.mode is Mode.MISSION
+    assert robot.holder[0] == page.seat_device()
+    page.until(lambda: "console-1" in page.events()[0]["assigned"])
     rows = {(row.action, row.author, row.outcome) for row in page.written()}
     assert {("revoke", "control room", "done"), ("take over", "ana", "done")} <= rows
 
 
-def test_a_robot_that_was_sent_nowhere_is_nobodys_then(page):
+def test_a_robot_that_was_sent_nowhere_is_taken_as_it_is(page):
     assert page.world.do("take", robots=["robot-1"])[0]
-    taken = page.ask("take_over", robot=number(page, "robot-1"), reason="it is needed")
+    assert page.ask("take_over", robot="robot-1", reason="it is needed")["ok"]
 
-    assert taken["ok"]
+    page.let(2.0)
+    assert page.world.robot().holder[0] == page.seat_device()
+    assert page.ask("release")["ok"]
     page.let(2.0)
     assert page.world.robot().controller.grant is None
-
-
-def test_the_dva_refuses_both_to_who_may_only_look(monkeypatch, tmp_path):
-    with attached(monkeypatch, tmp_path, role="look") as page:
-        page.until(lambda: len(page.system.numbers) >= 4)
-        robot = number(page, "robot-1")
-        assert not page.ask("mission", robot=robot, event=1)["ok"]
-        assert "needs" in page.ask("take_over", robot=robot, reason="I want it")["text"]

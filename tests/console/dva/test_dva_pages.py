@@ -51,7 +51,7 @@ def asked_of(page, device, peer, body):
 
 
 def someone(page):
-    return page.world.persons[0].device
+    return page.world.seating.persons[0].device
 
 
 def listed(page):

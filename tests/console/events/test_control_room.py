@@ -215,7 +215,7 @@ def test_a_robot_that_another_drives_is_taken_over_with_what_it_was_sent_to(room
     done, text = room.do("take_over", robot="robot-1", reason="ben is away", role="supervise")
 
     assert done, text
-    assert room.robot(0).holder[0] == room.world.person(1).device.id_tag
+    assert room.robot(0).holder[0] == room.world.seating.person(1).device.id_tag
     assert room.robot(0).controller.mode is not Mode.TELEOPERATION
     assert room.seat()["drives"][0]["phase"] == "held"
 

@@ -1,5 +1,7 @@
 """A command is as old as the picture that its person's page has drawn last."""
 
+import math
+
 import pytest
 from helpers.console.simulated_console import Page
 from helpers.wording import unnamed
@@ -18,7 +20,7 @@ class Drawing(Page):
 
     def _want(self):
         if self.draws:
-            held = self.world.person(0).robots.values()
+            held = self.world.seating.person(0).robots.values()
             self.seen = [
                 [self.world.feed.numbers[each.robot], round(1000 * each.frame.captured)]
                 for each in held
@@ -38,7 +40,7 @@ def page(monkeypatch):
 
 
 def held(page):
-    return next(iter(page.world.person(0).robots.values()))
+    return next(iter(page.world.seating.person(0).robots.values()))
 
 
 @pytest.mark.system
@@ -62,7 +64,7 @@ def test_a_page_that_draws_no_more_is_stopped_at_the_age_limit_and_told_why(page
 
 def test_the_robot_itself_finds_commands_by_a_frozen_picture_too_old(page, monkeypatch):
     """Whatever the console notices: the tick in the commands is that of the frozen picture."""
-    monkeypatch.setattr(page.actions, "_look_for_old_pictures", lambda: None)
+    monkeypatch.setattr(page.world.driven, "stale_s", math.inf)
     page.draws = False
     page.let(LIMIT + 1.0)
     assert page.robot().controller.mode is Mode.TELEOPERATION

@@ -113,7 +113,7 @@ def test_a_permission_on_its_way_to_the_robot_is_news_only_when_it_takes_long(pa
     asked = {}
     monkeypatch.setattr(steps, "start", lambda *_, **more: asked.update(more))
     page.actions.take({"id": "s", "client": "c1", "do": "start"})
-    person = page.world.person(0)
+    person = page.world.seating.person(0)
     not_yet = m.Reply(1, m.NOT_PERMITTED, f"{person.device.id_tag} holds no permission here")
     asked["waits"](not_yet)
     assert person.alert == ""

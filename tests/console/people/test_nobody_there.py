@@ -86,14 +86,14 @@ def test_a_robot_is_free_for_a_client_of_ros_while_no_page_is_open(page):
     ("away", "kept"), [(RELOADED - 0.5, True), (RELOADED + 0.5, False), (60.0, False)]
 )
 def test_a_page_that_is_loaded_again_keeps_its_order(page, away, kept):
-    page.until(lambda: page.world.person(0).order)
-    order = page.world.person(0).order
+    page.until(lambda: page.world.seating.person(0).order)
+    order = page.world.seating.person(0).order
     page.are_open()
     page.let(away)
-    assert (page.world.person(0).order is order) == kept
+    assert (page.world.seating.person(0).order is order) == kept
     page.are_open("c1")
     page.let(2.0)
-    entry = page.world.run.dva.core.registry.entries[page.world.person(0).device.id_tag]
+    entry = page.world.run.dva.core.registry.entries[page.world.seating.person(0).device.id_tag]
     assert not entry.silent
 
 

@@ -85,7 +85,7 @@ def test_without_a_picture_one_drives_on_in_sight_of_the_robot(page):
     assert page.calibrate()["ok"]
     held = HeldPhone(page)
     held.tilt(10.3)
-    for one in page.world.persons:
+    for one in page.world.seating.persons.values():
         for robot in one.robots.values():
             robot._picture.close()  # the camera is broken, and all else works
     assert page.do("start")[0]

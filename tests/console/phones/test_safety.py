@@ -140,7 +140,7 @@ def test_ids_are_given_out_again_and_nothing_grows_without_end(page):
         assert page.register(f"x{n % 3}", label=f"{n}")["ok"]
     page.let(125.0)
     assert len(page.world.run.stage.devices) <= devices + 3
-    assert len(page.world.persons) == 4  # the console's, and three phones
+    assert len(page.world.seating.persons) == 4  # the console's, and three phones
 
 
 @pytest.mark.parametrize("label", ["", "x" * 65, "\x00", "line\nbreak", 7, None, ["a"]])

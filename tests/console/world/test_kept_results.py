@@ -168,7 +168,7 @@ def test_the_same_drives_give_the_same_bytes(whole, cut_off):
 def test_what_a_person_calls_a_device_is_in_no_table(monkeypatch, tmp_path):
     out = tmp_path / "out"
     results, page = begun(monkeypatch, out)
-    device = page.world.person(0).device
+    device = page.world.seating.person(0).device
     device.label = device.labels[device.id_tag] = "Jane's own"
     page.sets_out(then=3.0)
     results.write()

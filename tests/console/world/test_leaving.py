@@ -101,7 +101,7 @@ class RosClient:
 class ForeignRobot(RosClient):
     """A robot of another make, driven by a client of ROS, that goes away."""
 
-    robot = FOREIGN
+    robot = "theirs"
 
     def __init__(self, page):
         run = page.world.run

@@ -43,6 +43,8 @@ class AttachedPage:
             network=run.network,
             own=OWN,
             address="198.51.100.9:5600",
+            seat_id=lambda number: id_of("console", 900 + number),
+            join=lambda _: "198.51.100.9:5700",
         )
         options = ConsoleOptions(dva="198.51.100.1:5600", scenario="hands-on", audit=audit)
         self.system = AttachedSystem(options, links)
@@ -76,6 +78,10 @@ class AttachedPage:
                     return line
             self.let(0.01)
         raise AssertionError(f"{what}: no answer within {within} s")
+
+    def seat_device(self, number: int = 0) -> str:
+        """Return the id of the device of a seat."""
+        return self.pages.driven.seating.persons[number].device.id_tag
 
     def events(self) -> list[dict[str, Any]]:
         """Events as the page shows them now."""

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
+from dva_sim.console.people.driving import DrivenSystem
 from dva_sim.console.phones.phone_seat import PhoneSeat
-from dva_sim.console.views.feed import Feed
 from dva_sim.console.wire.scenes import OrderShown
 from dva_sim.console.wire.seats import DriveShown, InputHeard, PhoneShown, SeatLine
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
-from dva_sim.simulation.full.run import Run
 
 PHASES = ("driving", "starting", "stopping", "asking", "held")  # the first that holds is told
 
@@ -36,24 +35,14 @@ class SeatLines:
     """Lines for those who sit somewhere.
 
     Args:
-        feed: About it.
-        persons: By the numbers of their seats.
-        client_of: Client in each seat, by number.
+        system: System whose robots are driven.
         phones: By their clients.
     """
 
-    def __init__(
-        self,
-        run: Run,
-        feed: Feed,
-        persons: dict[int, PersonAgent],
-        client_of: dict[int, str],
-        phones: dict[str, PhoneSeat],
-    ) -> None:
-        self._run = run
-        self._feed = feed
-        self._persons = persons
-        self._client_of = client_of
+    def __init__(self, system: DrivenSystem, phones: Mapping[str, PhoneSeat]) -> None:
+        self._system = system
+        self._persons = system.seating.persons
+        self._client_of = system.seating.client_of
         self._phones = phones
         self._acted: dict[str, ActedInput] = {}  # of the newest command in force, by robot
 
@@ -98,7 +87,7 @@ class SeatLines:
         """The line of a client that sits nowhere."""
         return {
             "k": "seat",
-            "t": self._feed.now_ms,
+            "t": self._system.now_ms,
             "seat": client,
             "label": "",
             "phase": "free",
@@ -113,7 +102,7 @@ class SeatLines:
         phases = {each.phase for each in held}
         return {
             "k": "seat",
-            "t": self._feed.now_ms,
+            "t": self._system.now_ms,
             "seat": client,
             "label": person.device.label,
             "phase": next((phase for phase in PHASES if phase in phases), "free"),
@@ -124,32 +113,30 @@ class SeatLines:
         }
 
     def _order(self, order: m.Order) -> OrderShown:
-        where = order.position
-        x, y = self._run.stage.site.frame.to_xy(where.latitude, where.longitude)
+        x, y, room = self._system.place_of(order.position)
         return {
             "event": order.event_id,
             "kind": order.kind,
-            "robot": self._feed.numbers.get(order.device or ""),
+            "robot": self._system.number_of(order.device or ""),
             "x_m": round(x, 2),
             "y_m": round(y, 2),
-            "room": self._run.stage.site.room_at(x, y),
+            "room": room,
         }
 
     def _drive(self, held: HeldRobot) -> DriveShown:
-        run = self._run
+        system = self._system
         log = held.log or _NO_DRIVE
-        robot = run.field.robots.get(held.robot)
-        reach = run.stage.reach(held.robot)
+        reach = system.reach(held.robot)
         acted = self._acted.get(held.robot, _NOTHING)
         frame = held.frame
         trips = log.round_trips
         is_over = log.ended is not None
         command = log.commands[-1][1:] if log.commands and not is_over else (0.0, 0.0)
         return {
-            "i": self._feed.numbers.get(held.robot),  # of a robot from elsewhere there is none
-            "pattern": self._feed.pattern_of(held.robot),
+            "i": system.number_of(held.robot),
+            "pattern": system.pattern_of(held.robot),
             "phase": held.phase,
-            "mode": "" if robot is None else robot.controller.mode.value,
+            "mode": system.mode_of(held.robot),
             "session": held.session,
             "wanted": [
                 round(held.last.speed * reach.speed, 3),

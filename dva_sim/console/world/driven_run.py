@@ -1,0 +1,181 @@
+"""A console's own run as the system whose robots people drive; see `DrivenSystem`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.operator.held_robot import HeldRobot
+from dva_sim.agents.operator.strategies import Reach
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.cameras.screens import Screens
+from dva_sim.console.asking.refusal import OnResult
+from dva_sim.console.people.seating import Seating
+from dva_sim.console.robots.robot_actions import RobotActions
+from dva_sim.console.run.lag import LagRule
+from dva_sim.console.views.feed import Feed
+from dva_sim.console.views.foreign_devices import ForeignDevices
+from dva_sim.network.realtime import PacedClock
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.full.control_room import console_of
+from dva_sim.simulation.full.run import Run
+
+PEOPLE: Final = 1  # operators of the scenario whose places people take
+
+
+class DrivenRun:
+    """Robots of a run, and those that have joined it from outside, for people in seats.
+
+    Args:
+        run: The run.
+        clock: Its time, at its pace.
+        feed: Numbers of everybody.
+        lag: Whether the run keeps up with real time.
+        foreign: Robots from outside.
+        screens: Cameras that somebody looks at.
+        author: Name of the person at a page.
+        is_fake: Predicate: True for a device that was added by hand.
+
+    Attributes:
+        hands: Manual control at the robots, once there is any.
+        free_seat: Callback for a page that sits nowhere any more.
+    """
+
+    def __init__(
+        self,
+        run: Run,
+        *,
+        clock: PacedClock,
+        feed: Feed,
+        lag: LagRule,
+        foreign: ForeignDevices,
+        screens: Screens,
+        author: Callable[[str], str],
+        is_fake: Callable[[str], bool],
+    ) -> None:
+        self._run = run
+        self.clock = clock
+        self._feed = feed
+        self._lag = lag
+        self._foreign = foreign
+        self._screens = screens
+        self._author = author
+        self._is_fake = is_fake
+        self.hands: RobotActions | None = None
+        self.free_seat: Callable[[str], object] = lambda _: None
+        self.own_pattern = run.scenario.pattern
+        self.stale_s = run.scenario.robot.max_age_s
+        self.seeks_orders = True
+        self.seating = Seating(
+            self._make_seat, console_of(run.stage, run.scenario), self._watch_robot
+        )
+        for number in range(max(PEOPLE, len(run.persons))):
+            self.seating.person(number)
+
+    def _make_seat(self, number: int) -> AgentDevice:
+        device = self._run.stage.device("console", number)
+        for robot in self._run.field.robots:
+            device.connect(robot)  # an emergency does not wait for a connection
+        self._feed.things.add(device.id_tag, device.label, "operator")
+        return device
+
+    def _watch_robot(self, held: HeldRobot) -> None:
+        """Frames of a robot in somebody's hands are those that the seat gets."""
+        usual = held.on_frame
+
+        def on_frame(held: HeldRobot, frame: Any) -> None:
+            usual(held, frame)
+            self._screens.arrived(held.robot, frame)
+
+        held.on_frame = on_frame
+
+    # --- see `DrivenSystem` ----------------------------------------------------------------
+
+    @property
+    def now_ms(self) -> int:
+        """Time for pages [ms]."""
+        return self._feed.now_ms
+
+    @property
+    def emergency_device(self) -> AgentDevice:
+        """Device of the first seat, which always is there."""
+        return self.seating.person(0).device
+
+    def robots(self) -> list[str]:
+        """Ids of the run's own robots, and of those from outside."""
+        return [*self._run.field.robots, *self._foreign.addresses()]
+
+    def names_of(self, robot: str) -> set[object]:
+        """What a line may call a robot."""
+        return {robot, self.number_of(robot), self.label_of(robot)}
+
+    def number_of(self, robot: str) -> int | None:
+        """Number by which pages know a robot."""
+        return self._feed.numbers.get(robot)
+
+    def label_of(self, device: str) -> str:
+        """Label of a device."""
+        return self._run.stage.labels.get(device, device)
+
+    def mode_of(self, robot: str) -> str:
+        """Mode of a robot of the run; of one from outside the DVA tells."""
+        agent = self._run.field.robots.get(robot)
+        return "" if agent is None else agent.controller.mode.value
+
+    def pattern_of(self, robot: str) -> str:
+        """Name of the pattern by which a robot is driven."""
+        return self._feed.pattern_of(robot)
+
+    def reach(self, robot: str) -> Reach:
+        """Limits of a robot."""
+        return self._run.stage.reach(robot)
+
+    def place_of(self, position: m.Position) -> tuple[float, float, str | None]:
+        """A position on the site [m], and its room."""
+        site = self._run.stage.site
+        x, y = site.frame.to_xy(position.latitude, position.longitude)
+        return x, y, site.room_at(x, y)
+
+    def hears(self, robot: str) -> bool:
+        """False for a robot that was added by hand."""
+        return not self._is_fake(robot)
+
+    def introduce(self, device: AgentDevice, robots: Sequence[str]) -> None:
+        """Let a device know where robots from outside are found."""
+        for robot, address in self._foreign.addresses().items():
+            if robot in robots:
+                device.introduce(robot, address)
+
+    def why_not(self) -> str:
+        """Why nobody may drive now; empty if one may."""
+        if self._lag.held:
+            return "held: this machine cannot keep up with real time"
+        return "The simulation is paused. Resume it first." if self.clock.paused else ""
+
+    def note_held(self, robots: set[str]) -> None:
+        """Seats get the frames of the robots they hold."""
+        self._screens.hold(robots)
+
+    def note_emergency(self, robots: Sequence[str], device: AgentDevice, client: str) -> None:
+        """Manual control ends, and who stopped a robot is known; of several, the first counts."""
+        if self.hands is not None:
+            self.hands.stop(robots)
+        here = self._run.field.robots
+        for robot in robots:
+            if robot in here and not here[robot].controller.latch.holds:
+                self._feed.stoppers[robot] = device.id_tag, self._author(client)
+
+    def change_pattern(self, robot: str, name: str, on_result: OnResult) -> None:
+        """Drive a robot by another pattern, unless it is driven."""
+        run = self._run
+        label = self.label_of(robot)
+        agent = run.field.robots.get(robot)
+        if agent is not None and agent.controller.mode is Mode.TELEOPERATION:
+            on_result(False, f"{label} is driven: it has to be stopped first")
+            return
+        run.stage.pattern_names[robot] = name
+        if agent is not None:
+            agent.expect(run.stage.pattern_for(robot))
+        run.recorder.tell(run.clock.now, label, f"is driven by {name}", "link")
+        on_result(True, "")
