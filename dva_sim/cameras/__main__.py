@@ -14,6 +14,7 @@ import socket
 import sys
 import threading
 from collections.abc import Sequence
+from functools import partial
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -55,7 +56,7 @@ class CameraPages:
         viewer = self._streams.admit(robot, CLIENT)
         if viewer is None:
             raise HTTPException(503, f"{MOST_VIEWERS} viewers are looking already")
-        return PictureStream(self._streams, viewer)
+        return PictureStream(self._streams.stream(viewer), partial(self._streams.leave, viewer))
 
     async def still(self, request: Request) -> Response:
         """`GET /camera/LABEL.jpg`."""

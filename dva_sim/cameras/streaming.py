@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncGenerator, Callable
 from contextlib import aclosing, suppress
 
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
-from dva_sim.cameras.streams import BOUNDARY, CameraStreams, Viewer
+from dva_sim.cameras.streams import BOUNDARY
 from dva_sim.serving.connection import wire_of
 
 STALLED = 5.0  # a viewer that has not taken a picture within this is cut [s]
@@ -18,17 +19,17 @@ class PictureStream(Response):
     """Pictures of a robot, one after the other.
 
     Args:
-        cameras: All pictures.
-        viewer: The viewer of this response.
+        parts: Its pictures, as parts of a response.
+        leave: Callback once the viewer is gone.
     """
 
     media_type = f"multipart/x-mixed-replace; boundary={BOUNDARY}"
 
-    def __init__(self, cameras: CameraStreams, viewer: Viewer) -> None:
+    def __init__(self, parts: AsyncGenerator[bytes, None], leave: Callable[[], object]) -> None:
         super().__init__(headers={"Cache-Control": "no-store", "Connection": "close"})
         del self.headers["content-length"]
-        self._cameras = cameras
-        self._viewer = viewer
+        self._parts = parts
+        self._leave = leave
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send until the viewer leaves, or is cut."""
@@ -44,13 +45,13 @@ class PictureStream(Response):
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            self._cameras.leave(self._viewer)
+            self._leave()
             if wire.waiting:
                 wire.cut()
 
     async def _send(self, send: Send) -> None:
         with suppress(OSError, TimeoutError):
-            async with aclosing(self._cameras.stream(self._viewer)) as parts:
+            async with aclosing(self._parts) as parts:
                 async for part in parts:
                     message = {"type": "http.response.body", "body": part, "more_body": True}
                     async with asyncio.timeout(STALLED):

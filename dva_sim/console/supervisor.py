@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
 from dva_sim.console.audit.audit_keeper import auditing
+from dva_sim.console.driving.seating import leave_seats
 from dva_sim.console.options import kept_results, motion_folder, scenario_of, sockets
 from dva_sim.console.pages.processes import ConsoleProcesses
 from dva_sim.console.people.actions import Actions
-from dva_sim.console.people.seating import leave_seats
 from dva_sim.console.run.recorder import keep_run
 from dva_sim.console.world.kept_results import KeptResults
 from dva_sim.console.world.world import ConsoleWorld

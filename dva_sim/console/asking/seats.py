@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from dva_sim.console.wire.limits import SILENT_AFTER
 
 MOST_SEATS = 16
+FIRST_OF_PHONES = 1000  # number of the seat of the first phone; the console's own are below
 RELOADED = 3.0  # design: a page that is loaded again is open again by then, real time [s]
 
 

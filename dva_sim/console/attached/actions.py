@@ -16,10 +16,10 @@ from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.attached.people import AttachedPeople
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.bench import NOT_HERE, ServerActions
+from dva_sim.console.driving.drive_actions import LOOK, Driving, is_gone_for_good
 from dva_sim.console.events.alarm_actions import AlarmActions
 from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, place_of, report_of
 from dva_sim.console.events.missions import inspection_of, send_on_mission
-from dva_sim.console.people.driving import LOOK, Driving, is_gone_for_good
 from dva_sim.console.wire.actions import ActionPlace, Asked
 from dva_sim.console.wire.arguments import (
     FakeAsked,

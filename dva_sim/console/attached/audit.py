@@ -83,7 +83,7 @@ class AttachedAudit(Audited):
         return wait
 
     def is_noted(self, action: Action) -> bool:
-        """Return True: of decisions, too, the console knows only what it is told."""
+        """Return True: the console knows of decisions by messages alone."""
         return True
 
     def _finish(self, number: str) -> None:

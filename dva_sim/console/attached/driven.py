@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from typing_extensions import override
+
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.operator.attention import OperatorSetup
 from dva_sim.agents.operator.handheld import Console
@@ -13,7 +15,8 @@ from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.asking.refusal import OnResult
 from dva_sim.console.attached.lines import UNKNOWN_ROOM
 from dva_sim.console.attached.system import AttachedSystem
-from dva_sim.console.people.seating import Seating
+from dva_sim.console.driving.driven_system import DrivenSystem
+from dva_sim.console.driving.seating import Seating
 from dva_sim.console.views.things import UNKNOWN_ROBOT
 from dva_sim.core.registry import OPERATOR
 from dva_sim.network.patterns import Pattern, load_pattern
@@ -23,18 +26,16 @@ from dva_sim.simulation.scenario import Scenario, command_timeout_s, phone_profi
 REACH: Final = Reach(UNKNOWN_ROBOT["max_speed_mps"], UNKNOWN_ROBOT["max_turn_rate_radps"])
 
 
-class DrivenAttached:
+class DrivenAttached(DrivenSystem):
     """Robots that a DVA elsewhere lists, for people in seats.
 
-    A robot is driven in sight or by its own picture; the age of a command is told by the tick of
-    its status.
+    Commands carry the tick of a robot's newest status: they are as old as that.
 
     Args:
         system: System to which the console is attached.
         author: Name of the person at a page.
 
     Attributes:
-        free_seat: Callback for a page that sits nowhere any more.
         stoppers: Device and name of the person who stopped a robot from a page, by its id.
     """
 
@@ -48,6 +49,7 @@ class DrivenAttached:
         self.own_pattern = scenario.pattern
         self.stale_s = scenario.robot.max_age_s
         self._patterns: dict[str, str] = {}
+        self.on_held: Callable[[set[str]], object] = lambda _: None
         self.free_seat: Callable[[str], object] = lambda _: None
         self.stoppers: dict[str, tuple[str, str]] = {}
         self.seating = Seating(self._make_seat, self._console(scenario), lambda _: None)
@@ -79,74 +81,65 @@ class DrivenAttached:
     # --- see `DrivenSystem` ----------------------------------------------------------------
 
     @property
+    @override
     def now_ms(self) -> int:
-        """Time for pages [ms]."""
         return self._system.now_ms
 
     @property
+    @override
     def emergency_device(self) -> AgentDevice:
-        """The console's own control room."""
         return self._system.device
 
+    @override
     def robots(self) -> list[str]:
-        """Ids of the robots that the DVA lists."""
         return self._system.robots()
 
-    def names_of(self, robot: str) -> set[object]:
-        """What a line may call a robot."""
-        return {robot, self.number_of(robot), self.label_of(robot)}
-
+    @override
     def number_of(self, robot: str) -> int | None:
-        """Number by which pages know a robot."""
         return self._system.numbers.get(robot)
 
+    @override
     def label_of(self, device: str) -> str:
-        """Label of a device."""
         return self._system.label_of(device)
 
+    @override
     def mode_of(self, robot: str) -> str:
-        """Mode that a robot has published last."""
         entry = self._system.state.devices.get(robot)
         status = None if entry is None else entry.status
         return status.mode if isinstance(status, m.RobotStatus) else ""
 
+    @override
     def pattern_of(self, robot: str) -> str:
-        """Name of the pattern by which a robot is driven from here."""
         return self._patterns.get(robot, self.own_pattern)
 
+    @override
     def reach(self, robot: str) -> Reach:
-        """Limits of a robot: those of which pages know, since no message tells them."""
         return REACH
 
+    @override
     def place_of(self, position: m.Position) -> tuple[float, float, str | None]:
-        """A position on the map [m], and its room."""
         x, y = self._system.frame.to_xy(position.latitude, position.longitude)
         site = self._system.site
         return x, y, UNKNOWN_ROOM if site is None else site.room_at(x, y)
 
+    @override
     def hears(self, robot: str) -> bool:
-        """False for a robot that was added by hand here."""
         return not self._system.is_fake(robot)
 
+    @override
     def introduce(self, device: AgentDevice, robots: Sequence[str]) -> None:
-        """The list of the DVA has told where robots are found."""
+        for robot in robots:
+            device.introduce(robot, self._system.state.devices[robot].device.address)
 
-    def why_not(self) -> str:
-        """Nothing runs here that could stand in the way."""
-        return ""
-
-    def note_held(self, robots: set[str]) -> None:
-        """Pictures do not come through here."""
-
+    @override
     def note_emergency(self, robots: Sequence[str], device: AgentDevice, client: str) -> None:
-        """Note who stopped a robot; of several, the first counts."""
         for robot in robots:
             entry = self._system.state.devices[robot]
             if entry.emergency is None or entry.emergency[0].released is not None:
                 self.stoppers[robot] = device.id_tag, self._author(client)
 
+    @override
     def change_pattern(self, robot: str, name: str, on_result: OnResult) -> None:
-        """Drive a robot by another pattern, unless it is driven."""
         label = self.label_of(robot)
         if self.mode_of(robot) == Mode.TELEOPERATION.value:
             on_result(False, f"{label} is driven: it has to be stopped first")

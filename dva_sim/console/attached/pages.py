@@ -19,9 +19,9 @@ from dva_sim.console.attached.requests import LOG, RequestReader
 from dva_sim.console.attached.sensing import WatchedSensors
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import AuditKeeper
+from dva_sim.console.driving.seat_lines import SeatLines
 from dva_sim.console.events.console_alarms import ConsoleAlarms
 from dva_sim.console.events.decisions import about_event, dispatch_shown
-from dva_sim.console.people.seat_lines import SeatLines
 from dva_sim.console.run.lag import LagRule
 from dva_sim.console.views.feed import story_of
 from dva_sim.console.views.news import News, clock_shown

@@ -11,8 +11,8 @@ from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.attached.piped_bench import PipedBench
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import auditing
+from dva_sim.console.driving.seating import leave_seats
 from dva_sim.console.pages.processes import ConsoleProcesses, Say
-from dva_sim.console.people.seating import leave_seats
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live.process import ending_when_asked
 from dva_sim.options.runs import ConsoleOptions

@@ -229,10 +229,8 @@ class AttachedSystem:
 
     def robots(self) -> list[str]:
         """Ids of the robots that the DVA lists."""
-        known = self.state.devices.items()
-        return [
-            i for i, entry in known if entry.device.device_type == ROBOT and not self.is_fake(i)
-        ]
+        devices = self.state.devices.items()
+        return [id_tag for id_tag, entry in devices if entry.device.device_type == ROBOT]
 
     def is_fake(self, id_tag: str) -> bool:
         """Return True if a device was added by hand, here."""

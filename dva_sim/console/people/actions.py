@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import OnResult, Refused
+from dva_sim.console.driving.drive_actions import LOOK, Driving, is_gone_for_good
 from dva_sim.console.events.alarm_actions import AlarmActions
 from dva_sim.console.guards.guard_actions import GuardActions
-from dva_sim.console.people.driving import LOOK, Driving, is_gone_for_good
 from dva_sim.console.people.phone_actions import PhoneActions
 from dva_sim.console.people.room_actions import RoomActions
 from dva_sim.console.people.tour import tour_of

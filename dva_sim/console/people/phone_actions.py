@@ -11,7 +11,7 @@ import time
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import NO_ANSWER, OnResult, Refused
-from dva_sim.console.people.driving import Driving
+from dva_sim.console.driving.drive_actions import Driving
 from dva_sim.console.phones.phone_input import samples_of, settings_of
 from dva_sim.console.phones.phone_seat import PhoneSeat
 from dva_sim.console.wire.actions import Asked

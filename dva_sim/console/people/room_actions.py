@@ -8,10 +8,10 @@ from typing import Any
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.asking.releases import NOBODY_STOPPED, release_robots
+from dva_sim.console.driving.drive_actions import Driving
 from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, place_of, report_of
 from dva_sim.console.events.missions import inspection_of, send_on_mission
 from dva_sim.console.events.rooms import ConsoleRoom
-from dva_sim.console.people.driving import Driving
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import (
     MissionAsked,

@@ -15,7 +15,7 @@ from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.tilt import PhoneProfile, known_filters, known_mappings
-from dva_sim.console.people.seating import FIRST_OF_PHONES
+from dva_sim.console.asking.seats import FIRST_OF_PHONES
 from dva_sim.console.phones.phone_input import PIPELINES, PhoneSettings
 from dva_sim.console.phones.phone_seat import PhoneSeat
 from dva_sim.console.wire.arguments import DELAYS, STEPS

@@ -13,6 +13,7 @@ from dva_sim.console.views.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
 from dva_sim.console.wire.rows import EmergencyShown, RobotRow
 from dva_sim.core.registry import GUARD, ROBOT, DeviceEntry
 from dva_sim.kernel.labels import distinct
+from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import kind_of
 
@@ -39,6 +40,7 @@ def foreign_robot_row(number: int, mode: str, emergency: EmergencyShown | None =
         "commands_hz": None,
         "refused": None,
         "timeouts": None,
+        "camera": None,
     }
 
 
@@ -54,6 +56,12 @@ class ForeignDevices:
         self._feed = feed
         self._version = -1
         self._known: dict[str, str] = {}  # kinds, by id
+        self._cameras: dict[str, str | None] = {}
+
+    @property
+    def is_anybody(self) -> bool:
+        """Return True if somebody from outside has ever come."""
+        return bool(self._known)
 
     def come(self) -> bool:
         """Return True if a device is new since the last call; each has a number from then on."""
@@ -98,10 +106,19 @@ class ForeignDevices:
             for robot, stop in core.emergencies.stopped().items()
         }
         return [
-            foreign_robot_row(self._feed.numbers[id_tag], entry.mode, stopped.get(id_tag))
+            {
+                **foreign_robot_row(self._feed.numbers[id_tag], entry.mode, stopped.get(id_tag)),
+                "pattern": self._feed.pattern_of(id_tag),
+                "camera": self._cameras.get(id_tag),
+            }
             for id_tag, entry in self._here()
             if self._known[id_tag] == "robot"
         ]
+
+    def note_cameras(self, reply: m.Reply) -> None:
+        """Note the addresses of pictures that the DVA lists."""
+        if isinstance(reply.content, m.SensorList):
+            self._cameras = {one.device: one.camera_url for one in reply.content.devices}
 
     def addresses(self) -> dict[str, str]:
         """Return where each robot that is here takes requests, by id."""

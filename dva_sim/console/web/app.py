@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from dva_sim.console.web.audit import AuditPages
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.log_requests import LogRequests
 from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePages
+from dva_sim.console.web.relay import NoPictures, open_camera
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
 from dva_sim.console.wire.roles import Role
 from dva_sim.serving.connection import place_of
@@ -193,6 +195,9 @@ class Pages:
     async def stream(self, request: Request) -> Response:
         """`GET /camera/LABEL.mjpg`: a stream of JPEGs of a robot's camera."""
         robot = self._robot(request)
+        row = self._simulation.state.row_of(robot)
+        if "camera" in row:  # of a robot elsewhere, which states it or not
+            return await self._relayed(request, robot, row["camera"])
         if not self._cameras.draws:
             return problem(503, "no picture: nobody draws")
         if request.method == "HEAD":
@@ -200,7 +205,21 @@ class Pages:
         viewer = self._cameras.admit(robot, request.scope[ROLE])
         if viewer is None:
             return problem(503, "64 viewers are looking already")
-        return PictureStream(self._cameras, viewer)
+        return PictureStream(self._cameras.stream(viewer), partial(self._cameras.leave, viewer))
+
+    async def _relayed(self, request: Request, robot: int, url: str | None) -> Response:
+        """A stream from the address that a robot elsewhere has stated."""
+        if not url:
+            return problem(503, f"{request.path_params['label']} offers no picture")
+        viewer = self._cameras.admit(robot, request.scope[ROLE])
+        if viewer is None:
+            return problem(503, "64 viewers are looking already")
+        try:
+            camera = await open_camera(url)
+        except NoPictures as error:
+            self._cameras.leave(viewer)
+            return problem(503, f"no picture: {error}")
+        return PictureStream(camera.pictures(), partial(self._cameras.leave, viewer))
 
     async def still(self, request: Request) -> Response:
         """`GET /camera/LABEL.jpg`: one picture of a robot's camera."""

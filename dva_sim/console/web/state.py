@@ -85,6 +85,11 @@ class RunState:
         self._deltas: dict[int, str] = {}
         self._snapshot: tuple[int, str] = -1, ""
 
+    def row_of(self, robot: int) -> Line:
+        """Return the newest row of a robot, by its index; empty: there is none."""
+        rows = self.lines.get("rows", {}).get("robots", ())
+        return next((row for row in rows if row["i"] == robot), {})
+
     def take(self, line: Line) -> str:
         """Learn from a line; its kind."""
         kind = str(line.get("k", ""))

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
+from typing_extensions import override
+
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.strategies import Reach
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.cameras.screens import Screens
 from dva_sim.console.asking.refusal import OnResult
-from dva_sim.console.people.seating import Seating
+from dva_sim.console.driving.driven_system import DrivenSystem
+from dva_sim.console.driving.seating import Seating
 from dva_sim.console.robots.robot_actions import RobotActions
 from dva_sim.console.run.lag import LagRule
 from dva_sim.console.views.feed import Feed
@@ -24,14 +27,14 @@ from dva_sim.simulation.full.run import Run
 PEOPLE: Final = 1  # operators of the scenario whose places people take
 
 
-class DrivenRun:
+class DrivenRun(DrivenSystem):
     """Robots of a run, and those that have joined it from outside, for people in seats.
 
     Args:
         run: The run.
         clock: Its time, at its pace.
         feed: Numbers of everybody.
-        lag: Whether the run keeps up with real time.
+        lag: Rule that holds drives while the run lags.
         foreign: Robots from outside.
         screens: Cameras that somebody looks at.
         author: Name of the person at a page.
@@ -39,7 +42,6 @@ class DrivenRun:
 
     Attributes:
         hands: Manual control at the robots, once there is any.
-        free_seat: Callback for a page that sits nowhere any more.
     """
 
     def __init__(
@@ -63,6 +65,7 @@ class DrivenRun:
         self._author = author
         self._is_fake = is_fake
         self.hands: RobotActions | None = None
+        self.on_held = screens.hold
         self.free_seat: Callable[[str], object] = lambda _: None
         self.own_pattern = run.scenario.pattern
         self.stale_s = run.scenario.robot.max_age_s
@@ -93,72 +96,64 @@ class DrivenRun:
     # --- see `DrivenSystem` ----------------------------------------------------------------
 
     @property
+    @override
     def now_ms(self) -> int:
-        """Time for pages [ms]."""
         return self._feed.now_ms
 
     @property
+    @override
     def emergency_device(self) -> AgentDevice:
-        """Device of the first seat, which always is there."""
         return self.seating.person(0).device
 
+    @override
     def robots(self) -> list[str]:
-        """Ids of the run's own robots, and of those from outside."""
         return [*self._run.field.robots, *self._foreign.addresses()]
 
-    def names_of(self, robot: str) -> set[object]:
-        """What a line may call a robot."""
-        return {robot, self.number_of(robot), self.label_of(robot)}
-
+    @override
     def number_of(self, robot: str) -> int | None:
-        """Number by which pages know a robot."""
         return self._feed.numbers.get(robot)
 
+    @override
     def label_of(self, device: str) -> str:
-        """Label of a device."""
         return self._run.stage.labels.get(device, device)
 
+    @override
     def mode_of(self, robot: str) -> str:
-        """Mode of a robot of the run; of one from outside the DVA tells."""
         agent = self._run.field.robots.get(robot)
         return "" if agent is None else agent.controller.mode.value
 
+    @override
     def pattern_of(self, robot: str) -> str:
-        """Name of the pattern by which a robot is driven."""
         return self._feed.pattern_of(robot)
 
+    @override
     def reach(self, robot: str) -> Reach:
-        """Limits of a robot."""
         return self._run.stage.reach(robot)
 
+    @override
     def place_of(self, position: m.Position) -> tuple[float, float, str | None]:
-        """A position on the site [m], and its room."""
         site = self._run.stage.site
         x, y = site.frame.to_xy(position.latitude, position.longitude)
         return x, y, site.room_at(x, y)
 
+    @override
     def hears(self, robot: str) -> bool:
-        """False for a robot that was added by hand."""
         return not self._is_fake(robot)
 
+    @override
     def introduce(self, device: AgentDevice, robots: Sequence[str]) -> None:
-        """Let a device know where robots from outside are found."""
         for robot, address in self._foreign.addresses().items():
             if robot in robots:
                 device.introduce(robot, address)
 
+    @override
     def why_not(self) -> str:
-        """Why nobody may drive now; empty if one may."""
         if self._lag.held:
             return "held: this machine cannot keep up with real time"
         return "The simulation is paused. Resume it first." if self.clock.paused else ""
 
-    def note_held(self, robots: set[str]) -> None:
-        """Seats get the frames of the robots they hold."""
-        self._screens.hold(robots)
-
+    @override
     def note_emergency(self, robots: Sequence[str], device: AgentDevice, client: str) -> None:
-        """Manual control ends, and who stopped a robot is known; of several, the first counts."""
         if self.hands is not None:
             self.hands.stop(robots)
         here = self._run.field.robots
@@ -166,8 +161,8 @@ class DrivenRun:
             if robot in here and not here[robot].controller.latch.holds:
                 self._feed.stoppers[robot] = device.id_tag, self._author(client)
 
+    @override
     def change_pattern(self, robot: str, name: str, on_result: OnResult) -> None:
-        """Drive a robot by another pattern, unless it is driven."""
         run = self._run
         label = self.label_of(robot)
         agent = run.field.robots.get(robot)

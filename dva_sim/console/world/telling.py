@@ -9,12 +9,12 @@ from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.cameras.lines import Show, contained_line
 from dva_sim.cameras.screens import Screens
 from dva_sim.console.audit.audited import Audited
+from dva_sim.console.driving.seat_lines import SeatLines
 from dva_sim.console.dva.dva_pages import DvaPages
 from dva_sim.console.events.console_alarms import ConsoleAlarms
 from dva_sim.console.events.decisions import about_event
 from dva_sim.console.events.rooms import ConsoleRooms
 from dva_sim.console.guards.played_guards import PlayedGuards
-from dva_sim.console.people.seat_lines import SeatLines
 from dva_sim.console.phones.phones import Phones
 from dva_sim.console.robots.robot_windows import RobotWindows
 from dva_sim.console.robots.stop_reasons import stop_reason
@@ -32,6 +32,7 @@ from dva_sim.console.wire.limits import LOG_PERIOD
 from dva_sim.console.wire.lines import Tell
 from dva_sim.console.wire.rows import RobotRow, RowsLine
 from dva_sim.network.realtime import PacedClock
+from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.scenario import Scenario
 
@@ -42,6 +43,7 @@ ROWS = 0.5
 HAZARDS = 1.0
 DEVICES = 1.0
 TIDY = 1.0
+CAMERAS = 5.0
 SOON = 0.05  # from one look at what has changed to the next, real time [s]
 
 
@@ -98,6 +100,7 @@ class PublishingWorld:
         self.clock.pulse(LOG_PERIOD, self._tell_logs)
         self.clock.pulse(DEVICES, self._tell_devices)
         self.clock.pulse(TIDY, self.recorder.tidy)
+        self.clock.pulse(CAMERAS, self._ask_for_cameras)
 
     def tell_scene(self) -> None:
         """Tell what does not change, but for where the DVA listens."""
@@ -143,6 +146,11 @@ class PublishingWorld:
         }
         self.tell(rows)
         self._tell_alarms(rows["robots"])
+
+    def _ask_for_cameras(self) -> None:
+        """Ask the DVA where robots from outside show their pictures."""
+        if self.foreign.is_anybody:
+            self.rooms.listener.ask(m.GetSensorInfo(), self.foreign.note_cameras)
 
     def _tell_windows(self) -> None:
         def reason_of(robot: RobotAgent) -> str:

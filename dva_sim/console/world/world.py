@@ -16,11 +16,11 @@ from dva_sim.cameras.lines import FrameLine, Show, contained_line, scene_line
 from dva_sim.cameras.screens import Screens, camera_url, topic_of
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited, name_of_page
+from dva_sim.console.driving.seat_lines import SeatLines
 from dva_sim.console.dva.dva_pages import DvaPages
 from dva_sim.console.events.console_alarms import ConsoleAlarms, RunFacts
 from dva_sim.console.events.rooms import ConsoleRooms
 from dva_sim.console.guards.played_guards import PlayedGuards
-from dva_sim.console.people.seat_lines import SeatLines
 from dva_sim.console.phones.phones import Phones
 from dva_sim.console.robots.robot_windows import RobotWindows
 from dva_sim.console.run.lag import LagRule

@@ -11,6 +11,7 @@ from helpers.network.free_ports import free_port
 from helpers.processes.command_line import call
 from helpers.processes.patience import becomes
 from helpers.processes.programs import Program, Programs
+from helpers.wording import unnamed
 
 from dva_sim.console.attached import lines
 from dva_sim.console.attached.options import check, own_id
@@ -123,6 +124,7 @@ class Attached:
     def __init__(self, programs: Programs, dva: str, *words: str) -> None:
         self.program, self.address = started(programs, "--dva", dva, *words)
         self.program.wait_to_say("Attached to:")
+        self.seat: dict[str, str] = {}
 
     def _ask(self, path: str, body: object = None) -> dict:
         base, _, token = self.address.partition("?token=")
@@ -140,8 +142,10 @@ class Attached:
 
     def act(self, action: str, **arguments: object) -> dict:
         self.count = getattr(self, "count", 0) + 1
-        body = {"id": f"a-{self.count}", "action": action, "arguments": arguments}
-        return self._ask("/api/actions", body)
+        body = {"id": f"a-{self.count}", "action": action, "arguments": arguments} | self.seat
+        answer = self._ask("/api/actions", body)
+        self.seat = {"key": answer["key"]} if "key" in answer else self.seat
+        return answer
 
 
 def live(programs: Programs, dva: str, part: str, *words: str) -> Program:
@@ -164,10 +168,13 @@ def test_it_shows_what_runs_there_and_outlives_the_dva(programs):
     people = {one["label"]: one.get("doing") for one in console.state()["people"]}
     assert people.keys() == {"guard-1", "guard-2"}
     assert becomes(lambda: any(e["kind"] == "fire" for e in console.state()["events"]))
-    refused = console.act("take", robots=["robot-1"])
-    assert not refused["ok"]
-    assert "runs elsewhere" in refused["text"]
-    assert console._ask("/api/emergency", {"robots": "all"})["text"] == "robots stop"
+    assert "runs elsewhere" in console.act("link", delay_s=1.0)["text"]
+    assert console.act("take", robots=["robot-1"])["ok"]
+    assert console.act("start")["ok"]
+    assert becomes(lambda: ("robot-1", "Teleoperation") in robots())
+    stopped = console._ask("/api/emergency", {"robots": "all"})
+    assert unnamed(stopped["text"], "robot-1", "robot-2") == []
+    assert console.act("release")["ok"]
 
     fire = next(e["number"] for e in console.state()["events"] if e["kind"] == "fire")
     assert console.act("event_proposal", event=fire)["ok"]
@@ -199,6 +206,8 @@ def test_with_keys_it_attaches_as_the_control_room_of_its_key_and_decides(progra
     number = console.state()["events"][0]["number"]
     assert console.act("event_note", event=number, text="seen from elsewhere")["ok"]
     assert "key of its own" in console.act("fake_add", label="ghost", type="Robot")["text"]
+    assert "console-1" in console.act("take", robots=["robot-1"])["text"]
+    create_keys(keys, [id_of("console", 1)])
     assert becomes(lambda: any(e["kind"] == "fire" for e in console.state()["events"]))
     assert console.act("event_acknowledge", event=1)["ok"]
     done = console.act("event_assign", event=1, device="guard-1", reason="is near")

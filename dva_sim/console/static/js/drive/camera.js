@@ -1,9 +1,9 @@
 /** A robot's picture with its true age; an outdated picture is marked. */
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
-import { pictures, scene } from '../store.js';
+import { pictures, rowOf, scene } from '../store.js';
 import { isStale, pageAge } from '../net/world_time.js';
 import { secondsText } from '../ui/words.js';
-import { drawsNoMore, drew, pictureAge } from './drawn.js';
+import { drawsNoMore, drew, pictureAge, sinceArrived } from './drawn.js';
 import { play } from './mjpeg.js';
 
 const OLD_PERIODS = 2;
@@ -33,15 +33,28 @@ export function CameraPicture({ robot }) {
 
 /** @param {{robot: import('../lines.js').Thing, trouble: string}} props */
 function Age({ robot, trouble }) {
-  const age = pictureAge(robot.i) / 1000;
-  const period = 1 / (robot.camera?.rate_hz || 5);
+  const isElsewhere = rowOf(robot.i)?.camera !== undefined;
+  const { age, text } = isElsewhere ? arrivalOf(robot) : ageOf(robot);
   const known = Number.isFinite(age);
+  const period = 1 / (robot.camera?.rate_hz || 5);
   const limit = Math.max(HATCHED_S, scene.value?.stale_s ?? 0);
   const look = !known || age > limit || isStale.value ? 'hatched' : age > OLD_PERIODS * period ? 'old' : 'fresh';
   const silence = isStale.value ? `, no data for ${secondsTo(pageAge())}` : '';
-  const text = known ? `${secondsTo(age)} old${silence}` : pictures.value || trouble || 'waiting for the first picture';
+  const shown = known ? `${text}${silence}` : (isElsewhere ? '' : pictures.value) || trouble || 'waiting for the first picture';
   return html`<div class=${`veil ${look}`}></div>
-    <figcaption><span class=${`picture-age ${look}`}>${text}</span></figcaption>`;
+    <figcaption><span class=${`picture-age ${look}`}>${shown}</span></figcaption>`;
+}
+
+/** Age of a picture whose time is known. @param {import('../lines.js').Thing} robot */
+function ageOf(robot) {
+  const age = pictureAge(robot.i) / 1000;
+  return { age, text: `${secondsTo(age)} old` };
+}
+
+/** Time since the arrival of a picture that has no known age. @param {import('../lines.js').Thing} robot */
+function arrivalOf(robot) {
+  const age = sinceArrived(robot.i) / 1000;
+  return { age, text: `came ${secondsTo(age)} ago, age unknown` };
 }
 
 /** @param {number} age [s] */

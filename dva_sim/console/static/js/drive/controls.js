@@ -102,7 +102,7 @@ function Hint({ holds, stopped }) {
 function isOnItsWay() {
   const drives = seat.value?.drives ?? [];
   const wanted = held.value && wish.value.speed > 0 && seat.value?.phase === 'driving';
-  return wanted && drives.every((drive) => !rowOf(drive.i)?.set_speed_mps);
+  return wanted && drives.every((drive) => rowOf(drive.i)?.set_speed_mps === 0);
 }
 
 function heldByOther() {

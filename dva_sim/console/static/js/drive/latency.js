@@ -1,6 +1,6 @@
 /** Latency panel: ages of commands, replies and pictures of each driven robot. */
 import { html, useEffect, useMemo } from '../../vendor/preact.js';
-import { driveOf, floorMs, isModelled, rowOf } from '../store.js';
+import { driveOf, floorMs, isAttached, isModelled, rowOf } from '../store.js';
 import { isStale, worldNow } from '../net/world_time.js';
 import { Chart } from '../charts/chart.js';
 import { History } from '../charts/history.js';
@@ -16,7 +16,12 @@ const DASHES = [undefined, [6, 3]];
 /** Patterns under which a robot does not reply to commands. */
 const UNANSWERED = ['pub-sub', 'latest-wins'];
 
-const KINDS = /** @type {{title: string, hint: string, none: (i: number) => string, read: (i: number) => number | null}[]} */ ([
+/**
+ * @typedef {{title: string, hint: string, isFromReplies?: boolean, none: (i: number) => string,
+ *   read: (i: number) => number | null}} Kind
+ */
+
+const KINDS = /** @type {Kind[]} */ ([
   {
     title: 'Command age',
     none: () => 'no command yet',
@@ -25,6 +30,7 @@ const KINDS = /** @type {{title: string, hint: string, none: (i: number) => stri
   },
   {
     title: 'Round trip',
+    isFromReplies: true, // which a robot elsewhere sends as well
     none: (i) => (UNANSWERED.includes(rowOf(i)?.pattern ?? '') ? 'this pattern has no answers' : 'no answer yet'),
     hint: 'from a command sent to its answer',
     read: (i) => driveOf(i)?.round_trip_ms ?? null,
@@ -43,9 +49,10 @@ const KINDS = /** @type {{title: string, hint: string, none: (i: number) => stri
 /** @param {{robots: Thing[]}} props */
 export function Latency({ robots }) {
   const key = robots.map((robot) => robot.i).join();
-  const histories = useMemo(() => KINDS.map(() => new History(robots.length)), [key]);
+  const kinds = isAttached.value ? KINDS.filter((kind) => kind.isFromReplies) : KINDS;
+  const histories = useMemo(() => kinds.map(() => new History(robots.length)), [key, kinds.length]);
   useEffect(() => {
-    const timer = window.setInterval(() => sample(histories, robots), SAMPLE_MS);
+    const timer = window.setInterval(() => sample(kinds, histories, robots), SAMPLE_MS);
     return () => window.clearInterval(timer);
   }, [histories]);
   const lines = robots.map((robot, n) => ({
@@ -54,8 +61,8 @@ export function Latency({ robots }) {
     dash: DASHES[n],
   }));
   return html`<section class="latency panel" aria-label="Latency">
-    <h2>Latency <${Floor} /></h2>
-    <div class="charts reported">${KINDS.map(
+    <h2>Latency ${!isAttached.value && html`<${Floor} />`}</h2>
+    <div class="charts reported">${kinds.map(
       (kind, n) => html`<div title=${kind.hint}>
         <${Chart} title=${kind.title} unit="ms" lines=${lines} least=${100}
           read=${() => histories[n].read()} />
@@ -65,11 +72,11 @@ export function Latency({ robots }) {
   </section>`;
 }
 
-/** @param {History[]} histories @param {Thing[]} robots */
-function sample(histories, robots) {
+/** @param {Kind[]} kinds @param {History[]} histories @param {Thing[]} robots */
+function sample(kinds, histories, robots) {
   if (document.hidden || isStale.peek()) return;
   const time = worldNow() / 1000;
-  KINDS.forEach((kind, n) => histories[n].add(time, robots.map((robot) => kind.read(robot.i))));
+  kinds.forEach((kind, n) => histories[n].add(time, robots.map((robot) => kind.read(robot.i))));
 }
 
 /** Lower bound on the latency of a command, whatever the pattern. */

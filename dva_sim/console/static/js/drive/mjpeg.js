@@ -18,16 +18,22 @@ export async function play(url, show, tell, signal) {
   while (!signal.aborted) {
     try {
       const answer = await fetch(url, { signal, cache: 'no-store' });
-      if (!answer.ok || !answer.body) throw new Error(`the server answered ${answer.status}`);
+      if (!answer.ok || !answer.body) throw new Error(await reasonOf(answer));
       tell('');
       await readParts(answer.body.getReader(), show, signal);
       tell('The stream ended. Reconnecting …');
     } catch (error) {
       if (signal.aborted) return;
-      tell(`No picture: ${error instanceof Error ? error.message : error}`);
+      tell(error instanceof Error ? error.message : `${error}`);
     }
     await new Promise((later) => window.setTimeout(later, WAIT_MS));
   }
+}
+
+/** Reason that the server gives for a missing picture. @param {Response} answer */
+async function reasonOf(answer) {
+  const { text } = await answer.json().catch(() => ({}));
+  return text || `No picture: the server answered ${answer.status}`;
 }
 
 /**

@@ -1,6 +1,6 @@
 /** Header above each picture: the robot, its pattern, and counts of its commands. */
 import { html } from '../../vendor/preact.js';
-import { driveOf, modeOf, robots, rowOf, rows, seat } from '../store.js';
+import { driveOf, isAttached, modeOf, robots, rowOf, rows, seat } from '../store.js';
 import { sinceSent } from '../net/world_time.js';
 import { PatternSelect } from '../network/pattern_select.js';
 import { chooseRobots, driven } from '../shell/route.js';
@@ -55,6 +55,7 @@ function BesideButton({ robot }) {
  */
 function Watchdog({ robot }) {
   const reported = rowOf(robot.i)?.watchdog_left_s;
+  if (isAttached.value) return null; // no message tells it
   if (!rows.value || reported === null || reported === undefined) return html`<span class="watchdog off reported">watchdog off</span>`;
   const left = Math.max(0, reported - sinceSent(rows.value));
   return html`<span class=${`watchdog reported ${left < 1 ? 'low' : ''}`} title="The robot stops by itself if no command arrives for this long">
@@ -65,8 +66,9 @@ function Watchdog({ robot }) {
 function StopReason({ robot }) {
   const row = rowOf(robot.i);
   const drive = driveOf(robot.i);
-  const speed = row?.set_speed_mps ?? 0;
-  const text = row?.stop_reason ? `Stopped: ${row.stop_reason}` : `Set point ${speed.toFixed(2)} m/s`;
+  const speed = row?.set_speed_mps ?? drive?.command[0] ?? 0;
+  const name = isAttached.value ? 'Commanded' : 'Set point';
+  const text = row?.stop_reason ? `Stopped: ${row.stop_reason}` : `${name} ${speed.toFixed(2)} m/s`;
   const counts = drive ? `${drive.sent} sent, ${drive.refused} refused, ${drive.timeouts} timed out` : '';
   return html`<span class="stop-reason reported">${text} <span class="soft">${counts}</span></span>`;
 }

@@ -1,6 +1,6 @@
 /** Event panel: the state of one event, the policy's proposal, and all available actions. */
 import { html, useRef, useState } from '../../vendor/preact.js';
-import { isAttached, mayDispatch, maySteer, maySupervise, modeOf, robots, rowOf, selection, thingNamed } from '../store.js';
+import { mayDispatch, maySteer, maySupervise, modeOf, robots, rowOf, selection, thingNamed } from '../store.js';
 import { act } from '../net/actions.js';
 import { ageOf } from '../net/world_time.js';
 import { isOpen } from '../map/shown.js';
@@ -115,21 +115,16 @@ function TakeOver({ off, words, event, setResult }) {
   const label = picked || (here[0] ?? robots.value[0])?.label || '';
   const take = async () => {
     setResult('');
-    const done = await act('take_over', { robot: label, reason: words || (isAttached.value ? 'taken over' : 'taken over by hand') });
+    const done = await act('take_over', { robot: label, reason: words || 'taken over by hand' });
     if (!done.ok) return;
-    if (isAttached.value) {
-      setResult(done.text);
-      return;
-    }
     selection.value = null;
     chooseRobots([label]);
   };
-  const hint = isAttached.value ? 'Takes the robot from its driver; it then goes to its order by itself' : 'You drive it yourself';
   return html`<div class="take-over"><label for="take-over">Robot</label>
     <select id="take-over" value=${label} onInput=${(/** @type {any} */ event) => pick(event.currentTarget.value)}>
       ${robots.value.map((robot) => html`<option value=${robot.label} selected=${robot.label === label}>
         ${robot.label}${holderText(robot.i)}</option>`)}</select>
-    <button type="button" disabled=${off || !label} title=${hint} onClick=${take}>Take over</button></div>`;
+    <button type="button" disabled=${off || !label} title="You drive it yourself" onClick=${take}>Take over</button></div>`;
 }
 
 /** @param {number} i */

@@ -1,7 +1,7 @@
 /** Link panel: settings of the link, and the speed of the simulation. */
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
 import { FASTEST } from '../declared.js';
-import { clock, isModelled, link, maySteer, scene } from '../store.js';
+import { clock, isAttached, isModelled, link, maySteer, scene } from '../store.js';
 import { act } from '../net/actions.js';
 import { Slider } from '../ui/slider.js';
 import { rateText } from '../ui/words.js';
@@ -51,7 +51,7 @@ function RealLink() {
   return html`<section class="panel link-panel" aria-label="Link settings">
     <h2>A real link</h2>
     <p class="soft">Messages use real sockets in real time. Delay, jitter and loss are those of the real network.</p>
-    <div class="knobs"><${LinkSlider} knob=${knob} /></div>
+    ${!isAttached.value && html`<div class="knobs"><${LinkSlider} knob=${knob} /></div>`}
   </section>`;
 }
 

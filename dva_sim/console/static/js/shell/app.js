@@ -33,7 +33,7 @@ const PAGES = /** @type {[string, string, string][]} */ ([
   ['network', 'Network', 'activity'],
   ['audit', 'Audit', 'shield-check'],
 ]);
-const NOT_ATTACHED = ['robots', 'drive', 'network']; // of which messages tell nothing
+const NOT_ATTACHED = ['robots', 'network']; // of which messages tell nothing
 // What sends something is not there in a recording.
 const OF_A_RECORDING = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],

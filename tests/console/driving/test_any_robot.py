@@ -1,4 +1,4 @@
-"""Any robot that a console lists is driven from its page, whoever runs it: one story, all ways."""
+"""Any robot that a console lists is driven from its page, of any origin: one story, all ways."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -18,7 +18,7 @@ FOREIGN = "AA:BB:CC:00:00:01"
 
 
 class ForeignRobot:
-    """A robot of another make: it obeys whoever the DVA grants it to, and notes what it was told.
+    """A robot of another make: it answers OK to everybody, and notes the requests.
 
     Args:
         run: Run of the DVA at which it registers.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
-from dva_sim.console.people.driving import DrivenSystem
+from dva_sim.console.driving.driven_system import DrivenSystem
 from dva_sim.console.phones.phone_seat import PhoneSeat
 from dva_sim.console.wire.scenes import OrderShown
 from dva_sim.console.wire.seats import DriveShown, InputHeard, PhoneShown, SeatLine

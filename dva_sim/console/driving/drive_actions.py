@@ -1,7 +1,7 @@
 """Driving from pages: seats, robots in hand, input, and all that ends a drive.
 
 Whatever ends a drive ends it for good: nothing begins again by itself. Any robot that is listed can
-be taken, whoever runs it: a seat knows it by its messages.
+be taken, of any origin: a seat knows it by its messages.
 """
 
 from __future__ import annotations
@@ -12,17 +12,15 @@ from functools import partial
 from typing import Any, Protocol, Unpack
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
-from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.operator.handheld import Gathered
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.operator.steps import ask_emergency
-from dva_sim.agents.operator.strategies import Reach
 from dva_sim.console.asking.answers import BYE
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import OnResult, Refused, unanswered
 from dva_sim.console.audit.audited import name_of_page
+from dva_sim.console.driving.driven_system import DrivenSystem
 from dva_sim.console.events.takeover import Takeover
-from dva_sim.console.people.seating import Seating
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import (
     OfRobots,
@@ -34,89 +32,11 @@ from dva_sim.console.wire.arguments import (
 )
 from dva_sim.console.wire.limits import SILENT_AFTER
 from dva_sim.console.wire.seats import Answered
-from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.patterns import PATTERNS
 from dva_sim.protocol import messages as m
 
 LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
-
-
-class DrivenSystem(Protocol):
-    """The system whose robots are driven."""
-
-    @property
-    def clock(self) -> Clock:
-        """Return its time."""
-
-    @property
-    def now_ms(self) -> int:
-        """Return the time for pages [ms]."""
-
-    @property
-    def seating(self) -> Seating:
-        """Return the seats of the console."""
-
-    @property
-    def own_pattern(self) -> str:
-        """Return the pattern of its scenario."""
-
-    @property
-    def stale_s(self) -> float:
-        """Return the age above which robots refuse what a command was based on [s]."""
-
-    @property
-    def seeks_orders(self) -> bool:
-        """Return True if free seats take part while pages are open: the DVA may order them."""
-
-    @property
-    def emergency_device(self) -> AgentDevice:
-        """Return the device that stops robots for pages without a seat."""
-
-    def robots(self) -> Sequence[str]:
-        """Return the ids of all robots that pages show."""
-
-    def names_of(self, robot: str) -> set[object]:
-        """Return what a line may call a robot: its id, number or label."""
-
-    def number_of(self, robot: str) -> int | None:
-        """Return the number by which pages know a robot."""
-
-    def label_of(self, device: str) -> str:
-        """Return the label of a device, by its id."""
-
-    def mode_of(self, robot: str) -> str:
-        """Return the mode of a robot; empty if it is unknown."""
-
-    def pattern_of(self, robot: str) -> str:
-        """Return the name of the pattern by which a robot is driven next, or now."""
-
-    def reach(self, robot: str) -> Reach:
-        """Return the limits of a robot."""
-
-    def place_of(self, position: m.Position) -> tuple[float, float, str | None]:
-        """Return a position on the map [m], and its room."""
-
-    def hears(self, robot: str) -> bool:
-        """Return False for a robot that was added by hand, and hears nothing."""
-
-    def introduce(self, device: AgentDevice, robots: Sequence[str]) -> None:
-        """Let a device know where robots are found."""
-
-    def why_not(self) -> str:
-        """Return why nobody may drive now; empty if one may."""
-
-    def note_held(self, robots: set[str]) -> None:
-        """Note which robots are in somebody's hands."""
-
-    def note_emergency(self, robots: Sequence[str], device: AgentDevice, client: str) -> None:
-        """Note who stops robots from a page, before the robots are told."""
-
-    def free_seat(self, client: str, /) -> object:
-        """Tell a page that it sits nowhere any more."""
-
-    def change_pattern(self, robot: str, name: str, on_result: OnResult) -> None:
-        """Drive a robot by another pattern from the next drive on, unless it is driven."""
 
 
 class Handhelds(Protocol):
@@ -129,7 +49,7 @@ class Handhelds(Protocol):
         """Return True for the page of a phone that is steered by tilt now."""
 
     def let_go(self, client: str) -> None:
-        """The stick on a phone's screen is let go, if it is a phone."""
+        """Let go of the stick on a screen, if it is that of a phone."""
 
     def leaves(self, client: str) -> None:
         """A page has left its seat of the console."""
@@ -139,7 +59,7 @@ class NoHandhelds:
     """A console without phones."""
 
     def sits(self, client: str) -> bool:
-        """Return False: there is no phone."""
+        """Return False: nobody has a phone."""
         return False
 
     is_tilted = sits
@@ -272,7 +192,7 @@ class Driving:
 
     def hold(self) -> None:
         """Say which robots are in somebody's hands."""
-        self._system.note_held(self._seating.held)
+        self._system.on_held(self._seating.held)
 
     # --- who is meant ----------------------------------------------------------------------
 

@@ -9,12 +9,11 @@ from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
-from dva_sim.console.asking.seats import Seats
+from dva_sim.console.asking.seats import FIRST_OF_PHONES, Seats
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import PacedClock
 
 LAST_WORDS = 0.2  # of the run's time, for robots that are told to stop [s]
-FIRST_OF_PHONES = 1000  # number of the seat of the first phone; those below are the console's own
 
 
 class Seating:
