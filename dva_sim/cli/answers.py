@@ -16,7 +16,7 @@ from dva_sim.kernel.wording import first_and_rest
 from dva_sim.options.forms import Jobs, OptionForm, argument
 
 if TYPE_CHECKING:
-    from dva_sim.experiments.execution.sampled_runs import SampledRuns
+    from dva_sim.experiments.execution.sampled_runs import SampledRun
     from dva_sim.experiments.report.kept_answers import KeptAnswer
 
 
@@ -57,6 +57,7 @@ def _folder() -> Path:
 
 
 def _keep(results: Path, folder: Path, jobs: int | None) -> None:
+    from dva_sim.experiments.execution.sampled_runs import digests_of  # late: start-up
     from dva_sim.experiments.report import kept_answers  # late: start-up
     from dva_sim.experiments.study.file_kinds import open_study  # late: start-up
 
@@ -65,12 +66,13 @@ def _keep(results: Path, folder: Path, jobs: int | None) -> None:
         raise ConfigError(f"{results}: {changed} has changed since; run the study again")
     sampled = _sampled([answer.study], jobs)[answer.study]
     kept_answers.refuse_other_runs(results, sampled)
-    digests = {key: run.digest for key, run in sampled.items()}
+    digests = digests_of(sampled)
     print(f"Kept in {kept_answers.keep(replace(answer, sampled=digests), manifest, folder)}")
 
 
 def _compare(folder: Path, studies: Sequence[str], mark: bool, jobs: int | None) -> ExitCode:
     """Say of each kept answer whether it is still given; a gate fails if an unmarked one is not."""
+    from dva_sim.experiments.execution.sampled_runs import digests_of  # late: start-up
     from dva_sim.experiments.report import kept_answers  # late: start-up
 
     kept = [a for a in kept_answers.all_kept(folder) if not studies or a.study in studies]
@@ -81,8 +83,7 @@ def _compare(folder: Path, studies: Sequence[str], mark: bool, jobs: int | None)
     now = _sampled([answer.study for answer in kept if answer.sampled], jobs)
     code = ExitCode.OK
     for answer in kept:
-        runs = now.get(answer.study, {})
-        digests = {key: run.digest for key, run in runs.items()}
+        digests = digests_of(now.get(answer.study, []))
         lines, is_stale = _described(answer, digests, others[answer.study])
         print(f"{answer.study}: {lines}. {first_and_rest(answer.answer)[0]}")
         if is_stale and not answer.stale_since:
@@ -126,7 +127,7 @@ def _changed(name: str, folder: Path) -> str:
     return kept_answers.changed_since(kept_answers.read_manifest(name, folder), open_study(name))
 
 
-def _sampled(names: list[str], jobs: int | None) -> dict[str, SampledRuns]:
+def _sampled(names: list[str], jobs: int | None) -> dict[str, list[SampledRun]]:
     from dva_sim.experiments.execution.executors import cores  # late: start-up
     from dva_sim.experiments.execution.sampled_runs import sampled_runs  # late: start-up
     from dva_sim.experiments.study.file_kinds import open_study  # late: start-up

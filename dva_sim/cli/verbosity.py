@@ -94,8 +94,8 @@ def tell_cells(study: Study, cells: Sequence[DesignCell]) -> None:
 
     detail(f"Study: {study.file}, seed {study.seed}")
     for cell in cells:
-        which = "reference" if cell.index == REFERENCE else f"cell {cell.index}"
-        detail(f"  {cell.part}, {which}: {brief(dict(cell.levels)) or '-'} ({cell.config})")
+        which = "reference" if cell.cell == REFERENCE else f"cell {cell.cell}"
+        detail(f"  {cell.part}, {which}: {brief(cell.levels) or '-'} ({cell.config})")
 
 
 def tell_files(folder: Path, *patterns: str) -> None:

@@ -30,11 +30,10 @@ def job_of(
         person: Person of the job.
         asked: Further input of its program.
     """
-    cell = tuple(asked.items())
     return StudyJob(
         part=name,
-        cell=cell,
-        index=0,
+        cell=0,
+        levels=asked,
         person=person,
         trial=0,
         seed=seed,

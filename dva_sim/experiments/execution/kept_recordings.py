@@ -195,11 +195,11 @@ class Rerun:
             tables=tables,
             about={
                 "part": job.part,
-                "cell": str(job.index),
+                "cell": str(job.cell),
                 "person": str(job.person),
                 "trial": str(job.trial),
                 "config": job.config,
-                **{f"factor {name}": str(level) for name, level in job.cell},
+                **{f"factor {name}": str(level) for name, level in job.levels.items()},
             },
         )
         return {}
@@ -207,7 +207,7 @@ class Rerun:
 
 def _fingerprint(job: StudyJob, row: Row, own: Iterable[str]) -> str:
     """Hash of a run's measures, without its design columns and the user's measures."""
-    asked = {*DESIGN_COLUMNS, *(factor for factor, _ in job.cell), *own}
+    asked = {*DESIGN_COLUMNS, *job.levels, *own}
     return _print_of({name: value for name, value in row.items() if name not in asked})
 
 

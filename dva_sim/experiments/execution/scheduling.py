@@ -101,7 +101,7 @@ def perform_chunk(
 
 def _checked(tables: Tables, job: StudyJob) -> Tables:
     """The tables, if they can be kept beside the columns of the design."""
-    taken = {*DESIGN_COLUMNS, *(factor for factor, _ in job.cell)}
+    taken = {*DESIGN_COLUMNS, *job.levels}
     for name, rows in tables.items():
         if not (name.isascii() and name.isidentifier()):
             raise ValueError(f"table name {name!r} should be letters, digits and _")

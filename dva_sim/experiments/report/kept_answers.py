@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -18,12 +18,11 @@ from typing import Any
 from dva_sim.experiments.analysis.choice_map import ChoiceMap
 from dva_sim.experiments.analysis.predictions import judge_all
 from dva_sim.experiments.execution.checkpoint import load_so_far
-from dva_sim.experiments.execution.sampled_runs import Digests, SampledRuns
+from dva_sim.experiments.execution.sampled_runs import Digests, SampledRun
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.report.choice_table import beside_table, choice_table
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.manifest import manifest_of, status_of
-from dva_sim.experiments.study.parts import REPEATS
 from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import ConfigError
@@ -188,7 +187,7 @@ def _without_question(kept: Any) -> Any:
     return {key: value for key, value in kept.items() if key != "question"}
 
 
-def refuse_other_runs(folder: Path, sampled: SampledRuns) -> None:
+def refuse_other_runs(folder: Path, sampled: Sequence[SampledRun]) -> None:
     """Refuse a results folder whose runs this program no longer reproduces.
 
     Raises:
@@ -196,18 +195,15 @@ def refuse_other_runs(folder: Path, sampled: SampledRuns) -> None:
     """
     runs = load_so_far(folder).runs
     places = {key: n for n, key in enumerate(zip(runs["config"], runs["seed"], strict=True))}
-    for key, run in sampled.items():
-        part, index, config, seed = key.rsplit("/", 3)
-        place = places.get((config, int(seed)))
+    for job, _, row in sampled:
+        place = places.get(job.key)
         if place is None:
-            if part == REPEATS:
+            if job.is_repeat:
                 continue
-            raise ConfigError(
-                f"{folder}: has no run of configuration {index} of {part} as it is now"
-            )
-        other = [c for c, value in run.row.items() if not _is_equal(runs[c][place], value)]
+            raise ConfigError(f"{folder}: has no run {job.address} as it is now")
+        other = [c for c, value in row.items() if not _is_equal(runs[c][place], value)]
         if other:
-            where = f"{other[0]} of configuration {index} of {part}"
+            where = f"{other[0]} of run {job.address}"
             raise ConfigError(f"{folder}: this program gives another {where}; run the study again")
 
 
@@ -288,7 +284,10 @@ def read(file: Path) -> KeptAnswer:
         lists = ("predictions", "hypotheses", "map", "beside")
         pairs = {key: tuple(map(tuple, data.get(key, ()))) for key in lists}
         contrast = tuple(data["contrast"]) if data["contrast"] else None
-        return KeptAnswer(**data | {"rows": rows, "contrast": contrast} | pairs)
+        # Up to 0.9.0 a part and a number stood before CONFIG/SEED.
+        named = {"/".join(k.split("/")[-2:]): v for k, v in data.get("sampled", {}).items()}
+        read = {"rows": rows, "contrast": contrast, "sampled": named}
+        return KeptAnswer(**data | read | pairs)
     except OSError as error:
         raise ConfigError(f"{file} cannot be read: {error.strerror}") from None
     except (ValueError, TypeError, KeyError) as error:

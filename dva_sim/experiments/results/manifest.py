@@ -50,8 +50,7 @@ def manifest_of(plan: StudyPlan) -> dict[str, Any]:
         "changes": dict(study.changes),
         "inputs": hashes_of(plan.input_names),
         "cells": [
-            {"part": c.part, "cell": c.index, "config": c.config, "levels": dict(c.levels)}
-            for c in cells
+            {"part": c.part, "cell": c.cell, "config": c.config, "levels": c.levels} for c in cells
         ],
         "parameter_sets": list(plan.parameter_sets),
         "tuned": None if plan.tuned is None else plan.tuned.model_dump(mode="json"),
@@ -103,7 +102,7 @@ def machine(todo: Sequence[StudyRun], costs: Mapping[RunKey, float]) -> dict[str
     spent: dict[str, list[float]] = defaultdict(list)
     for job in {job.key: job for job in todo}.values():
         if job.key in costs:
-            spent[f"{job.part}/{job.index}"].append(costs[job.key])
+            spent[f"{job.part}/{job.cell}"].append(costs[job.key])
     return {
         "platform": platform.platform(),
         "cpu_s": sum(costs.values()),

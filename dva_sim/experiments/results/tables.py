@@ -73,9 +73,9 @@ def design_row(job: StudyRun) -> Row:
     """The columns that say which run it was; a reference run has no levels."""
     return {
         "part": job.part,
-        "cell": job.index,
+        "cell": job.cell,
         "config": job.config,
-        **dict(job.cell),
+        **job.levels,
         "is_reference": job.is_reference,
         "person": job.person,
         "trial": job.trial,
@@ -85,7 +85,7 @@ def design_row(job: StudyRun) -> Row:
 
 def _write(folder: Path, jobs: Sequence[StudyRun], tables_of: TablesOf) -> list[Path]:
     """All tables of some runs."""
-    factors = dict.fromkeys(factor for job in jobs for factor, _ in job.cell)
+    factors = dict.fromkeys(factor for job in jobs for factor in job.levels)
     design: Columns = {c: set() for c in (*_BEFORE_LEVELS, *factors, *_BEHIND_LEVELS)}
     tables: dict[str, _Table] = {}
     with ExitStack() as stack:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple, Self
 
 REFERENCE = -1
-_REFERENCE = "reference"
 
 
 class Address(NamedTuple):
@@ -36,5 +35,5 @@ class Address(NamedTuple):
 
     def __str__(self) -> str:
         """Text as in names of files: `drive-3-0-1`, or `drive-reference-0-1`."""
-        cell = _REFERENCE if self.cell == REFERENCE else self.cell
+        cell = "reference" if self.cell == REFERENCE else self.cell
         return "-".join(map(str, (self.part, cell, *(n for n in self[2:] if n is not None))))

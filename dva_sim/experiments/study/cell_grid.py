@@ -87,7 +87,7 @@ class DesignCell:
 
     Attributes:
         part: Name of the part.
-        index: Position in the design, or `REFERENCE`.
+        cell: Position in the design, or `REFERENCE`.
         levels: Level of each factor; none for the reference.
         scenario: Scenario to be run, except for the person.
         config: Hash of that scenario.
@@ -95,8 +95,8 @@ class DesignCell:
     """
 
     part: str
-    index: int
-    levels: tuple[tuple[str, Level], ...]
+    cell: int
+    levels: Mapping[str, Level]
     scenario: AnyScenario
     config: str
     changes: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
@@ -108,8 +108,8 @@ class StudyRun:
 
     Attributes:
         part: Name of the part.
-        cell: Level of each factor; empty for a reference run.
-        index: Position of the cell in the design, or `REFERENCE`.
+        cell: Position of the cell in the design, or `REFERENCE`.
+        levels: Level of each factor; none for a reference run.
         person: Index of the simulated person, from 0.
         trial: Index of the trial, from 0.
         seed: Random seed of the run: the same for this person and trial in every cell.
@@ -117,8 +117,8 @@ class StudyRun:
     """
 
     part: str
-    cell: tuple[tuple[str, Level], ...]
-    index: int
+    cell: int
+    levels: Mapping[str, Level]
     person: int
     trial: int
     seed: int
@@ -127,12 +127,12 @@ class StudyRun:
     @property
     def address(self) -> Address:
         """Its place among the runs of all parts."""
-        return Address(self.part, self.index, self.person, self.trial)
+        return Address(self.part, self.cell, self.person, self.trial)
 
     @property
     def is_reference(self) -> bool:
         """True if this is the reference run of its part."""
-        return self.index == REFERENCE
+        return self.cell == REFERENCE
 
     @property
     def is_repeat(self) -> bool:
@@ -198,7 +198,7 @@ def _refuse_impossible_measures(inputs: StudyInputs, every: Sequence[DesignCell]
     """Reject measures that no run of a part can produce, before running anything."""
     study = inputs.study
     for path, part, measure in _asked_measures(study):
-        made = [c.scenario for c in every if c.part == part and c.index != REFERENCE]
+        made = [c.scenario for c in every if c.part == part and c.cell != REFERENCE]
         own = inputs.measures_of(made[0].model) if made else []
         possible = [[*model_for(scenario).measures(scenario), *own] for scenario in made]
         if not any(measure in names for names in possible):
@@ -265,7 +265,7 @@ def runs_in(manifest: Mapping[str, Any]) -> list[StudyRun]:
     study = Study.model_validate(manifest["study"])
     rows = manifest["cells"]
     return [
-        StudyRun(part, tuple(row["levels"].items()), row["cell"], *draw, row["config"])
+        StudyRun(part, row["cell"], row["levels"], *draw, row["config"])
         for part in dict.fromkeys(row["part"] for row in rows)
         for row in rows
         if row["part"] == part
@@ -301,8 +301,8 @@ def _cells_of(inputs: StudyInputs, name: str) -> Iterator[DesignCell]:
 def _cells_at(
     inputs: StudyInputs, name: str, rows: Iterable[Mapping[str, Level]]
 ) -> Iterator[DesignCell]:
-    for index, levels in enumerate(rows):
-        yield _cell(inputs, name, index, levels, _changes(inputs, levels))
+    for cell, levels in enumerate(rows):
+        yield _cell(inputs, name, cell, levels, _changes(inputs, levels))
 
 
 def _repeats_of(inputs: StudyInputs) -> Iterator[DesignCell]:
@@ -312,7 +312,7 @@ def _repeats_of(inputs: StudyInputs) -> Iterator[DesignCell]:
     if not factors or study.answer is None:
         return
     fixed = settings_of_repeats(study)
-    for index, values in enumerate(itertools.product(*factors.values())):
+    for cell, values in enumerate(itertools.product(*factors.values())):
         levels = dict(zip(factors, values, strict=True))
         traits = inputs.parameter_sets[int(str(levels[PARAMETERS]))]
         chosen = {factor: level for factor, level in levels.items() if factor != PARAMETERS}
@@ -320,7 +320,7 @@ def _repeats_of(inputs: StudyInputs) -> Iterator[DesignCell]:
         own = {*study.parts[study.answer.part].changes, *study.changes, *changes}
         drawn = {f"{TRAITS}.{name}": value for name, value in traits.items()}
         changes |= {key: value for key, value in drawn.items() if key not in own}
-        yield _cell(inputs, REPEATS, index, levels, changes)
+        yield _cell(inputs, REPEATS, cell, levels, changes)
 
 
 def _changes(inputs: StudyInputs, levels: Mapping[str, Level]) -> dict[str, Any]:
@@ -340,14 +340,14 @@ def _changes(inputs: StudyInputs, levels: Mapping[str, Level]) -> dict[str, Any]
 def _cell(
     inputs: StudyInputs,
     part: str,
-    index: int,
+    cell: int,
     levels: Mapping[str, Level],
     changes: Mapping[str, Any],
 ) -> DesignCell:
     every = _every_change(inputs, part, changes)
     scenario = _build(inputs, part, every)
     config = stable_hash(scenario.model_dump(mode="json"))
-    return DesignCell(part, index, tuple(levels.items()), scenario, config, every)
+    return DesignCell(part, cell, levels, scenario, config, every)
 
 
 def _every_change(inputs: StudyInputs, part: str, changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -416,7 +416,7 @@ def _jobs_of(
         scenarios = {person: play(person * team) for person, _, _ in draws}
         for draw in draws:
             scenario = scenarios[draw[0]]
-            yield StudyJob(name, cell.levels, cell.index, *draw, cell.config, scenario)
+            yield StudyJob(name, cell.cell, cell.levels, *draw, cell.config, scenario)
 
 
 def _draws(study: Study, name: str) -> list[tuple[int, int, int]]:

@@ -89,7 +89,7 @@ def check_cases(
 def play(job: StudyJob) -> Tables:
     """One run: tops and bottoms of each measure, and the controls, one row per batch."""
     scenario = cast(TimedScenario, job.scenario)
-    asked = dict(job.cell)
+    asked = job.levels
     sample = sample_of(simulate_timed(scenario, job.seed))
     batches = Batches(sample, int(str(asked["batches"])))
     columns: Columns = {"events": batches.count(np.ones(len(sample.stream), dtype=bool))}

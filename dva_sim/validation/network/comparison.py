@@ -97,7 +97,7 @@ def _jobs(order: ModelRuns, seed: int) -> list[StudyJob]:
 
 
 def _asked(job: StudyJob) -> tuple[dict[str, str], Depth, tuple[str, ...], int, int]:
-    row, depth, without, first, count = json.loads(str(dict(job.cell)["order"]))
+    row, depth, without, first, count = json.loads(str(job.levels["order"]))
     return row, depth, tuple(without), first, count
 
 

@@ -584,7 +584,7 @@ def perform_exact(job: StudyJob) -> Tables:
 
 def perform(job: StudyJob) -> Tables:
     """All trials of one person in one cell."""
-    if "population" in dict(job.cell):
+    if "population" in job.levels:
         part, cell = job.config.split("/")
         return {"rows": PARTS[part](_asked_person(job), cell, job.seed)}
     return {"rows": play(cast(TaskScenario, job.scenario), job.seed)}
@@ -592,7 +592,7 @@ def perform(job: StudyJob) -> Tables:
 
 def _asked_person(job: StudyJob) -> Person:
     """Person for a job, drawn from the population that it names."""
-    asked = dict(job.cell)
+    asked = job.levels
     everybody = population(OperatorConfig()).with_medians(json.loads(str(asked["traits"])))
     return draw_person(everybody, int(str(asked["population"])), job.person)
 

@@ -114,12 +114,12 @@ def test_a_study_stops_at_the_interval_that_it_shows():
     found = [
         {
             "part": job.part,
-            "cell": job.index,
-            **dict(job.cell),
+            "cell": job.cell,
+            **job.levels,
             "is_reference": False,
             "person": job.person,
             "trial": job.trial,
-            **_measured(job.person, dict(job.cell)["pattern"] == "req-rep"),
+            **_measured(job.person, job.levels["pattern"] == "req-rep"),
         }
         for job in cell_grid.jobs(asked)
     ]

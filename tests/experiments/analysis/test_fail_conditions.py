@@ -17,7 +17,7 @@ def later(job):
     """Drives of request/reply take 10 s more; every second round trip is gone."""
     tables = cheap(job)
     run = tables["runs"][0]
-    run["drive_time_s"] += 10.0 * (dict(job.cell).get("pattern") == "req-rep")
+    run["drive_time_s"] += 10.0 * (job.levels.get("pattern") == "req-rep")
     run["round_trip_s"] = float("nan")
     return tables
 

@@ -93,7 +93,7 @@ def test_a_failed_run_counts_as_ended_and_is_listed(tmp_path):
     def failing(job):
         if job.person == 2 and job.trial == 0:
             raise KeyboardInterrupt
-        if job.person == 0 and job.index == 1:
+        if job.person == 0 and job.cell == 1:
             raise ValueError("sank")
         return measured(job)
 

@@ -109,16 +109,21 @@ def test_what_a_study_asks_for_otherwise_is_named_before_any_run(kept, tmp_path)
 
 def test_every_level_is_among_the_few_runs(tmp_path):
     study = study_in(tmp_path)
-    levels = {pair for _, job in sampled_jobs(study) for pair in job.cell}
+    levels = {pair for job in sampled_jobs(study) for pair in job.levels.items()}
     assert levels == {(name, level) for name, some in study.factors.items() for level in some}
-    parts = [job.part for _, job in sampled_jobs(study)]
+    parts = [job.part for job in sampled_jobs(study)]
     assert max(map(parts.count, parts)) <= 4
 
 
-def test_an_answer_that_is_no_longer_given_fails_the_gate_until_it_is_marked(kept, monkeypatch):
+def test_an_answer_that_is_no_longer_given_fails_the_gate_until_it_is_marked(
+    kept, tmp_path, monkeypatch
+):
     answer, manifest, folder = kept
-    kept_answers.keep(replace(answer, sampled={"drive/0": "1"}), manifest, folder)
-    changed = {answer.study: {"drive/0": SampledRun("2", {})}}
+    job = next(sampled_jobs(study_in(tmp_path)))
+    named = f"drive/0/{job.config}/{job.seed}"  # as up to 0.9.0
+    kept_answers.keep(replace(answer, sampled={named: "1"}), manifest, folder)
+    assert list(kept_answers.all_kept(folder)[0].sampled) == [f"{job.config}/{job.seed}"]
+    changed = {answer.study: [SampledRun(job, "2", {})]}
     monkeypatch.setattr(command, "_sampled", lambda names, jobs: changed)
     monkeypatch.setattr(command, "_changed", lambda name, folder: "")
     assert command._compare(folder, [], False, 1) == ExitCode.GATE_FAILED
@@ -185,13 +190,11 @@ def test_results_in_another_size_than_the_file_has_are_not_kept(tmp_path):
 def test_results_of_a_program_that_gave_other_runs_are_not_kept(tmp_path):
     folder = finished(tmp_path / "r")
     jobs = list(sampled_jobs(study_in(tmp_path)))
-    key = "{0.part}/{1}/{0.config}/{0.seed}".format
-    rows = {key(job, n): SampledRun("", cheap(job)["runs"][0]) for n, job in jobs}
+    rows = [SampledRun(job, "", cheap(job)["runs"][0]) for job in jobs]
     kept_answers.refuse_other_runs(folder, rows)
-    name, run = next(iter(rows.items()))
+    run = rows[0]
     slower = {"drive_time_s": run.row["drive_time_s"] + 1.0}
     with pytest.raises(ConfigError, match="another drive_time_s"):
-        kept_answers.refuse_other_runs(folder, {name: SampledRun("", slower)})
-    part, index, _, seed = name.rsplit("/", 3)
+        kept_answers.refuse_other_runs(folder, [run._replace(row=slower)])
     with pytest.raises(ConfigError, match="as it is now"):
-        kept_answers.refuse_other_runs(folder, {f"{part}/{index}/other/{seed}": run})
+        kept_answers.refuse_other_runs(folder, [run._replace(job=replace(run.job, config="other"))])

@@ -16,7 +16,7 @@ def test_every_person_drives_every_trial_in_every_cell_and_once_in_the_reference
 
 def test_jobs_come_by_part_cell_person_and_trial(tmp_path):
     jobs = cell_grid.jobs(study_in(tmp_path))
-    order = [(job.part, job.index, job.person, job.trial) for job in jobs]
+    order = [(job.part, job.cell, job.person, job.trial) for job in jobs]
     assert order == sorted(order)
 
 
@@ -41,14 +41,14 @@ def test_the_scenario_knows_its_levels_its_person_and_its_population(tmp_path):
         assert job.scenario.operator.person == job.person
         assert job.scenario.operator.population_seed == 3
         if not job.is_reference:
-            assert job.scenario.pattern == dict(job.cell)["pattern"]
-            assert job.scenario.link.delay_s == dict(job.cell)["link.delay_s"]
+            assert job.scenario.pattern == job.levels["pattern"]
+            assert job.scenario.link.delay_s == job.levels["link.delay_s"]
 
 
 def test_the_reference_is_the_base_scenario_with_its_own_changes(tmp_path):
     cell = cell_grid.cells(study_in(tmp_path))[0]
-    assert cell.index == cell_grid.REFERENCE
-    assert cell.levels == ()
+    assert cell.cell == cell_grid.REFERENCE
+    assert cell.levels == {}
     assert cell.scenario.operator.strategy == "oracle"
     assert cell.scenario.link.delay_s == 0
 
@@ -72,7 +72,7 @@ def test_a_configurations_hash_is_the_same_for_equal_scenarios_only(tmp_path):
 def test_a_study_without_factors_has_one_cell(tmp_path):
     text = STUDY.split("factors:")[0] + "parts: {only: {scenario: one.yaml}}\n"
     jobs = cell_grid.jobs(study_in(tmp_path, text=text))
-    assert [(job.index, job.cell) for job in jobs] == [(0, ())] * 6
+    assert [(job.cell, job.levels) for job in jobs] == [(0, {})] * 6
 
 
 def test_a_level_changes_options_in_its_own_cell_alone(tmp_path):
@@ -123,7 +123,9 @@ def test_seeds_are_what_they_always_were(tmp_path):
     """Results that were begun with an older program go on, and old answers can be run again."""
     jobs = cell_grid.jobs(study_in(tmp_path, text=REPEATED))
     assert [job.seed for job in jobs[:2]] == [1289764452063391784, 6791902960423926731]
-    seeds = [(job.part, job.index, *job.cell, job.person, job.trial, job.seed) for job in jobs]
+    seeds = [
+        (job.part, job.cell, *job.levels.items(), job.person, job.trial, job.seed) for job in jobs
+    ]
     assert hashlib.sha256(repr(seeds).encode()).hexdigest()[:16] == "d04fb4f22a6c0684"
 
 

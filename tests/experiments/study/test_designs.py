@@ -69,7 +69,7 @@ def test_a_file_of_rows_means_the_same_as_the_rows(tmp_path):
     (tmp_path / "rows.csv").write_text("link.delay_s,link.loss\n0,0.1\n0.5,0\n")
     filed = cell_grid.jobs(study_in(tmp_path, text=ONLY_PATTERN + "design: {csv: rows.csv}\n"))
     assert [job.key for job in filed] == [job.key for job in listed]
-    assert [job.cell for job in filed] == [job.cell for job in listed]
+    assert [job.levels for job in filed] == [job.levels for job in listed]
 
 
 def test_cells_of_a_file_are_read_as_yaml_would_read_them(tmp_path):

@@ -42,8 +42,8 @@ def test_sets_depend_on_the_seed_of_the_study_alone(tmp_path):
 
 def test_the_contrast_is_repeated_with_every_set_at_the_last_stop(tmp_path):
     jobs = repeats(kit.study_in(tmp_path, text=kit.REPEATED))
-    cells = list(dict.fromkeys(job.cell for job in jobs))
-    assert [dict(cell) for cell in cells] == [
+    levels = {job.cell: job.levels for job in jobs}
+    assert list(levels.values()) == [
         {"parameters": number, "pattern": pattern, "link.delay_s": 0.25}
         for number, pattern in itertools.product(range(4), ("req-rep", "latest-wins"))
     ]
@@ -57,7 +57,7 @@ def test_a_repeat_has_the_persons_and_the_random_numbers_of_the_study_and_its_ow
     for job in repeats(study):
         assert job.seed == own[job.person, job.trial].seed
         assert job.scenario.operator.person == job.person
-        assert job.scenario.operator.traits == sets[dict(job.cell)["parameters"]]
+        assert job.scenario.operator.traits == sets[job.levels["parameters"]]
 
 
 def test_the_usual_model_is_not_run_a_second_time(tmp_path):
@@ -68,9 +68,9 @@ def test_the_usual_model_is_not_run_a_second_time(tmp_path):
 
 def test_strategies_are_crossed_with_the_sets(tmp_path):
     text = kit.REPEATED + "  strategies: [pursuit, oracle]\n  at: [0, 0.25]\n"
-    cells = {job.cell for job in repeats(kit.study_in(tmp_path, text=text))}
-    assert len(cells) == 2 * 4 * 2 * 2
-    assert {dict(cell)["operator.strategy"] for cell in cells} == {"pursuit", "oracle"}
+    levels = {job.cell: job.levels for job in repeats(kit.study_in(tmp_path, text=text))}
+    assert len(levels) == 2 * 4 * 2 * 2
+    assert {each["operator.strategy"] for each in levels.values()} == {"pursuit", "oracle"}
 
 
 def test_repeats_fill_a_table_of_their_own(tmp_path):

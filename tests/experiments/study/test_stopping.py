@@ -27,8 +27,8 @@ def rows_of(study, time_of, persons):
     return [
         {
             "part": job.part,
-            "cell": job.index,
-            **dict(job.cell),
+            "cell": job.cell,
+            **job.levels,
             "is_reference": job.is_reference,
             "person": job.person,
             "trial": job.trial,
@@ -73,7 +73,7 @@ def test_a_budget_alone_makes_small_batches(tmp_path):
 
 def noisy(job):
     """Persons differ by a second or so, trials by less."""
-    rng = np.random.default_rng([job.person, job.trial, job.index + 1])
+    rng = np.random.default_rng([job.person, job.trial, job.cell + 1])
     return 40 + rng.normal(0, 1.5)
 
 
@@ -102,7 +102,7 @@ def test_it_is_enough_once_every_width_is_below_the_bound(tmp_path):
     assert not stopping.is_enough(study, rows_of(study, spread(3), 6))
 
     def one_wide_cell(job):
-        return spread(3 if job.part == "drive" and job.index == 3 else 0.1)(job)
+        return spread(3 if job.part == "drive" and job.cell == 3 else 0.1)(job)
 
     assert not stopping.is_enough(study, rows_of(study, one_wide_cell, 6))
 
@@ -110,7 +110,7 @@ def test_it_is_enough_once_every_width_is_below_the_bound(tmp_path):
 @pytest.mark.parametrize("text", [STUDY + STOP, STUDY + ON_ANSWER])
 def test_where_all_persons_are_alike_the_first_batch_is_enough(tmp_path, text):
     study = study_in(tmp_path, text=text)
-    rows = rows_of(study, lambda job: 40.0 + job.index, 3)
+    rows = rows_of(study, lambda job: 40.0 + job.cell, 3)
     assert (stopping.half_widths(study, study.stop, rows) == 0).all()
     assert stopping.is_enough(study, rows)
 
@@ -119,7 +119,7 @@ def test_a_contrast_is_paired_so_what_a_person_brings_along_does_not_count(tmp_p
     study = study_in(tmp_path, text=STUDY + ON_ANSWER)
 
     def persons_differ_patterns_hardly(job):
-        effect = 5 if dict(job.cell).get("pattern") == "req-rep" else 0
+        effect = 5 if job.levels.get("pattern") == "req-rep" else 0
         return 100 * job.person + 10 * job.trial + effect + 0.01 * noisy(job)
 
     rows = rows_of(study, persons_differ_patterns_hardly, 6)

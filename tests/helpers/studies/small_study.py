@@ -144,14 +144,14 @@ def unlucky(job: StudyJob) -> Tables:
 
 def deadly(job: StudyJob) -> Tables:
     """One run always takes its process with it."""
-    if job.part == "story" and job.index == 2 and job.person == 1:
+    if job.part == "story" and job.cell == 2 and job.person == 1:
         os.kill(os.getpid(), signal.SIGKILL)
     return cheap(job)
 
 
 def deadly_once(mark: Path, job: StudyJob) -> Tables:
     """One run takes its process with it, the first time only."""
-    if job.part == "story" and job.index == 2 and job.person == 1 and not mark.exists():
+    if job.part == "story" and job.cell == 2 and job.person == 1 and not mark.exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return cheap(job)
@@ -159,7 +159,7 @@ def deadly_once(mark: Path, job: StudyJob) -> Tables:
 
 def stopped_once(mark: Path, job: StudyJob) -> Tables:
     """One run stops its process, the first time only, and nobody lets it go on."""
-    if job.part == "story" and job.index == 2 and job.person == 1 and not mark.exists():
+    if job.part == "story" and job.cell == 2 and job.person == 1 and not mark.exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGSTOP)
     return cheap(job)
@@ -167,7 +167,7 @@ def stopped_once(mark: Path, job: StudyJob) -> Tables:
 
 def stalls(job: StudyJob) -> Tables:
     """One run never ends, and takes every exception for its own."""
-    while job.part == "story" and job.index == 2 and job.person == 1:
+    while job.part == "story" and job.cell == 2 and job.person == 1:
         try:
             time.sleep(0.01)
         except Exception:
@@ -177,7 +177,7 @@ def stalls(job: StudyJob) -> Tables:
 
 def never_comes_back(job: StudyJob) -> Tables:
     """One run waits below Python, where no exception reaches it."""
-    if job.part == "story" and job.index == 2 and job.person == 1:
+    if job.part == "story" and job.cell == 2 and job.person == 1:
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
         threading.Event().wait()
     return cheap(job)

@@ -56,8 +56,8 @@ def asked_by(study: Study, results: Results | None = None) -> list[AskedCell]:
     found = {}
     for cell in grid:
         if isinstance(cell.scenario, MiddlewareScenario):
-            config = as_run.get((cell.part, cell.index), cell.config)
-            levels = {factor: str(level) for factor, level in cell.levels}
+            config = as_run.get((cell.part, cell.cell), cell.config)
+            levels = {factor: str(level) for factor, level in cell.levels.items()}
             scenario = cell.scenario if config == cell.config else None
             found[config] = AskedCell(config, levels, scenario, tuple(seeds[cell.config]))
     if not found:

@@ -156,7 +156,7 @@ def plays_in(asked: Sequence[AskedCell], plays: int) -> int:
 def perform(job: StudyJob) -> Tables:
     """The plays of one seed of one configuration."""
     scenario = job.scenario
-    plays = int(str(dict(job.cell)["plays"]))
+    plays = int(str(job.levels["plays"]))
     assert isinstance(scenario, MiddlewareScenario)
     rows = []
     for play in range(plays):

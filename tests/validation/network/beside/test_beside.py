@@ -72,7 +72,7 @@ PREDICTED = CellPrediction("a", {"middleware": "udp"}, (1, 2, 3), BANDS)
 
 def made(late, job):
     """A run at 10 ms; one at 150 ms is that much older, but for the second person's."""
-    is_far = dict(job.cell)["link"] == "far"
+    is_far = job.levels["link"] == "far"
     older = 0.14 if is_far and job.person != 1 else 0.0
     row = GOOD | {name: GOOD[name] + older for name in GOOD if name.startswith("age")}
     return {"runs": [row | {"disturbed": int(late and is_far)}]}
