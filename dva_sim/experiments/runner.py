@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from dva_sim.experiments.analysis.stopping import widest
 from dva_sim.experiments.execution.kept_recordings import record_study
 from dva_sim.experiments.execution.scheduling import Simulate
 from dva_sim.experiments.execution.session import open_session
@@ -17,7 +18,6 @@ from dva_sim.experiments.study.factor_levels import cells_of_repeats, size
 from dva_sim.experiments.study.file_kinds import open_study
 from dva_sim.experiments.study.loading import pairs_of
 from dva_sim.experiments.study.plan import Progress, StudyPlan, checked_plan
-from dva_sim.experiments.study.stopping import is_enough, rounds, widest
 from dva_sim.experiments.study.study import Study
 from dva_sim.options.studies import RunOptions
 
@@ -96,26 +96,27 @@ def run_study(
 
     # Run what the folder does not hold yet, batch after batch of persons, until it is enough. The
     # rule looks at whole batches, which are the same wherever and however often it was interrupted.
-    batches = rounds(study, plan.jobs)
     finished: list[list[StudyJob]] = []
+    reached = math.inf
     why = None
     with (
         listener.progress("running", plan.runs) as show,
         open_session(plan, options, options.progress or show, episode) as session,
     ):
-        for batch in batches:
+        for batch in plan.rounds:
             left = session.left(batch)
             if left and finished and session.is_budget_spent:
                 why = "budget"
                 break
             session.run(left)
             finished.append(batch)
-            if study.stop is not None and is_enough(study, session.rows(finished)):
-                why = "enough"
-                break
-        stopped: dict[str, Any] = {"rounds": len(finished), "of": len(batches), "why": why}
+            if study.stop is not None:
+                reached = widest(study, study.stop, session.table(finished))
+                if reached <= study.stop.half_width:
+                    why = "enough"
+                    break
+        stopped: dict[str, Any] = {"rounds": len(finished), "of": len(plan.rounds), "why": why}
         if study.stop is not None:
-            reached = widest(study, study.stop, session.rows(finished))
             stopped["why"] = why or "limit"
             stopped["half_width"] = reached if math.isfinite(reached) else None
         session.write(finished, stopped)

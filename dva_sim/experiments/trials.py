@@ -125,7 +125,7 @@ def chosen_of(study: Study, results: Results) -> TunedValues:
 def _tried(part: RunGrid, rule: Tuning, when: Setting, value: float) -> TriedValue:
     """One value, judged by `(persons, trials)` of the measure."""
     cell = part.where(part.grid(rule.measure), {**rule.at, **when, rule.key: value})
-    found = mean_interval(cell.ravel(), part.persons.repeat(len(part.trials)))
+    found = mean_interval(cell.ravel(), part.person)
     low, high = (found.low, found.high) if found.n_persons > 1 else (found.mean, found.mean)
     mean, low, high = (round(x, _DIGITS) for x in (found.mean, low, high))
     return TriedValue(when=when, value=value, mean=mean, low=low, high=high)

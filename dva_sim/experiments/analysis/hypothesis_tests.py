@@ -177,12 +177,10 @@ def pairs_of(
     """Both sides of a contrast at one place; None where it was not run."""
     table, factors = layout_of(study, runs)
     part = RunGrid(table, contrast.part, factors)
-    known = {f.name: f.levels for f in part.factors}
     wanted = [*at.items(), *((contrast.factor, level) for level in contrast.contrast)]
-    if not all(level in known.get(name, ()) for name, level in wanted):
+    if not all(level in part.levels.get(name, ()) for name, level in wanted):
         return None
-    in_excess = part.has_reference(contrast.measure)
-    grid = part.excess(contrast.measure) if in_excess else part.grid(contrast.measure)
+    grid = part.outcome(contrast.measure)
     sides = [part.where(grid, dict(at) | {contrast.factor: level}) for level in contrast.contrast]
     person = np.broadcast_to(part.persons[:, np.newaxis], sides[0].shape)
     return PairedRuns(sides[0].ravel(), sides[1].ravel(), person.ravel())

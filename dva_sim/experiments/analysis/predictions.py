@@ -127,7 +127,7 @@ def _asked(
     contrast = prediction.contrast or view.contrast
     where = dict(view.panels[0]) | ({view.over.name: view.stops[-1]} if view.over else {})
     where |= prediction.at
-    levels = {f.name: f.levels for f in view.part.factors}
+    levels = view.part.levels
     if factor != view.line.name and view.contrast is not None:
         where.setdefault(view.line.name, view.contrast[1])
     where.pop(factor, None)

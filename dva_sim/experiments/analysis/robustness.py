@@ -63,8 +63,7 @@ def support_of_part(part: RunGrid, scenario: Mapping[str, Any]) -> Support | Non
         part: The runs.
         scenario: The part's before any factor changed it, for the strategy.
     """
-    levels = {f.name: f.levels for f in part.factors}
-    names = levels.get(STRATEGY, (get(scenario, STRATEGY),))
+    names = part.levels.get(STRATEGY, (get(scenario, STRATEGY),))
     strategies = tuple(str(name) for name in names if name is not None)
     runs = _loop_delays(part)
     if runs is None or not strategies:
@@ -281,7 +280,7 @@ class _Reading:
 
     def own(self, where: dict[str, Level]) -> Floats | None:
         """The difference under the study's own model; None if that was not repeated."""
-        tried = next((f.levels for f in self.part.factors if f.name == STRATEGY), (self._own,))
+        tried = self.part.levels.get(STRATEGY, (self._own,))
         if self._own not in tried:
             return None
         strategy = {STRATEGY: self._own} if STRATEGY in where else {}

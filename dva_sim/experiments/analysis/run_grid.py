@@ -44,15 +44,25 @@ class RunGrid:
         table: Columns of the table `runs`, or of another with the same leading columns.
         name: Name of the part.
         factors: Factors of the study; those missing from the table are left out.
+
+    Attributes:
+        levels: Levels of each factor, by its name.
+        persons: All persons, ascending.
+        trials: All trials, ascending.
+        person: Person of each run of a cell `(persons * trials,)`.
+        treated: Columns of the runs but for the references.
+        references: Columns of the reference runs.
     """
 
     def __init__(self, table: Table, name: str, factors: Sequence[Factor]) -> None:
         self.name = name
         self.factors = tuple(f for f in factors if f.name in table)
+        self.levels = {f.name: f.levels for f in self.factors}
         here = np.asarray(table["part"]) == name
         aside = np.asarray(table["is_reference"]).astype(bool)
         self.persons = np.unique(np.asarray(table["person"])[here])
         self.trials = np.unique(np.asarray(table["trial"])[here])
+        self.person = self.persons.repeat(len(self.trials))
         self.treated = {key: np.asarray(values)[here & ~aside] for key, values in table.items()}
         self.references = {key: np.asarray(values)[here & aside] for key, values in table.items()}
         codes = [codes_of(self.treated, f) for f in self.factors]
@@ -118,6 +128,10 @@ class RunGrid:
     def excess(self, column: str) -> Floats:
         """The grid of a column in excess of the reference run of the same person and trial."""
         return np.asarray(self.grid(column) - self.reference(column))
+
+    def outcome(self, column: str) -> Floats:
+        """The grid of a column as it is judged: in excess of the reference where there is one."""
+        return self.excess(column) if self.has_reference(column) else self.grid(column)
 
     def has_reference(self, column: str) -> bool:
         """True if reference runs exist, so that an excess can be computed."""

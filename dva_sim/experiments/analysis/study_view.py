@@ -120,9 +120,7 @@ class StudyView:
     @property
     def values(self) -> Floats:
         """The measure as it is judged: in excess of the reference wherever there is one."""
-        if self.part.has_reference(self.measure):
-            return self.part.excess(self.measure)
-        return self.part.grid(self.measure)
+        return self.part.outcome(self.measure)
 
     def stops_outside(self, panel: Setting, lines: Sequence[Level] | None = None) -> list[int]:
         """The stops of a panel at which at least one line, of some or all, is an extrapolation."""
@@ -138,20 +136,32 @@ class StudyView:
 
         Where there are covariates, as values of the persons whose mean is the adjusted one.
         """
-        grid = self.values
-        found = self.curve(grid, panel, first) - self.curve(grid, panel, second)
-        if not self.covariates:
-            return person_means(found)
-        beside = []
-        for covariate in self.covariates:
-            product = product_of(self.part, covariate)
-            sides = [self.curve(product, panel, line) for line in (first, second)]
-            beside.append(person_means(np.where(np.isfinite(found), sum(sides) / 2, np.nan)))
-        return adjusted(person_means(found), beside)
+
+        def sides(grid: Floats) -> list[Floats]:
+            return [self.curve(grid, panel, line) for line in (first, second)]
+
+        beside = [sides(product_of(self.part, name)) for name in self.covariates]
+        return adjusted_means(sides(self.values), beside)
 
     def band_of(self, panel: Setting, first: Level, second: Level) -> Band:
         """Differences at all stops with their band; see `difference`."""
         return band(self.difference(panel, first, second), self.level)
+
+
+def adjusted_means(sides: Sequence[Floats], covariates: Sequence[Sequence[Floats]]) -> Floats:
+    """First minus second, paired by person and trial, as person means `(persons, stops)`.
+
+    Where there are covariates, as values of the persons whose mean is the adjusted one.
+
+    Args:
+        sides: The first and the second `(stops, persons, trials)`.
+        covariates: Both sides of each.
+    """
+    found = sides[0] - sides[1]
+    means = person_means(found)
+    there = np.isfinite(found)
+    beside = [person_means(np.where(there, (a + b) / 2, np.nan)) for a, b in covariates]
+    return adjusted(means, beside) if beside else means
 
 
 def product_of(part: RunGrid, covariate: str) -> Floats:

@@ -18,7 +18,6 @@ from dva_sim.experiments.results.manifest import manifest_of
 from dva_sim.experiments.results.results import JOURNAL
 from dva_sim.experiments.study.cell_grid import DesignCell, RunKey, StudyJob
 from dva_sim.experiments.study.plan import StudyPlan
-from dva_sim.experiments.study.stopping import rounds
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import RunTooLong
 from dva_sim.simulation.models import model_for
@@ -113,7 +112,7 @@ def dry_run(
         runs=len(todo),
         done=len(todo) - len(left),
         cells=len(plan.cells),
-        rounds=len(rounds(plan.study, todo)),
+        rounds=len(plan.rounds),
         workers=workers,
         estimate_s=None if cpu is None else cpu * pace,
         tried=len(tried.costs),

@@ -23,7 +23,15 @@ from dva_sim.experiments.execution.executors import Workers, WorkersLost
 from dva_sim.experiments.execution.scheduling import Simulate, run_job
 from dva_sim.experiments.results.folder_lock import FolderLock
 from dva_sim.experiments.results.manifest import failures, machine, manifest_of, write_json
-from dva_sim.experiments.results.results import JOURNAL, MACHINE, MANIFEST, TABLES, digests
+from dva_sim.experiments.results.results import (
+    JOURNAL,
+    MACHINE,
+    MANIFEST,
+    TABLES,
+    Frame,
+    digests,
+    frame_of,
+)
 from dva_sim.experiments.results.tables import design_row, write_tables
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.hashing import edited_files, files_of, folders_of_files
@@ -146,11 +154,12 @@ class StudySession:
         ids = {id(job) for batch in batches for job in batch}
         return [job for job in self._plan.jobs if id(job) in ids]
 
-    def rows(self, batches: Sequence[Sequence[StudyJob]]) -> list[dict[str, Any]]:
+    def table(self, batches: Sequence[Sequence[StudyJob]]) -> Frame:
         """Return the table `runs` of some batches, without repeats."""
         own = [job for job in self.in_order(batches) if not job.is_repeat]
         tables = ((job, self.journal.tables(job.key) or {}) for job in own)
-        return [design_row(job) | row for job, found in tables for row in found.get("runs", ())]
+        rows = (design_row(job) | row for job, found in tables for row in found.get("runs", ()))
+        return frame_of(list(rows))
 
     def write(self, batches: Sequence[Sequence[StudyJob]], stopped: dict[str, Any]) -> None:
         """Write the tables of some batches, the manifest, and what it took on this machine.

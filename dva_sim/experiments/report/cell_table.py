@@ -191,10 +191,9 @@ def _measure(part: RunGrid, measure: str, possible: tuple[float, float]) -> list
     if not part.has(measure):
         return []
     excess = part.has_reference(measure)
-    grid = _by_cell(part, part.excess(measure) if excess else part.grid(measure))
-    person = np.repeat(part.persons, len(part.trials))
+    grid = _by_cell(part, part.outcome(measure))
     medians = [_text(np.median, present(cell), number) for cell in grid]
-    intervals = [mean_interval(cell.ravel(), person) for cell in grid]
+    intervals = [mean_interval(cell.ravel(), part.person) for cell in grid]
     widest = possible[1] - possible[0]
     least, most = (-widest, widest) if excess else possible
     means = [

@@ -140,8 +140,7 @@ def _reduction(reading: Reading) -> VarianceReduction | None:
     if view is None or sides is None:
         return None
     first, second = sides
-    person = np.broadcast_to(view.part.persons[:, np.newaxis], first.shape)
-    return variance_reduction(first.ravel(), second.ravel(), person.ravel())
+    return variance_reduction(first.ravel(), second.ravel(), view.part.person)
 
 
 def timeout_remark(scenarios: Mapping[str, Mapping[str, Any]], study: Mapping[str, Any]) -> str:

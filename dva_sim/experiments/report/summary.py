@@ -233,8 +233,7 @@ def _differences(finding: Finding, view: StudyView, stop: int) -> tuple[Floats, 
     first, second = (
         view.curve(values, panel, side)[stop] for side in (finding.first, finding.second)
     )
-    person = np.repeat(view.part.persons, len(view.part.trials))
-    return (first - second).ravel(), person
+    return (first - second).ravel(), view.part.person
 
 
 def in_context(reading: ResultsReading) -> Finding | None:

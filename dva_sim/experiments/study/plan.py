@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,6 +17,8 @@ from dva_sim.experiments.study.tuning import TunedValues, TuningBasis
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.models import AnyScenario, model_for
 from dva_sim.simulation.run_measures import RunMeasure
+
+_BATCH_IN_BUDGET = 2  # persons, where a budget alone ends a study
 
 Progress = Callable[[int, int], object]
 """Called with a number of things that are done, and of all."""
@@ -81,6 +84,20 @@ class StudyPlan:
     def jobs(self) -> list[StudyJob]:
         """All runs in a fixed order: part, cell, person, trial; the repeats last."""
         return cell_grid.jobs(self.study, self.cells)
+
+    @cached_property
+    def rounds(self) -> list[list[StudyJob]]:
+        """The jobs in batches of persons; a study that nothing can stop early is one batch."""
+        study = self.study
+        ends = [study.persons]
+        if study.stop is not None:
+            ends = study.stop.looks(study.persons)
+        elif study.budget_s is not None:
+            ends = [*range(_BATCH_IN_BUDGET, study.persons, _BATCH_IN_BUDGET), study.persons]
+        batches: list[list[StudyJob]] = [[] for _ in ends]
+        for job in self.jobs:
+            batches[bisect_right(ends, job.person)].append(job)
+        return [batch for batch in batches if batch]
 
     @cached_property
     def runs(self) -> int:

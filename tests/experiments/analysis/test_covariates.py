@@ -8,10 +8,13 @@ import pytest
 from helpers.studies import synthetic_results
 from helpers.studies.small_study import STUDY, study_in
 
+from dva_sim.experiments.analysis import stopping
 from dva_sim.experiments.analysis.study_view import covariates_of, finding_of, view_of
 from dva_sim.experiments.report.method import remarks
 from dva_sim.experiments.report.summary import Reading
-from dva_sim.experiments.study import cell_grid, stopping
+from dva_sim.experiments.results.results import frame_of
+from dva_sim.experiments.results.tables import design_row
+from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.parts import multiplied
 from dva_sim.kernel.errors import ConfigError
@@ -112,23 +115,16 @@ def test_a_study_without_covariates_is_the_same_study_as_ever(tmp_path):
 def test_a_study_stops_at_the_interval_that_it_shows():
     asked = load_study("how-late-at-250-ms", ["stop.most_persons=48"])
     found = [
-        {
-            "part": job.part,
-            "cell": job.cell,
-            **job.levels,
-            "is_reference": False,
-            "person": job.person,
-            "trial": job.trial,
-            **_measured(job.person, job.levels["pattern"] == "req-rep"),
-        }
+        design_row(job) | _measured(job.person, job.levels["pattern"] == "req-rep")
         for job in cell_grid.jobs(asked)
     ]
     assert asked.stop is not None
-    seen = stopping.half_widths(asked, asked.stop, found)
-    shown = finding_of(view_of(asked.asked(), synthetic_results.columns(found)))
+    runs = frame_of(found)
+    seen = stopping.half_widths(asked, asked.stop, runs)
+    shown = finding_of(view_of(asked.asked(), runs))
     assert seen == pytest.approx((shown.high - shown.low) / 2)
     plain = asked.model_copy(update={"covariates": ()})
-    assert seen[0] < 0.5 * stopping.half_widths(plain, asked.stop, found)[0]
+    assert seen[0] < 0.5 * stopping.half_widths(plain, asked.stop, runs)[0]
 
 
 def _measured(person: int, is_slow: bool) -> dict[str, float]:

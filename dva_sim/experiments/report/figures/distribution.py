@@ -74,15 +74,14 @@ class Distributions(style.ReportFigure):
 
 def _columns(view: StudyView, values: Floats, ok: NDArray[np.bool_]) -> dict[str, Any]:
     """The runs of a cell that gave a value, with who drove and whether it was confirmed."""
-    persons = view.part.persons
-    trials = view.part.trials
+    part = view.part
     there = np.isfinite(values)
     columns = {
-        "person": np.repeat(persons, len(trials))[there],
-        "trial": np.tile(trials, len(persons))[there],
+        "person": part.person[there],
+        "trial": np.tile(part.trials, len(part.persons))[there],
         view.measure: values[there],
     }
-    return columns | ({"confirmed": ok[there]} if view.part.has("confirmed") else {})
+    return columns | ({"confirmed": ok[there]} if part.has("confirmed") else {})
 
 
 def _dots(

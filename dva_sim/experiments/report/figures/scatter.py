@@ -79,8 +79,7 @@ def _per_point(part: RunGrid, column: str, setting_: Setting) -> Floats:
 
 def _clouds(view: StudyView, part: RunGrid, panel: Setting) -> list[Cloud]:
     """Each line, or the contrast of two of them if one was declared."""
-    in_excess = part.has_reference(view.measure)
-    grid = part.excess(view.measure) if in_excess else part.grid(view.measure)
+    grid = part.outcome(view.measure)
 
     def at(level: Level) -> Floats:
         line = {view.line.name: level} if view.line else {}

@@ -7,8 +7,12 @@ import pytest
 from helpers.studies.small_study import REPEATED, STUDY, complaint, study_in
 from helpers.wording import unnamed
 
-from dva_sim.experiments.study import cell_grid, stopping
-from dva_sim.experiments.study.cell_grid import REFERENCE
+from dva_sim.experiments.analysis import stopping
+from dva_sim.experiments.results.results import frame_of
+from dva_sim.experiments.results.tables import design_row
+from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study.addresses import REFERENCE
+from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.statistics import mean_interval
 
 STOP = (
@@ -22,53 +26,56 @@ def persons_of(batches):
     return [sorted({job.person for job in batch}) for batch in batches]
 
 
+def rounds_of(study):
+    return StudyPlan.of(study).rounds
+
+
 def rows_of(study, time_of, persons):
     """Rows as the runs of some persons would leave them."""
     return [
-        {
-            "part": job.part,
-            "cell": job.cell,
-            **job.levels,
-            "is_reference": job.is_reference,
-            "person": job.person,
-            "trial": job.trial,
-            "drive_time_s": time_of(job),
-        }
+        design_row(job) | {"drive_time_s": time_of(job)}
         for job in cell_grid.jobs(study)
-        if job.person < persons
+        if job.person < persons and not job.is_repeat
     ]
 
 
+def half_widths(study, rows):
+    return stopping.half_widths(study, study.stop, frame_of(rows))
+
+
+def is_enough(study, rows):
+    return stopping.widest(study, study.stop, frame_of(rows)) <= study.stop.half_width
+
+
 def test_a_study_that_nothing_stops_is_one_batch(tmp_path):
-    jobs = cell_grid.jobs(study_in(tmp_path))
-    assert stopping.rounds(study_in(tmp_path), jobs) == [jobs]
-    assert not stopping.is_enough(study_in(tmp_path), [])
+    plan = StudyPlan.of(study_in(tmp_path))
+    assert plan.rounds == [plan.jobs]
 
 
 def test_the_first_batch_is_the_studys_persons_and_others_follow_up_to_the_most(tmp_path):
     study = study_in(tmp_path, text=STUDY + STOP)
-    batches = stopping.rounds(study, cell_grid.jobs(study))
+    batches = rounds_of(study)
     assert persons_of(batches) == [[0, 1, 2], [3, 4, 5, 6], [7, 8, 9]]
 
 
 def test_batches_hold_every_job_once_and_repeats_come_with_their_persons(tmp_path):
     study = study_in(tmp_path, text=REPEATED + STOP)
-    jobs = cell_grid.jobs(study)
-    batches = stopping.rounds(study, jobs)
-    assert sorted(job.key for batch in batches for job in batch) == sorted(j.key for j in jobs)
+    batches = rounds_of(study)
+    every = sorted(job.key for job in cell_grid.jobs(study))
+    assert sorted(job.key for batch in batches for job in batch) == every
     assert {job.person for job in batches[0] if job.is_repeat} == {0, 1}
 
 
 def test_what_is_run_first_is_what_a_study_of_so_many_persons_runs(tmp_path):
     few = cell_grid.jobs(study_in(tmp_path))
     study = study_in(tmp_path, text=STUDY + STOP)
-    first = stopping.rounds(study, cell_grid.jobs(study))[0]
+    first = rounds_of(study)[0]
     assert [job.key for job in first] == [job.key for job in few]
 
 
 def test_a_budget_alone_makes_small_batches(tmp_path):
     study = study_in(tmp_path, "persons=5", text=STUDY + "budget_s: 60\n")
-    assert persons_of(stopping.rounds(study, cell_grid.jobs(study))) == [[0, 1], [2, 3], [4]]
+    assert persons_of(rounds_of(study)) == [[0, 1], [2, 3], [4]]
 
 
 def noisy(job):
@@ -80,7 +87,7 @@ def noisy(job):
 def test_the_width_is_that_of_the_mean_in_every_cell_over_the_reference(tmp_path):
     study = study_in(tmp_path, text=STUDY + STOP)
     rows = rows_of(study, noisy, 6)
-    found = stopping.half_widths(study, study.stop, rows)
+    found = half_widths(study, rows)
     aside = {
         (row["person"], row["trial"]): row["drive_time_s"]
         for row in rows
@@ -98,21 +105,21 @@ def test_it_is_enough_once_every_width_is_below_the_bound(tmp_path):
         return lambda job: 40 + scale * (noisy(job) - 40)
 
     study = study_in(tmp_path, text=STUDY + STOP)
-    assert stopping.is_enough(study, rows_of(study, spread(0.1), 6))
-    assert not stopping.is_enough(study, rows_of(study, spread(3), 6))
+    assert is_enough(study, rows_of(study, spread(0.1), 6))
+    assert not is_enough(study, rows_of(study, spread(3), 6))
 
     def one_wide_cell(job):
         return spread(3 if job.part == "drive" and job.cell == 3 else 0.1)(job)
 
-    assert not stopping.is_enough(study, rows_of(study, one_wide_cell, 6))
+    assert not is_enough(study, rows_of(study, one_wide_cell, 6))
 
 
 @pytest.mark.parametrize("text", [STUDY + STOP, STUDY + ON_ANSWER])
 def test_where_all_persons_are_alike_the_first_batch_is_enough(tmp_path, text):
     study = study_in(tmp_path, text=text)
     rows = rows_of(study, lambda job: 40.0 + job.cell, 3)
-    assert (stopping.half_widths(study, study.stop, rows) == 0).all()
-    assert stopping.is_enough(study, rows)
+    assert (half_widths(study, rows) == 0).all()
+    assert is_enough(study, rows)
 
 
 def test_a_contrast_is_paired_so_what_a_person_brings_along_does_not_count(tmp_path):
@@ -123,23 +130,23 @@ def test_a_contrast_is_paired_so_what_a_person_brings_along_does_not_count(tmp_p
         return 100 * job.person + 10 * job.trial + effect + 0.01 * noisy(job)
 
     rows = rows_of(study, persons_differ_patterns_hardly, 6)
-    found = stopping.half_widths(study, study.stop, rows)
+    found = half_widths(study, rows)
     assert found.shape == (2,)  # at every level that the contrast runs over
     assert (found < 0.1).all()
-    assert stopping.is_enough(study, rows)
+    assert is_enough(study, rows)
 
 
 def test_with_one_person_or_without_values_nothing_is_enough(tmp_path):
     study = study_in(tmp_path, text=STUDY + STOP)
-    assert not stopping.is_enough(study, rows_of(study, lambda _: 40.0, 1))
-    assert not stopping.is_enough(study, rows_of(study, lambda _: math.nan, 6))
-    assert not stopping.is_enough(study, [])
+    assert not is_enough(study, rows_of(study, lambda _: 40.0, 1))
+    assert not is_enough(study, rows_of(study, lambda _: math.nan, 6))
+    assert not is_enough(study, [])
 
 
 def test_failed_runs_are_left_out(tmp_path):
     study = study_in(tmp_path, text=STUDY + ON_ANSWER)
     rows = [row for row in rows_of(study, noisy, 8) if (row["person"], row["cell"]) != (3, 1)]
-    assert np.isfinite(stopping.half_widths(study, study.stop, rows)).all()
+    assert np.isfinite(half_widths(study, rows)).all()
 
 
 @pytest.mark.parametrize(
@@ -168,7 +175,7 @@ def test_the_most_persons_are_not_fewer_than_the_first_batch(tmp_path):
 def test_a_stop_on_a_schedule_doubles_and_shares_the_chance_to_err(tmp_path):
     scheduled = ON_ANSWER.replace("batch_persons: 2", "batch_persons: double")
     study = study_in(tmp_path, text=STUDY + scheduled)
-    assert persons_of(stopping.rounds(study, cell_grid.jobs(study))) == [
+    assert persons_of(rounds_of(study)) == [
         [0, 1, 2],
         [3, 4, 5],
         [6, 7],
@@ -177,7 +184,7 @@ def test_a_stop_on_a_schedule_doubles_and_shares_the_chance_to_err(tmp_path):
     plain = study_in(tmp_path, text=STUDY + ON_ANSWER)
     assert plain.stop.level(plain.persons) == 0.95
     rows = rows_of(study, noisy, 8)
-    wide, narrow = (stopping.half_widths(s, s.stop, rows) for s in (study, plain))
+    wide, narrow = (half_widths(s, rows) for s in (study, plain))
     assert (wide > 1.05 * narrow).all()
 
 

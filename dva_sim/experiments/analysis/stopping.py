@@ -1,0 +1,73 @@
+"""Stopping rules: pure deciders on whole batches of persons, in the order of the design.
+
+The order of finishing plays no part, so the same study stops after the same batch on every machine.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from dva_sim.experiments.analysis.run_grid import Factor, Floats, RunGrid, Table
+from dva_sim.experiments.analysis.study_view import adjusted_means, product_of
+from dva_sim.experiments.study.factor_levels import factors_in_rows
+from dva_sim.experiments.study.parts import Contrast, StopRule
+from dva_sim.experiments.study.study import Study
+from dva_sim.statistics import band, mean_interval
+
+
+def widest(study: Study, stop: StopRule, runs: Table) -> float:
+    """Half of the widest interval that the rule looks at; infinite where there is none yet.
+
+    Args:
+        runs: The table of runs so far.
+    """
+    found = half_widths(study, stop, runs)
+    return float(found.max()) if len(found) and np.isfinite(found).all() else math.inf
+
+
+def half_widths(study: Study, stop: StopRule, runs: Table) -> Floats:
+    """Half of each interval that the rule looks at; nan where there is none yet."""
+    if not runs:
+        return np.array([])
+    if stop.comparison is None:
+        return _of_measure(stop, runs)
+    return _of_contrast(study, study.contrasts[stop.comparison], runs, stop.level(study.persons))
+
+
+def _of_measure(stop: StopRule, runs: Table) -> Floats:
+    """Half-widths of each cell's mean, in excess of the reference run if there is one."""
+    cells = Factor("cell", tuple(np.unique(runs["cell"]).tolist()))
+    part = RunGrid(runs, str(stop.part), [cells])
+    values = part.outcome(str(stop.measure))[part.ran]
+    return np.array([mean_interval(cell.ravel(), part.person).half_width for cell in values])
+
+
+def _of_contrast(study: Study, asked: Contrast, runs: Table, level: float) -> Floats:
+    """Half-widths of the paired difference at each level of `over`; references cancel.
+
+    The answer's is adjusted for the covariates. Factors that it does not name are at their first
+    level, but for those of listed rows, which are averaged.
+    """
+    part = RunGrid(runs, asked.part, [Factor(*factor) for factor in study.factors.items()])
+    named = {asked.factor, asked.over, *factors_in_rows(study)}
+    fixed = {f: levels[0] for f, levels in part.levels.items() if f not in named}
+    fixed |= asked.within
+    axes = [name for name in part.levels if name not in (*fixed, asked.factor)]
+
+    def sides(grid: Floats) -> list[Floats]:
+        """First and second, `(stops, persons, trials)` each."""
+        found = []
+        for side in asked.contrast:
+            values = part.where(grid, fixed | {asked.factor: side})
+            at = axes.index(asked.over) if asked.over is not None else None
+            stops = values[np.newaxis] if at is None else np.moveaxis(values, at, 0)
+            by_person = np.moveaxis(stops, -2, 1)
+            found.append(by_person.reshape(*by_person.shape[:2], -1))
+        return found
+
+    wanted = study.covariates if asked is study.answer else ()
+    beside = [sides(product_of(part, name)) for name in wanted]
+    seen = band(adjusted_means(sides(part.grid(asked.measure)), beside), level)
+    return np.asarray((seen.high - seen.low) / 2)
