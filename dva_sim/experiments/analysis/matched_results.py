@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ _NOT = object()
 
 
 _Cell = Mapping[str, Any]  # as in the manifest: part, cell, config, levels
+_Cells = dict[Address, _Cell]
 
 
 @dataclass(frozen=True)
@@ -71,65 +73,42 @@ def match(first: Results, second: Results) -> Matched:
     """
     a = _cells(first)
     b = _cells(second)
-    differing = _differing(a, b)
-    alike = [name for name in _factors(a, b) if name not in differing]
-    by_levels = _matched(a, b, lambda cell: (cell["part"], *map(cell["levels"].get, alike)))
-    rest_a = _without(a, (x for x, _ in by_levels))
-    rest_b = _without(b, (y for _, y in by_levels))
-    by_config = _matched(rest_a, rest_b, lambda cell: (cell["part"], cell["config"]))
-    pairs = sorted((*by_levels, *by_config), key=lambda pair: a.index(pair[0]))
+    factors = dict.fromkeys(name for cell in (*a.values(), *b.values()) for name in cell["levels"])
+    levels = {name: (_levels(a, name), _levels(b, name)) for name in factors}
+    alike = [name for name, (here, there) in levels.items() if {*here} & {*there}]
+    pairs = _matched(a, b, lambda cell: (cell["part"], *map(cell["levels"].get, alike)))
+    left_a = {x: cell for x, cell in a.items() if x not in pairs}
+    left_b = {y: cell for y, cell in b.items() if y not in pairs.values()}
+    pairs |= _matched(left_a, left_b, lambda cell: (cell["part"], cell["config"]))
     return Matched(
-        tuple(_pair(x, y) for x, y in pairs),
-        tuple(_name(cell) for cell in _without(rest_a, (x for x, _ in by_config))),
-        tuple(_name(cell) for cell in _without(rest_b, (y for _, y in by_config))),
-        differing,
+        tuple(_pair(cell, b[pairs[x]]) for x, cell in a.items() if x in pairs),
+        tuple(_name(cell) for x, cell in a.items() if x not in pairs),
+        tuple(_name(cell) for y, cell in b.items() if y not in pairs.values()),
+        {name: both for name, both in levels.items() if name not in alike},
     )
 
 
-def _cells(results: Results) -> list[_Cell]:
+def _cells(results: Results) -> _Cells:
     cells = results.manifest.get("cells", [])
-    return [c for c in cells if c["part"] != REPEATS and c["cell"] != REFERENCE]
+    kept = (c for c in cells if c["part"] != REPEATS and c["cell"] != REFERENCE)
+    return {Address.of(cell): cell for cell in kept}
 
 
-def _differing(
-    a: Sequence[_Cell], b: Sequence[_Cell]
-) -> dict[str, tuple[tuple[Level, ...], tuple[Level, ...]]]:
-    """Factors that cannot tell cells apart in both, with their levels here and there."""
-    found = {}
-    for factor in _factors(a, b):
-        here = _levels(a, factor)
-        there = _levels(b, factor)
-        if not set(here) & set(there):
-            found[factor] = here, there
-    return found
+def _levels(cells: _Cells, factor: str) -> tuple[Level, ...]:
+    levels = (cell["levels"] for cell in cells.values())
+    return tuple(dict.fromkeys(each[factor] for each in levels if factor in each))
 
 
-def _factors(a: Sequence[_Cell], b: Sequence[_Cell]) -> list[str]:
-    return list(dict.fromkeys(name for cell in (*a, *b) for name in cell["levels"]))
-
-
-def _levels(cells: Iterable[_Cell], factor: str) -> tuple[Level, ...]:
-    return tuple(dict.fromkeys(c["levels"][factor] for c in cells if factor in c["levels"]))
-
-
-def _matched(
-    a: Iterable[_Cell], b: Iterable[_Cell], key: Callable[[_Cell], Hashable]
-) -> list[tuple[_Cell, _Cell]]:
+def _matched(a: _Cells, b: _Cells, key: Callable[[_Cell], Hashable]) -> dict[Address, Address]:
     """Pairs of cells whose key is the same, and nobody else's."""
     once_a = _once(a, key)
     once_b = _once(b, key)
-    return [(cell, once_b[name]) for name, cell in once_a.items() if name in once_b]
+    return {x: once_b[name] for name, x in once_a.items() if name in once_b}
 
 
-def _once(cells: Iterable[_Cell], key: Callable[[_Cell], Hashable]) -> dict[Hashable, _Cell]:
-    cells = list(cells)
-    counts = Counter(map(key, cells))
-    return {key(cell): cell for cell in cells if counts[key(cell)] == 1}
-
-
-def _without(cells: Iterable[_Cell], taken: Iterable[_Cell]) -> list[_Cell]:
-    addresses = set(map(Address.of, taken))
-    return [cell for cell in cells if Address.of(cell) not in addresses]
+def _once(cells: _Cells, key: Callable[[_Cell], Hashable]) -> dict[Hashable, Address]:
+    counts = Counter(map(key, cells.values()))
+    return {key(cell): x for x, cell in cells.items() if counts[key(cell)] == 1}
 
 
 def _name(cell: _Cell) -> tuple[str, Levels]:
@@ -142,7 +121,8 @@ def _pair(a: _Cell, b: _Cell) -> Pair:
     return Pair(a["part"], common, a["cell"], b["cell"], a["config"] == b["config"])
 
 
-Run = tuple[int, int, int, int]
+Run = tuple[Address, int]
+"""A run of either folder, by its address in the first, and its seed."""
 
 
 @dataclass(frozen=True)
@@ -151,45 +131,26 @@ class Rows:
 
     Attributes:
         values: Values of the measure `(n,)`.
-        cell: Number of the cell in the first folder `(n,)`.
-        person: Person of each row `(n,)`.
-        trial: Trial of each row `(n,)`.
-        seed: Seed of each run `(n,)`.
+        runs: Run of each row `(n,)`.
     """
 
     values: Array
-    cell: Array
-    person: Array
-    trial: Array
-    seed: Array
-
-    @property
-    def runs(self) -> list[Run]:
-        """Cell, person, trial and seed of each row."""
-        columns = (self.cell, self.person, self.trial, self.seed)
-        return list(zip(*(column.tolist() for column in columns), strict=True))
+    runs: list[Run]
 
     def by_run(self) -> dict[Run, Any]:
         """The values by run; of a run with several rows the last."""
         return dict(zip(self.runs, self.values.tolist(), strict=True))
 
-    def of(self, runs: Set[Run]) -> Rows:
-        """The rows of some runs."""
-        return self.where(np.array([run in runs for run in self.runs], dtype=bool))
-
     def where(self, chosen: Array) -> Rows:
         """Some rows, by a mask `(n,)`."""
-        columns = (self.values, self.cell, self.person, self.trial, self.seed)
-        return Rows(*(column[chosen] for column in columns))
+        return Rows(self.values[chosen], list(compress(self.runs, chosen)))
 
-    def means(self) -> Rows:
-        """One row for each run that has a value: the mean of its rows."""
-        there = np.isfinite(self.values)
-        keys = np.stack([self.cell, self.person, self.trial, self.seed], axis=1)[there]
-        runs, place = np.unique(keys.astype(np.int64), axis=0, return_inverse=True)
-        place = place.reshape(-1)
-        totals = np.bincount(place, weights=self.values[there], minlength=len(runs))
-        return Rows(totals / np.bincount(place, minlength=len(runs)), *runs.T)
+    def means(self) -> dict[Run, float]:
+        """The mean of the rows of each run that has a value."""
+        runs = sorted(set(self.runs))
+        number = {run: n for n, run in enumerate(runs)}
+        found, means = person_means(self.values, [number[run] for run in self.runs])
+        return dict(zip((runs[n] for n in found.astype(int)), means.tolist(), strict=True))
 
 
 @dataclass(frozen=True)
@@ -250,40 +211,38 @@ def difference(part: str, levels: Levels, first: Rows, second: Rows) -> Differen
     """
     a = first.means()
     b = second.means()
-    runs_a = a.by_run()
-    runs_b = b.by_run()
-    both = sorted(runs_a.keys() & runs_b.keys())
-    old, new = (np.array([runs[run] for run in both]) for runs in (runs_a, runs_b))
-    person = np.array([person for _, person, _, _ in both])
+    both = sorted(a.keys() & b.keys())
+    old, new = (np.array([means[run] for run in both]) for means in (a, b))
     return Difference(
         part,
         levels,
-        runs=(len(a.values), len(b.values)),
-        medians=(_median(a.values), _median(b.values)),
-        interval=paired_difference(new, old, person) if both else _unpaired(a, b),
+        runs=(len(a), len(b)),
+        medians=(_median(a), _median(b)),
+        interval=paired_difference(new, old, _persons(both)) if both else _unpaired(a, b),
         is_paired=bool(both),
         same=int((old == new).sum()),
     )
 
 
-def _median(values: Array) -> float:
-    return float(np.median(values)) if len(values) else np.nan
+def _median(means: Mapping[Run, float]) -> float:
+    return float(np.median(list(means.values()))) if means else np.nan
 
 
-def _unpaired(a: Rows, b: Rows) -> Interval:
+def _persons(runs: Iterable[Run]) -> Array:
+    return np.array([address.person for address, _ in runs])
+
+
+def _unpaired(a: Mapping[Run, float], b: Mapping[Run, float]) -> Interval:
     """Welch's interval on the means of persons, who are others in each folder."""
     from scipy import stats
 
-    old, new = (person_means(rows.values, rows.person)[1] for rows in (a, b))
+    old, new = (person_means(list(means.values()), _persons(means))[1] for means in (a, b))
     mean = float(new.mean() - old.mean()) if len(old) and len(new) else np.nan
     n = min(len(old), len(new))
     if n < 2:
         return Interval(mean, np.nan, np.nan, n)
     found = stats.ttest_ind(new, old, equal_var=False).confidence_interval(LEVEL)
     return Interval(mean, float(found.low), float(found.high), n)
-
-
-_ROW = ("part", "cell", "person", "trial", "seed")
 
 
 @dataclass(frozen=True)
@@ -299,6 +258,10 @@ class GateGroup:
     part: str
     levels: Levels
     pairs: tuple[Pair, ...]
+
+    def cells(self, side: int) -> dict[int, int]:
+        """The cells of the first (0) or second (1) folder, with their numbers in the first."""
+        return {(pair.first, pair.second)[side]: pair.first for pair in self.pairs}
 
 
 class MatchedResults:
@@ -390,15 +353,15 @@ class MatchedResults:
         """
         rows = self.own_rows(side, table, column, group)
         shared = self.shared(group)
-        return rows.of(shared) if shared else rows
+        return rows.where(np.array([run in shared for run in rows.runs])) if shared else rows
 
     def failed(self, side: int, group: GateGroup) -> frozenset[Run]:
         """The runs of some cells that failed in the first (0) or second (1) folder."""
-        number = {(p.first, p.second)[side]: p.first for p in group.pairs}
+        cells = group.cells(side)
         return frozenset(
-            (number[run["cell"]], run["person"], run["trial"], run["seed"])
+            (Address.of(run)._replace(cell=cells[run["cell"]]), run["seed"])
             for run in self.sides[side].failures
-            if run["part"] == group.part and run["cell"] in number
+            if run["part"] == group.part and run["cell"] in cells
         )
 
     def shared(self, group: GateGroup) -> frozenset[Run]:
@@ -411,18 +374,19 @@ class MatchedResults:
     def own_rows(self, side: int, table: str, column: str, group: GateGroup) -> Rows:
         """All rows of some cells in one folder, with or without a counterpart."""
         frame = self._frame(side, table, column)
-        own = [(pair.first, pair.second)[side] for pair in group.pairs]
-        number = dict(zip(own, (pair.first for pair in group.pairs), strict=True))
-        chosen = frame.where((frame["part"] == group.part) & np.isin(frame["cell"], own))
-        cells = np.array([number[cell] for cell in chosen["cell"].tolist()], dtype=np.int64)
-        return Rows(chosen[column], cells, *(chosen[name] for name in _ROW[2:]))
+        cells = group.cells(side)
+        chosen = frame.where((frame["part"] == group.part) & np.isin(frame["cell"], list(cells)))
+        runs = [run._replace(cell=cells[run.cell]) for run in Address.all_of(chosen)]
+        return Rows(chosen[column], list(zip(runs, chosen["seed"].tolist(), strict=True)))
 
     def _frame(self, side: int, table: str, column: str) -> Frame:
         if table == "runs":
             return self.sides[side].runs
         key = side, table, column
         if key not in self._frames:
-            self._frames[key] = self.sides[side].table(table, columns=(*_ROW, column))
+            self._frames[key] = self.sides[side].table(
+                table, columns=(*Address._fields, "seed", column)
+            )
         return self._frames[key]
 
     def refuse_distrusted(self) -> None:
