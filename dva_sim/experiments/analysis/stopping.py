@@ -48,26 +48,32 @@ def _of_contrast(study: Study, asked: Contrast, runs: Table, level: float) -> Fl
     """Half-widths of the paired difference at each level of `over`; references cancel.
 
     The answer's is adjusted for the covariates. Factors that it does not name are at their first
-    level, but for those of listed rows, which are averaged.
+    level, but for those of rows, which are averaged.
     """
-    part = RunGrid(runs, asked.part, [Factor(*factor) for factor in study.factors.items()])
-    named = {asked.factor, asked.over, *factors_in_rows(study)}
-    fixed = {f: levels[0] for f, levels in part.levels.items() if f not in named}
+    sides_at = {asked.factor, asked.over}
+    together = (study.design.zip or ())[1:] if study.design is not None else ()
+    alike = {*together} - {*sides_at, *asked.within}  # as the first that is taken with them
+    factors = [Factor(*each) for each in study.factors.items() if each[0] not in alike]
+    part = RunGrid(runs, asked.part, factors)
+    free = sides_at | factors_in_rows(study)
+    fixed = {f: levels[0] for f, levels in part.levels.items() if f not in free}
     fixed |= asked.within
     axes = [name for name in part.levels if name not in (*fixed, asked.factor)]
+    over = axes.index(asked.over) if asked.over is not None else None
 
     def sides(grid: Floats) -> list[Floats]:
         """First and second, `(stops, persons, trials)` each."""
         found = []
         for side in asked.contrast:
             values = part.where(grid, fixed | {asked.factor: side})
-            at = axes.index(asked.over) if asked.over is not None else None
-            stops = values[np.newaxis] if at is None else np.moveaxis(values, at, 0)
+            stops = values[np.newaxis] if over is None else np.moveaxis(values, over, 0)
             by_person = np.moveaxis(stops, -2, 1)
             found.append(by_person.reshape(*by_person.shape[:2], -1))
         return found
 
     wanted = study.covariates if asked is study.answer else ()
     beside = [sides(product_of(part, name)) for name in wanted]
-    seen = band(adjusted_means(sides(part.grid(asked.measure)), beside), level)
+    means = adjusted_means(sides(part.grid(asked.measure)), beside)
+    ran = np.isfinite(sides(part.grid("cell"))[0]).any(axis=(1, 2))  # rows may leave stops out
+    seen = band(means[:, ran], level)
     return np.asarray((seen.high - seen.low) / 2)
