@@ -168,7 +168,7 @@ def run_row(trials: Sequence[Mapping[str, Any]]) -> Row:
     row: Row = {"trials": len(trials)}
     for column in _AVERAGED:
         if column.name in trials[0]:
-            row[_of_block(column).name] = mean(trial[column.name] for trial in trials)
+            row[_of_block(column).name] = finite_mean(trial[column.name] for trial in trials)
     row["plugin_failures"] = sum(trial["plugin_failures"] for trial in trials)
     for name in names_of(_FARTHEST):
         if name in trials[0]:
@@ -182,8 +182,8 @@ def run_row(trials: Sequence[Mapping[str, Any]]) -> Row:
     return row | {"simulated_s": sum(float(trial["trial_time_s"]) for trial in trials)}
 
 
-def mean(values: Iterable[float]) -> float:
-    """The mean of what is finite; nan of nothing."""
+def finite_mean(values: Iterable[float]) -> float:
+    """nan of nothing."""
     finite = [float(value) for value in values if math.isfinite(value)]
     return sum(finite) / len(finite) if finite else math.nan
 
@@ -199,7 +199,10 @@ def _throughputs(done: Sequence[Mapping[str, Any]]) -> Row:
         ends = [trial["end_m"] for trial in trials]
         nominal.append(throughput(amplitude, width, times))
         effective.append(throughput(amplitude, width, times, ends))
-    return {"throughput_bps": mean(nominal), "effective_throughput_bps": mean(effective)}
+    return {
+        "throughput_bps": finite_mean(nominal),
+        "effective_throughput_bps": finite_mean(effective),
+    }
 
 
 def _slope(done: Sequence[Mapping[str, Any]], key: str) -> float:
