@@ -20,7 +20,13 @@ from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, Tabl
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.study.addresses import Address
 from dva_sim.experiments.study.parts import Level
-from dva_sim.statistics import Interval, cumulative_incidence, paired_difference, share_interval
+from dva_sim.statistics import (
+    Interval,
+    cumulative_incidence,
+    paired_difference,
+    person_means,
+    share_interval,
+)
 
 CONFIRMED = "confirmed"
 CLEARED = "cleared"
@@ -107,17 +113,12 @@ class Endings:
 
     def difference(self, first: Level, second: Level, stop: Level) -> Interval:
         """Share confirmed by the horizon: first minus second, paired by person."""
-        sides = [self._confirmed_by_person(level, stop) for level in (first, second)]
-        both = sorted(set(sides[0]) & set(sides[1]))
-        return paired_difference([sides[0][p] for p in both], [sides[1][p] for p in both], both)
-
-    def _confirmed_by_person(self, line: Level, stop: Level) -> dict[int, float]:
-        mask = self.under(line, stop)
         done = (self.way == CONFIRMED) & (self.time <= self.horizon)
-        return {
-            int(person): float(done[mask & (self._person == person)].mean())
-            for person in np.unique(self._person[mask])
-        }
+        masks = [self.under(level, stop) for level in (first, second)]
+        sides = [person_means(done[mask], self._person[mask]) for mask in masks]
+        both, *places = np.intersect1d(sides[0][0], sides[1][0], return_indices=True)
+        a, b = (means[place] for (_, means), place in zip(sides, places, strict=True))
+        return paired_difference(a, b, both)
 
 
 def with_endings(runs: Table, events: Table) -> Table:

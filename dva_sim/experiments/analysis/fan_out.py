@@ -103,5 +103,5 @@ def need_of(results: Results, part: str, where: Setting, since: float) -> Need:
 
 
 def _rows(table: Mapping[str, Any], part: str, where: Setting) -> dict[str, Any]:
-    grid = RunGrid(table, part, [Factor(name, (level,)) for name, level in where.items()])
-    return {name: values[grid.at(where)] for name, values in grid.treated.items()}
+    factors = [Factor(name, (level,)) for name, level in where.items()]
+    return RunGrid(table, part, factors).rows_at(where)

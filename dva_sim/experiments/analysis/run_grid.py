@@ -153,6 +153,11 @@ class RunGrid:
                 mask &= codes == factor.levels.index(setting[factor.name])
         return mask
 
+    def rows_at(self, setting: Mapping[str, Level]) -> dict[str, NDArray[Any]]:
+        """Columns of the runs at some levels."""
+        here = self.at(setting)
+        return {name: values[here] for name, values in self.treated.items()}
+
     def settings(self, but: Sequence[str] = ()) -> Iterator[Setting]:
         """Every combination of levels of the factors, except those named in `but`."""
         free = [f for f in self.factors if f.name not in but]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.run_grid import Table, codes_of, nan_mean, person_means
+from dva_sim.experiments.analysis.run_grid import RunGrid, Table, nan_mean, person_means
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.simulation.labels import setting
 from dva_sim.simulation.measures.shifts import FOLLOW_S
@@ -38,13 +38,16 @@ class Shifts:
     Args:
         view: Its lines are policies, its stops arrival rates.
         events: Columns of the table `events`, if there is one.
+
+    Attributes:
+        events: The events in the grid of the runs; None where there is no such table.
     """
 
     def __init__(self, view: StudyView, events: Table | None = None) -> None:
         self.view = view
         self.policies = tuple(str(level) for level in view.lines)
         self.stops = range(len(view.stops))
-        self.events = self._events(events or {})
+        self.events = RunGrid(events, view.part.name, view.part.factors) if events else None
 
     @property
     def baseline(self) -> str:
@@ -135,32 +138,6 @@ class Shifts:
             best = self.of("bound_mean_s")[:, self.policies.index(FLOOR), stop]
         columns = [self.policies.index(p) for p in self.travellers]
         return share_of_the_way(floor, response[:, columns], best)
-
-    # --- events ----------------------------------------------------------------------------
-
-    def _events(self, table: Table) -> dict[str, NDArray[Any]]:
-        """Rows of this part and panel, with the numbers of policy and stop."""
-        if not table:
-            return {}
-        view = self.view
-        rows = {name: np.asarray(values) for name, values in table.items()}
-        here = (rows["part"] == view.part.name) & ~rows["is_reference"].astype(bool)
-        assert view.line is not None
-        rows["policy"] = codes_of(rows, view.line)
-        rows["stop"] = codes_of(rows, view.over) if view.over else np.zeros(len(here), dtype=int)
-        for factor in view.part.factors:
-            if factor.name in view.panels[0]:
-                wanted = factor.levels.index(view.panels[0][factor.name])
-                here &= codes_of(rows, factor) == wanted
-        return {name: values[here] for name, values in rows.items()}
-
-    def events_of(self, policy: str, stop: int) -> Mapping[str, NDArray[Any]]:
-        """Columns of the events of one cell; empty where there is no table of events."""
-        if not self.events:
-            return {}
-        number = self.policies.index(policy)
-        mask = (self.events["policy"] == number) & (self.events["stop"] == stop)
-        return {name: values[mask] for name, values in self.events.items()}
 
 
 RESAMPLES = 1000

@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from dva_sim.experiments.analysis.answer import Answer, Finding
-from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, Setting, Table
-from dva_sim.experiments.analysis.shift_effects import BEST, POLICY, Shifts, is_dispatch, pooled
+from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, Table
+from dva_sim.experiments.analysis.shift_effects import BEST, Shifts, is_dispatch, pooled
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.answer_sentences import answer
 from dva_sim.experiments.report.cell_table import CellTable, Summary, cell_table
@@ -133,32 +133,28 @@ def _cells(shifts: Shifts) -> CellTable:
     """Every cell of the part the answer speaks of, with percentiles over all its events.
 
     Percentiles are pooled: the mean of the shifts' own would leave out the shifts that do not
-    reach them, which are the worst.
+    reach them, which are the worst. Panels of which the answer does not speak have a dash.
     """
     part = shifts.view.part
     table = cell_table(part, shifts.view.measure, SUMMARIES)
-    if not shifts.events:
+    if shifts.events is None:
         return table
     known = [table.heads.index(head) for _, head, _, _ in SUMMARIES if head in table.heads]
     at = min(known, default=len(table.heads))
+    dashes = ["–" for _ in PERCENTILES]
     rows = []
     for setting, row in zip(part.settings(), table.rows, strict=True):
-        found = _percentiles(shifts, setting)
+        is_shown = shifts.view.panels[0].items() <= setting.items()
+        found = _percentiles(shifts.events.rows_at(setting), shifts.follow) if is_shown else dashes
         rows.append([*row[:at], *found, *row[at:]])
     heads = [f"response, p{q} [s]" for q in PERCENTILES]
     return replace(table, heads=[*table.heads[:at], *heads, *table.heads[at:]], rows=rows)
 
 
-def _percentiles(shifts: Shifts, setting: Setting) -> list[str]:
-    """Percentiles of one cell; a dash in other panels, which `events_of` does not cover."""
-    view = shifts.view
-    panel = shifts.view.panels[0]
-    if any(setting[name] != level for name, level in panel.items()):
-        return ["–" for _ in PERCENTILES]
-    stop = view.stops.index(setting[view.over.name]) if view.over else 0
-    events = shifts.events_of(str(setting[POLICY]), stop)
-    values = pooled(events, [q / 100 for q in PERCENTILES], shifts.follow)[0]
-    over = f"> {shifts.follow:g}"
+def _percentiles(events: Table, follow: float) -> list[str]:
+    """Percentiles of one cell."""
+    values = pooled(events, [q / 100 for q in PERCENTILES], follow)[0]
+    over = f"> {follow:g}"
     return [over if np.isposinf(value) else number(float(value)) for value in values]
 
 
