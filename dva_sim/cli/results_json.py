@@ -11,8 +11,7 @@ from typing import Any
 from dva_sim.experiments.analysis.compare import Comparison
 from dva_sim.experiments.analysis.fail_conditions import GateVerdict
 from dva_sim.experiments.analysis.matched_results import Difference, Levels
-from dva_sim.experiments.analysis.run_grid import RunGrid
-from dva_sim.experiments.analysis.study_view import interval_of, layout_of
+from dva_sim.experiments.analysis.study_view import interval_of, parts_of
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.results.results import Results
@@ -55,15 +54,12 @@ def table(results: Results, name: str, most: int) -> Data:
         ConfigError: no such table.
     """
     frame = results.table(name)
-    columns = {key: values[:most].tolist() for key, values in frame.items()}
     return {
         "folder": str(results.folder),
         "table": name,
         "rows": frame.rows,
         "columns": _columns(results, name),
-        "data": [
-            dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)
-        ],
+        "data": frame.where(slice(most)).to_rows(),
     }
 
 
@@ -128,9 +124,7 @@ def _cells(reading: Reading) -> Iterator[Data]:
     view = reading.view
     if view is None:
         return
-    runs, factors = layout_of(reading.study, reading.runs, are_points_trials=False)
-    for name in dict.fromkeys(str(part) for part in runs["part"]):
-        part = RunGrid(runs, name, factors)
+    for part in parts_of(reading.study, reading.runs):
         made = part.grid("seed")
         grid = part.grid(view.measure)
         for setting in part.settings():
@@ -138,7 +132,7 @@ def _cells(reading: Reading) -> Iterator[Data]:
             found = interval_of(part.where(grid, setting))
             mean, low, high = (found.mean, found.low, found.high) if found else (None,) * 3
             numbers = {"runs": count, "measure": view.measure, "mean": mean, "low": low}
-            yield _place(name, tuple(setting.items())) | numbers | {"high": high}
+            yield _place(part.name, tuple(setting.items())) | numbers | {"high": high}
 
 
 def _columns(results: Results, name: str) -> list[Data]:

@@ -14,8 +14,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, Table
-from dva_sim.experiments.analysis.study_view import layout_of
+from dva_sim.experiments.analysis.run_grid import Floats, Setting, Table
+from dva_sim.experiments.analysis.study_view import part_of
 from dva_sim.experiments.study.parts import ANSWER, POINT, Contrast, Hypothesis, Level
 from dva_sim.statistics import (
     LEVEL,
@@ -175,8 +175,7 @@ def pairs_of(
     study: Mapping[str, Any], runs: Table, contrast: Contrast, at: Setting
 ) -> PairedRuns | None:
     """Both sides of a contrast at one place; None where it was not run."""
-    table, factors = layout_of(study, runs)
-    part = RunGrid(table, contrast.part, factors)
+    part = part_of(study, runs, contrast.part)
     wanted = [*at.items(), *((contrast.factor, level) for level in contrast.contrast)]
     if not all(level in part.levels.get(name, ()) for name, level in wanted):
         return None

@@ -191,10 +191,10 @@ def factors_of(study: Mapping[str, Any]) -> list[Factor]:
     return [Factor(name, tuple(levels)) for name, levels in study.get("factors", {}).items()]
 
 
-def layout_of(
-    study: Mapping[str, Any], runs: Table, are_points_trials: bool = True
-) -> tuple[Table, list[Factor]]:
-    """The runs with the factors by which they are laid out as a grid.
+def part_of(
+    study: Mapping[str, Any], runs: Table, name: str, *, are_points_trials: bool = True
+) -> RunGrid:
+    """The runs of a part, laid out by the factors that tell its cells apart.
 
     In the full grid these are the factors declared. Factors whose levels are taken together are
     one, that of which the answer speaks or the first. Points in ranges are like trials: a person
@@ -204,6 +204,7 @@ def layout_of(
     Args:
         study: Study as the manifest has it.
         runs: The table of runs.
+        name: Name of the part.
         are_points_trials: Otherwise the point is a factor of its own.
     """
     factors = factors_of(study)
@@ -211,13 +212,21 @@ def layout_of(
     if together := design.get("zip"):
         declared = study.get("answer") or {}
         named = [declared.get("factor"), declared.get("over"), *(declared.get("within") or {})]
-        kept = next((name for name in named if name in together), together[0])
-        return runs, [f for f in factors if f.name not in together or f.name == kept]
-    if POINT in study.get("factors", {}) and POINT in runs and are_points_trials:
-        return _as_trials(runs), [f for f in factors if f.name != POINT]
-    if names := row_names(study, runs):
-        return with_rows(runs, names), [Factor(ROW, tuple(names.values()))]
-    return runs, factors
+        kept = next((factor for factor in named if factor in together), together[0])
+        factors = [f for f in factors if f.name not in together or f.name == kept]
+    elif POINT in study.get("factors", {}) and POINT in runs and are_points_trials:
+        runs = _as_trials(runs)
+        factors = [f for f in factors if f.name != POINT]
+    elif names := row_names(study, runs):
+        runs = with_rows(runs, names)
+        factors = [Factor(ROW, tuple(names.values()))]
+    return RunGrid(runs, name, factors)
+
+
+def parts_of(study: Mapping[str, Any], runs: Table) -> list[RunGrid]:
+    """Every part that has runs, with each point as a level of its own."""
+    names = dict.fromkeys(map(str, runs["part"]))
+    return [part_of(study, runs, name, are_points_trials=False) for name in names]
 
 
 def points_of(study: Mapping[str, Any], runs: Table) -> list[str]:
@@ -301,10 +310,9 @@ def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
     Returns None where there is no run to look at.
     """
     declared = study.get("answer") or {}
-    parts = list(dict.fromkeys(str(p) for p in runs["part"]))
+    parts = list(map(str, runs["part"]))
     name = declared.get("part") if declared.get("part") in parts else next(iter(parts), None)
-    table, factors = layout_of(study, runs)
-    part = RunGrid(table, name, factors) if name else None
+    part = part_of(study, runs, name) if name else None
     if part is None or not len(part):
         return None
     declared = declared or _only_answer(part)

@@ -126,10 +126,7 @@ def name_of(job: StudyJob) -> str:
 
 def rows_of(results: Results) -> dict[Address, Row]:
     """Return the rows of the table of runs, by address."""
-    runs = results.runs
-    columns = {name: runs[name].tolist() for name in runs}
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    return {Address.of(row): row for row in rows}
+    return {Address.of(row): row for row in results.runs.to_rows()}
 
 
 def badness(measure: str, row: Row) -> float:

@@ -27,7 +27,8 @@ from dva_sim.experiments.analysis.study_view import (
     StudyView,
     covariates_of,
     keys_of,
-    layout_of,
+    part_of,
+    parts_of,
     possible_values,
 )
 from dva_sim.experiments.report.answer_conditions import depends
@@ -95,8 +96,7 @@ class Reading(ResultsReading):
         """True if a side of a hypothesis lies beyond the delays people were watched at."""
         name = claim.contrast.part
         factor = claim.contrast.factor
-        table, factors = layout_of(self.study, self.runs)
-        part = RunGrid(table, name, factors)
+        part = part_of(self.study, self.runs, name)
         support = support_of_part(part, self.scenario_of(name)) if self.page.has_support else None
         if support is None:
             return False
@@ -142,9 +142,7 @@ class Reading(ResultsReading):
         """A table of cells for each part that has runs."""
         if self.view is None:
             return []
-        names = dict.fromkeys(str(name) for name in self.runs["part"])
-        table, factors = layout_of(self.study, self.runs, are_points_trials=False)
-        parts = [RunGrid(table, name, factors) for name in names]
+        parts = parts_of(self.study, self.runs)
         return [self._cells_of(part, self.view) for part in parts if len(part)]
 
     def _cells_of(self, part: RunGrid, view: StudyView) -> CellTable:

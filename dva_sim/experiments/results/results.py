@@ -117,9 +117,14 @@ class Frame(dict[str, Array]):
         """Number of rows."""
         return len(next(iter(self.values()), ()))
 
-    def where(self, rows: Array) -> Frame:
+    def where(self, rows: Array | slice) -> Frame:
         """Some rows, by a mask or by their numbers."""
         return Frame({name: values[rows] for name, values in self.items()})
+
+    def to_rows(self) -> list[dict[str, Any]]:
+        """Row by row, each with its value of every column."""
+        columns = [values.tolist() for values in self.values()]
+        return [dict(zip(self, row, strict=True)) for row in zip(*columns, strict=True)]
 
     def to_pandas(self) -> Any:
         """Convert to a pandas.DataFrame.
@@ -161,12 +166,11 @@ class Frame(dict[str, Array]):
 
     def _repr_html_(self) -> str:
         heads = "".join(f"<th>{escape(name)}</th>" for name in self)
-        body = "".join(f"<tr>{self._html_row(row)}</tr>" for row in range(self.rows)[:_SHOWN])
+        rows = [map(plain, row.values()) for row in self.where(slice(_SHOWN)).to_rows()]
+        cells = ("".join(f"<td>{escape(text)}</td>" for text in row) for row in rows)
+        body = "".join(f"<tr>{row}</tr>" for row in cells)
         table = f"<table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"
         return f"{table}<p>{self.rows} rows</p>"
-
-    def _html_row(self, row: int) -> str:
-        return "".join(f"<td>{escape(plain(values[row]))}</td>" for values in self.values())
 
 
 def frame_of(rows: Sequence[Mapping[str, Any]]) -> Frame:

@@ -3,8 +3,7 @@
 import numpy as np
 from helpers.studies import synthetic_results
 
-from dva_sim.experiments.analysis.run_grid import RunGrid
-from dva_sim.experiments.analysis.study_view import finding_of, layout_of, points_of, view_of
+from dva_sim.experiments.analysis.study_view import finding_of, part_of, points_of, view_of
 from dva_sim.experiments.report.cell_table import cell_table
 
 ANSWER = {
@@ -42,9 +41,9 @@ def test_factors_taken_together_are_one_and_the_table_shows_them_all():
         "design": {"zip": ["link.delay_s", "link.jitter_s"]},
         "answer": ANSWER | {"over": "link.jitter_s"},
     }
-    table, factors = layout_of(study, runs)
-    assert [f.name for f in factors] == ["pattern", "link.jitter_s"]
-    found = cell_table(RunGrid(table, "drive", factors), "drive_time_s", points=["link.delay_s"])
+    part = part_of(study, runs, "drive")
+    assert list(part.levels) == ["pattern", "link.jitter_s"]
+    found = cell_table(part, "drive_time_s", points=["link.delay_s"])
     assert len(found.rows) == 6
     assert found.rows[2][:3] == ["REQ/REP", "50\N{NO-BREAK SPACE}ms", "0.3"]
 
@@ -107,6 +106,5 @@ def test_a_reference_run_is_that_of_every_point():
     aside["is_reference"][:] = True
     both = {key: np.concatenate([runs[key], aside[key]]) for key in runs}
     study = {"factors": {"point": [0, 1, 2], "pattern": ["pub-sub"]}}
-    table, factors = layout_of(study, both)
-    excess = RunGrid(table, "drive", factors).excess("drive_time_s")
+    excess = part_of(study, both, "drive").excess("drive_time_s")
     np.testing.assert_array_equal(excess, np.zeros((1, 3, 6)))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, nan_mean
-from dva_sim.experiments.analysis.study_view import StudyView, layout_of
+from dva_sim.experiments.analysis.study_view import StudyView, part_of
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.csv_numbers import Numbers, with_unit
 from dva_sim.experiments.report.figures.legend import legend
@@ -63,8 +63,7 @@ class Points(NamedTuple):
 def points_of(view: StudyView, reading: Reading) -> Points:
     """The runs of a design of points in ranges."""
     names = reading.points
-    table, factors = layout_of(reading.study, reading.runs, are_points_trials=False)
-    part = RunGrid(table, view.part.name, factors)
+    part = part_of(reading.study, reading.runs, view.part.name, are_points_trials=False)
     panel = view.panels[0] | ({view.over.name: view.stops[-1]} if view.over else {})
     where = nan_mean(np.stack([_per_point(part, name, {}) for name in names]), axis=-1)
     return Points(list(_clouds(view, part, panel)), names, where, panel)
