@@ -127,8 +127,9 @@ class StudySession:
         """
         done = self.journal.done()
         rest = [job for key, job in {job.key: job for job in batch}.items() if key not in done]
-        place = _at_random if self._plan.is_real_time else _as_designed
-        return sorted(rest, key=lambda job: (job.person, job.trial, place(job)))
+        if self._plan.is_real_time:
+            rest.sort(key=lambda job: derive_seed(job.seed, "order", job.config))
+        return sorted(rest, key=lambda job: (job.person, job.trial))
 
     @property
     def is_budget_spent(self) -> bool:
@@ -192,14 +193,6 @@ class StudySession:
             "wall_s": time.perf_counter() - self._clock,
         }
         write_json(folder / MACHINE, machine(jobs, self.journal.costs()) | facts)
-
-
-def _as_designed(_: StudyJob) -> int:
-    return 0
-
-
-def _at_random(job: StudyJob) -> int:
-    return derive_seed(job.seed, "order", job.config)
 
 
 @contextmanager

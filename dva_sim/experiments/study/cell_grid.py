@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import itertools
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -243,17 +244,22 @@ def jobs(study: Study, grid: Sequence[DesignCell] | None = None) -> list[StudyJo
         ConfigError: a scenario that cannot be read, or is not valid with some change.
     """
     every = cells(study) if grid is None else grid
-    names = dict.fromkeys(cell.part for cell in every)
-    of_part = {name: [cell for cell in every if cell.part == name] for name in names}
-    teams = {
-        name: max(1, *(model_for(cell.scenario).team(cell.scenario) for cell in part_cells))
-        for name, part_cells in of_part.items()
-    }
-    return [
-        job
-        for name, part_cells in of_part.items()
-        for job in _jobs_of(study, name, part_cells, teams.get(_source_of(study, name), 1))
-    ]
+    teams: dict[str, int] = defaultdict(lambda: 1)
+    for cell in every:
+        teams[cell.part] = max(teams[cell.part], model_for(cell.scenario).team(cell.scenario))
+    draws = _draws(study, teams)
+    # Persons of one cluster follow each other, so that no two clusters share an operator; repeats
+    # have the persons of the part that they repeat.
+    found = []
+    for cell in every:
+        team = teams[_source_of(study, cell.part)]
+        play = partial(model_for(cell.scenario).played_by, cell.scenario)
+        scenarios = {person: play(person * team) for person, _, _ in draws[cell.part]}
+        found += [
+            StudyJob(cell.part, cell.cell, cell.levels, *draw, cell.config, scenarios[draw[0]])
+            for draw in draws[cell.part]
+        ]
+    return found
 
 
 def runs_in(manifest: Mapping[str, Any]) -> list[StudyRun]:
@@ -262,14 +268,13 @@ def runs_in(manifest: Mapping[str, Any]) -> list[StudyRun]:
     Args:
         manifest: Manifest of a study that may be running; only its study and cells are read.
     """
-    study = Study.model_validate(manifest["study"])
     rows = manifest["cells"]
+    parts = dict.fromkeys(row["part"] for row in rows)
+    draws = _draws(Study.model_validate(manifest["study"]), parts)
     return [
-        StudyRun(part, row["cell"], row["levels"], *draw, row["config"])
-        for part in dict.fromkeys(row["part"] for row in rows)
+        StudyRun(row["part"], row["cell"], row["levels"], *draw, row["config"])
         for row in rows
-        if row["part"] == part
-        for draw in _draws(study, part)
+        for draw in draws[row["part"]]
     ]
 
 
@@ -405,28 +410,16 @@ def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
     return found
 
 
-def _jobs_of(
-    study: Study, name: str, part_cells: Sequence[DesignCell], team: int
-) -> Iterator[StudyJob]:
-    # Persons of one cluster follow each other, so that no two clusters share an operator; repeats
-    # have the persons of the part that they repeat.
-    draws = _draws(study, name)
-    for cell in part_cells:
-        play = partial(model_for(cell.scenario).played_by, cell.scenario)
-        scenarios = {person: play(person * team) for person, _, _ in draws}
-        for draw in draws:
-            scenario = scenarios[draw[0]]
-            yield StudyJob(name, cell.cell, cell.levels, *draw, cell.config, scenario)
-
-
-def _draws(study: Study, name: str) -> list[tuple[int, int, int]]:
-    """Person, trial and seed of each run in a cell of a part, in order."""
-    persons, trials, part = _size(study, name)
-    return [
-        (person, trial, derive_seed(study.seed, part, person, trial))
-        for person in range(persons)
-        for trial in range(trials)
-    ]
+def _draws(study: Study, parts: Iterable[str]) -> dict[str, list[tuple[int, int, int]]]:
+    """Person, trial and seed of each run in a cell of every part, in order."""
+    found = {}
+    for name in parts:
+        persons, trials, part = _size(study, name)
+        found[name] = [
+            (person, trial, derive_seed(study.seed, part, person, trial))
+            for person, trial in itertools.product(range(persons), range(trials))
+        ]
+    return found
 
 
 def _size(study: Study, name: str) -> tuple[int, int, str]:
