@@ -132,13 +132,15 @@ def run_study(
             )
         listener.recorded(problems)
 
-    # Analyse the tables, and write the answer, the figures and the page.
+    # Analyse the tables, and report: the answer, the figures and the page.
     page = None
     if options.report:
-        from dva_sim.experiments.report.report import write_report  # late: start-up
+        from dva_sim.experiments.report.report import write_page  # late: start-up
+        from dva_sim.experiments.report.summary import Reading  # late: start-up
 
         with listener.progress("reporting", 1):
-            page = write_report(folder)
+            analysed = Reading(results)
+            page = write_page(analysed)
     return StudyOutcome(results, problems, page)
 
 

@@ -351,7 +351,12 @@ def write_report(folder: Path, pdf: bool = False) -> Path:
         DvaSimError: the disk is full or refuses to be written, or the page is there and no browser
             prints it.
     """
-    reading = Reading(load_so_far(folder))
+    return write_page(Reading(load_so_far(folder)), pdf)
+
+
+def write_page(reading: Reading, pdf: bool = False) -> Path:
+    """Make the report of results that have been analysed; see `write_report`."""
+    folder = reading.results.folder
     drawn = draw_all(reading)
     blocks = blocks_of(reading, drawn)
     question = str(reading.study.get("question", "A study without a question"))
