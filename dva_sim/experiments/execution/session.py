@@ -128,7 +128,7 @@ class StudySession:
         done = self.journal.done()
         rest = [job for key, job in {job.key: job for job in batch}.items() if key not in done]
         if self._plan.is_real_time:
-            rest.sort(key=lambda job: derive_seed(job.seed, "order", job.config))
+            rest.sort(key=_at_random)
         return sorted(rest, key=lambda job: (job.person, job.trial))
 
     @property
@@ -193,6 +193,10 @@ class StudySession:
             "wall_s": time.perf_counter() - self._clock,
         }
         write_json(folder / MACHINE, machine(jobs, self.journal.costs()) | facts)
+
+
+def _at_random(job: StudyJob) -> int:
+    return derive_seed(job.seed, "order", job.config)
 
 
 @contextmanager
