@@ -3,7 +3,6 @@
 import pytest
 from helpers.network.links import link
 
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.connections import Connector, Load, ZeromqConfig, is_calm
 from dva_sim.network.link import LinkConfig
 from dva_sim.simulation import scenario as scenarios
@@ -79,18 +78,3 @@ def test_the_usual_pictures_and_commands_use_a_twelfth_of_the_usual_link():
 def test_a_run_says_what_it_used(changes, depth):
     scenario = scenarios.build(scenarios.load("drive-to-event"), {"horizon_s": 8, **changes})
     assert simulate(scenario, 1).depth == depth
-
-
-@pytest.mark.parametrize(
-    ("changes", "expected"),
-    [
-        ({"zeromq.high_water_mark": 0}, "zeromq.high_water_mark"),
-        ({"zeromq.conflate": "robot"}, "none, publisher, subscriber or both"),
-        ({"zeromq.sndbuf": 1}, "unknown key 'zeromq.sndbuf'"),
-        ({"transport": "udp"}, "zeromq or datagrams"),
-        ({"network_depth": "packet"}, "auto, message or segment"),
-    ],
-)
-def test_what_cannot_be_set_is_refused(changes, expected):
-    with pytest.raises(ConfigError, match=expected):
-        scenarios.build({}, changes)

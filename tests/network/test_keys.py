@@ -101,31 +101,6 @@ def test_a_folder_can_be_split(folder, tmp_path):
     assert create_keys(there, [GUARD]) == []  # its secret is elsewhere
 
 
-def test_what_is_missing_is_named(folder, tmp_path):
-    assert "dva-sim keys" in refused(tmp_path / "nowhere")
-    assert "public key of robot-9" in refused(folder, "robot-9")
-    (tmp_path / "empty").mkdir()
-    assert "contains no keys" in refused(tmp_path / "empty")
-
-
-@pytest.mark.parametrize(
-    ("content", "problem"),
-    [
-        (b"", 'no line id = "..."'),
-        (b'id = "x"\n', 'no line public-key = "..."'),
-        (b'id = "x"\npublic-key = "short"\n', "not a key of 40 letters"),
-        (b'id = "x"\npublic-key = "' + b"#" * 40 + b'"\n', "not a key of 40 letters"),
-        (b'id = "x"\npublic-key = "' + b"~" * 40 + b'"\n', "not a key of 40 letters"),
-        (b"\xff\xfe\x00", "not plain text"),
-    ],
-)
-def test_a_broken_file_is_named(folder, content, problem):
-    (folder / PUBLIC).write_bytes(content)
-    line = refused(folder)
-    assert line.startswith(str(folder / PUBLIC))
-    assert problem in line
-
-
 def test_two_devices_cannot_have_one_key(folder):
     text = (folder / PUBLIC).read_text()
     (folder / "public" / "copy.key").write_text(text)
@@ -157,14 +132,3 @@ def test_an_id_that_is_no_file_name_is_refused(tmp_path, id_):
     with pytest.raises(ConfigError, match="id"):
         create_keys(tmp_path, ["fine", id_])
     assert list(tmp_path.iterdir()) == []
-
-
-def test_two_ids_never_share_a_file(folder):
-    with pytest.raises(ConfigError, match="same file"):
-        create_keys(folder, [ROBOT.replace(":", "-")])
-
-
-def test_a_place_that_cannot_be_written_is_named(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(ConfigError, match="cannot be written"):
-        create_keys(tmp_path / "file", [ROBOT])

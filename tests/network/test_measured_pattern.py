@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 from helpers.network.transports import DELAY, PHONE, ROBOT, VirtualWorld
-from helpers.wording import unnamed
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.measured_commands import measured_runs
@@ -121,35 +120,6 @@ def test_a_command_may_take_no_time_but_not_less(table):
         measured_runs(table, {})
 
 
-@pytest.mark.parametrize("name", ["commands.csv", "commands.csv.gz"])
-@pytest.mark.parametrize("damage", [lambda data: data[:-6], lambda data: b"\xff" * 9 + data[9:]])
-def test_a_damaged_table_is_refused_in_a_line(tmp_path, name, damage):
-    data = (HEAD + ROWS).encode()
-    file = tmp_path / name
-    file.write_bytes(damage(gzip.compress(data) if name.endswith(".gz") else data))
-    with pytest.raises(ConfigError, match=name) as caught:
-        load_pattern(NAME, {"file": str(file)})()
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("rows", "where", "problem"),
-    [
-        ("a,x,1,0.9\n", {}, "arrived earlier"),
-        ("a,x,nan,1\n", {}, "should be finite"),
-        ("a,x,1,inf\n", {}, "should be finite"),
-        ("a,x,1,2\na,y,1,2\n", {"middleware": "a"}, "mixes commands of link x and y"),
-        ("a,x,one,2\n", {}, "should be numbers"),
-        ("", {}, "no command was measured"),
-    ],
-)
-def test_a_table_with_impossible_or_mixed_commands_is_refused(tmp_path, rows, where, problem):
-    file = tmp_path / "commands.csv"
-    file.write_text(HEAD + rows)
-    with pytest.raises(ConfigError, match=problem):
-        load_pattern(NAME, {"file": str(file), "where": where})()
-
-
 def test_a_run_in_which_nothing_arrived_is_silence_of_its_length(tmp_path):
     file = tmp_path / "commands.csv"
     rows = [f"{person},{at},{at + 0.1 if person else ''}" for person in (0, 1) for at in (0, 1, 2)]
@@ -180,32 +150,6 @@ def test_what_is_under_way_when_a_drive_ends_is_lost(table):
     times, _ = driven({"file": str(table), "where": {"middleware": "brokered"}}, 2.0)
     assert len(times) > 0
     assert max(times) <= began + 2.0
-
-
-@pytest.mark.parametrize(
-    ("text", "where", "names"),
-    [
-        (HEAD + ROWS, {"middleware": "carrier pigeon"}, ("carrier pigeon", "no command")),
-        (HEAD + ROWS, {"transport": "x"}, ("transport",)),
-        ("made_s\n1\n", {}, ("arrived_s",)),
-        (HEAD + "a,b,soon,later\n", {}, ("soon",)),
-        ("", {}, ("made_s", "arrived_s")),
-    ],
-)
-def test_a_table_that_cannot_be_used_is_refused_in_a_line(tmp_path, text, where, names):
-    file = tmp_path / "commands.csv"
-    file.write_text(text)
-    with pytest.raises(ConfigError, match=r".") as caught:
-        load_pattern(NAME, {"file": str(file), "where": where})()
-    assert unnamed(str(caught.value), "commands.csv", *names) == []
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("window", [[5, 13], [0.6, 0.5], [0.5]])
-def test_a_window_without_commands_is_refused(table, window):
-    options = {"file": str(table), "where": {"middleware": "direct"}, "window_s": window}
-    with pytest.raises(ConfigError, match=r"measured"):
-        load_pattern(NAME, options)()
 
 
 def test_the_shipped_table_is_made_of_what_a_study_exports(tmp_path):

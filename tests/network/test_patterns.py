@@ -45,42 +45,10 @@ def test_every_pattern_says_all_that_reports_and_pages_tell_of_it():
     assert set(PATTERNS) <= {entry.name for entry in names.everything("patterns")["patterns"]}
 
 
-@pytest.mark.parametrize(
-    ("name", "options", "expected"),
-    [
-        ("reqrep", {}, "pattern 'reqrep' is unknown; did you mean 'req-rep'?"),
-        ("mine", {}, "or a file: mine.py:Mine"),
-        ("req-rep", {"window": 3}, "pattern 'req-rep' has no option 'window'; it has none"),
-        (EXAMPLE, {"evry": 3}, "has no option 'evry'; did you mean 'every'?"),
-        (EXAMPLE, {"every": 0}, "option 'every' is 0; should be a whole number from 1"),
-        (EXAMPLE, {"timeout_s": -1}, "option 'timeout_s' is -1; should be above 0"),
-        ("gone.py:Mine", {}, "file 'gone.py' not found"),
-    ],
-)
-def test_a_pattern_that_cannot_be_had_is_told_in_a_line(name, options, expected):
-    with pytest.raises(ConfigError, match=r".") as caught:
-        load_pattern(name, options)()
-    assert expected in str(caught.value)
-
-
 def test_a_package_offers_patterns_by_name(monkeypatch):
     offered = EntryPoint("plain", "dva_sim.network.patterns:PubSub", "dva_sim.patterns")
     monkeypatch.setattr("dva_sim.kernel.plugins.entry_points", lambda group: [offered])
     assert isinstance(load_pattern("plain")(), PubSub)
-
-
-@pytest.mark.parametrize(
-    ("text", "place"),
-    [
-        ("horizon_s: 60\npattern: reqrep\n", "one.yaml:2:"),
-        (f"pattern: {EXAMPLE}\npattern_options:\n  timeout_s: 1\n  every: 0\n", "one.yaml:4:"),
-    ],
-)
-def test_a_mistake_in_a_pattern_is_told_at_its_key(tmp_path, text, place):
-    (tmp_path / "one.yaml").write_text(text)
-    with pytest.raises(ConfigError, match=r".") as caught:
-        scenarios.build(scenarios.load(str(tmp_path / "one.yaml")))
-    assert place in str(caught.value)
 
 
 def test_options_of_a_pattern_are_written_only_where_there_are_any():

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from helpers.wording import unnamed
 
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.link import read_delay_log
 from dva_sim.testing.files import check_file
 
@@ -53,20 +52,6 @@ def test_a_run_that_begins_again_after_40_000_requests_is_no_loss_of_25_000(tmp_
     text = ping(EPOCH, 40, [39_999, 40_000]) + ping(EPOCH + 50_000, 40, [1, 2], head=False)
     log = read_delay_log(write(tmp_path, text))
     assert (len(log.times), log.runs) == (4, 2)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "0 40\n",
-        "0 40\n0 41\n",
-        ping(EPOCH, 40, [1]),
-        ping(EPOCH, 40, [1]) + ping(EPOCH + 3600, 40, [1]),
-    ],
-)
-def test_probes_of_a_single_moment_of_each_run_are_no_log(tmp_path, text):
-    with pytest.raises(ConfigError, match="at least two moments"):
-        read_delay_log(write(tmp_path, text))
 
 
 @pytest.mark.parametrize(
@@ -117,20 +102,6 @@ def test_a_unit_that_is_assumed_and_unusual_is_doubted(tmp_path, text, units, na
     assert log.units == units
     assert bool(log.doubts) is bool(names)
     assert unnamed(" ".join(log.doubts), *names) == []
-
-
-@pytest.mark.parametrize(
-    ("text", "names"),
-    [
-        ("time,throughput_mbps\n0,5\n1,6\n", ["throughput_mbps", "link.rate_bps"]),
-        ("a,b\n0,5\n1,6\n", ["a, b", "time_s,delay_ms"]),
-        ('{"intervals": [{"sum": {"bits_per_second": 5e6}}]}', ["iperf3", "5,000,000 bit/s"]),
-    ],
-)
-def test_a_log_of_throughput_is_refused_for_what_it_is(tmp_path, text, names):
-    with pytest.raises(ConfigError) as error:
-        read_delay_log(write(tmp_path, text))
-    assert unnamed(str(error.value), "delays.log:1:1", *names) == []
 
 
 @pytest.mark.parametrize(

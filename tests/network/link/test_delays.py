@@ -12,7 +12,6 @@ from helpers.network.links import GAMMA, NORMAL, SHIFTED
 from numpy.typing import NDArray
 from scipy import stats
 
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import LinkConfig
 from dva_sim.network.link.time_noise import SlowNoise, normal_quantile
@@ -167,21 +166,6 @@ def test_each_direction_may_have_its_own_delay():
     assert link("up", **config).delay == 0.3
     assert link("down", **config).delay == 0.1
     assert link("up", **config).carry(0.0, 100) != pytest.approx(0.3, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("10\nfast\n", r"d\.txt:2:1: should be a delay \[ms\], not 'fast'"),
-        ("10\n-3\n", r"d\.txt:2:1: a delay should be between 0 and 60000 ms, not -3"),
-        ("# none\n", r"d\.txt: contains no delay"),
-    ],
-)
-def test_a_bad_file_of_delays_is_refused_with_its_line(tmp_path, text, words):
-    path = tmp_path / "d.txt"
-    path.write_text(text)
-    with pytest.raises(ConfigError, match=words):
-        link(delay_law={"law": "empirical", "file": str(path)})
 
 
 def test_slow_numbers_are_an_ornstein_uhlenbeck_process_at_each_millisecond():

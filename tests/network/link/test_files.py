@@ -1,9 +1,5 @@
 """Links from files: of their own keys, or part of a scenario."""
 
-import pytest
-from helpers.wording import unnamed
-
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.link import LinkConfig
 from dva_sim.network.link.files import read_link
 
@@ -20,12 +16,3 @@ def test_a_link_is_read_from_its_keys_or_from_a_scenario(tmp_path):
     changed = read_link(str(tmp_path / "run.yaml"), {"up.loss": 0.3, "rate_bps": 1e6}, ENDS)
     assert (changed.toward("up").loss, changed.toward("down").loss) == (0.3, 0.0)
     assert read_link("drive-to-event", {}, ENDS) == read_link(None, {}, ENDS) == LinkConfig()
-
-
-def test_mistakes_are_told_at_their_place_in_a_scenario(tmp_path):
-    (tmp_path / "run.yaml").write_text(
-        "model: full\nlink:\n  partitions:\n    - {from_s: 0, for_s: 1, source: robot-1}\n"
-    )
-    with pytest.raises(ConfigError) as error:
-        read_link(str(tmp_path / "run.yaml"), {}, ENDS)
-    assert not unnamed(str(error.value), "run.yaml:3:3", "robot-1", "near", "far")

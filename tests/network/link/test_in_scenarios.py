@@ -5,10 +5,8 @@ from typing import Any
 
 import pytest
 
-from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full import Recording, rehearse, simulate
+from dva_sim.simulation.full import Recording, simulate
 
 
 def run(**link: Any) -> Recording:
@@ -53,22 +51,3 @@ def test_the_same_seed_gives_the_same_drive_over_bursts_and_slow_delays():
         "bursts": {"mean_s": 0.1},
     }
     assert applied(run(**link)) == applied(run(**link))
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("link:\n  delay_law: fast\n", r":2:3: link.delay_law: a law is a mapping, such as"),
-        ("link:\n  outages: [{from_s: 1}]\n", r":2:13: missing key 'link.outages.0.for_s'"),
-        ("link:\n  up: {dely_s: 1}\n", r":2:8: unknown key 'link.up.dely_s'; did you mean"),
-        ("link:\n  bursts: {mean_s: 1}\n  loss: 2\n", r":3:3: link.loss: should be at most"),
-        ("link:\n  delay_log: bad.log\n", r"bad\.log:2:1: should be a time, not 'x'"),
-        ("link:\n  partitions: [{source: a, from_s: 1, for_s: 1}]\n", "'a' of a partition is nob"),
-    ],
-)
-def test_a_mistake_is_told_with_its_place(tmp_path, monkeypatch, text, words):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "bad.log").write_text("1 2\nx 3\n")
-    (tmp_path / "s.yaml").write_text(text + "events: [{kind: fire, at_s: 5}]\n")
-    with pytest.raises(ConfigError, match=words):
-        rehearse(scenarios.build(load_yaml("s.yaml")), seed=1)

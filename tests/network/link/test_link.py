@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
-from helpers.network.links import GAMMA, NORMAL, SHIFTED, link
+from helpers.network.links import link
 
-from dva_sim.kernel.config import validate
-from dva_sim.kernel.errors import ConfigError
-from dva_sim.network.link import LinkConfig, TraceRate, read_trace
+from dva_sim.network.link import TraceRate
 
 
 def test_a_packet_takes_its_serialisation_and_the_delay():
@@ -68,58 +66,3 @@ def test_a_trace_starts_at_a_seeded_offset_and_adds_to_the_delay(tmp_path):
     )
     assert first == again != other
     assert 0.5 <= first <= 0.52
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("1\nx\n", ":2:1: should be a whole millisecond"),
-        ("5\n3\n", ":2:1: 3 ms comes after 5 ms"),
-        ("", "no packet opportunity"),
-        ("0\n", "no packet opportunity"),
-    ],
-)
-def test_a_bad_trace_is_refused_with_its_line(tmp_path, text, words):
-    path = tmp_path / "bad.up"
-    path.write_text(text)
-    with pytest.raises(ConfigError) as caught:
-        read_trace(str(path))
-    assert words in str(caught.value)
-
-
-def test_a_missing_trace_is_named():
-    with pytest.raises(ConfigError, match=r"nowhere\.up: "):
-        read_trace("nowhere.up")
-
-
-@pytest.mark.parametrize(
-    ("config", "words"),
-    [
-        ({"delay_s": 0.05, "delay_law": NORMAL}, "sd_s 0.02 of a normal law is above a third of"),
-        ({"delay_s": 0.03, "delay_law": GAMMA}, "least_s 0.04 should be below delay_s 0.03"),
-        ({"delay_s": 0.04, "delay_law": SHIFTED}, "least_s 0.04 should be below delay_s 0.04"),
-        ({"delay_s": 0.1, "up": {"delay_s": 0.05}, "delay_law": NORMAL}, "third of delay_s 0.05"),
-        ({"delay_s": 0.1, "jitter_s": 0.1, "delay_law": NORMAL}, "jitter_s and delay_law exclude"),
-        ({"delay_law": NORMAL, "delay_log": "x", "delay_s": 1}, "delay_law and delay_log exclude"),
-        ({"delay_law": {"law": "empirical"}}, "needs either delays_s or file"),
-        ({"delay_law": "normal"}, "delay_law: a law is a mapping, such as .*, not 'normal'"),
-        ({"delay_law": {"law": "normal"}}, "missing key 'delay_law.sd_s'"),
-        ({"delay_law": {"law": "cauchy"}}, "'cauchy'.*normal, gamma"),
-        ({"delay_law": {"law": "gamma", "sd_s": 1, "sdd": 2}}, "unknown key 'delay_law.sdd'"),
-        ({"up": {"delay": 1}}, "unknown key 'up.delay'; did you mean 'delay_s'"),
-        ({"bursts": {}}, "bursts need either mean_s or mean_packets"),
-        ({"bursts": {"mean_s": 1, "mean_packets": 2}}, "bursts need either"),
-        ({"loss": 0.5, "bursts": {"mean_s": 1, "loss": 0.5}}, "should be below bursts.loss 0.5"),
-        ({"loss": 0.8, "bursts": {"mean_packets": 2}}, "too short for a loss of 0.8: at least 4"),
-        ({"loss": 0.1, "down": {"loss": 0.6}, "bursts": {"mean_s": 1, "loss": 0.5}}, "loss 0.6"),
-        ({"outages": [{"from_s": 1}]}, "missing key 'outages.0.for_s'"),
-        ({"outages": [{"from_s": 1, "for_s": 2, "every_s": 2}]}, "for_s 2 should be below every_s"),
-        ({"outages": [{"from_s": 1, "for_s": 2, "direction": "left"}]}, "up, down or both"),
-        ({"partitions": [{"from_s": 1, "for_s": 2, "to": "x"}]}, "unknown key 'partitions.0.to'"),
-        ({"queue_packets": 0}, "queue_packets: "),
-        ({"delay_s": 0.1, "jitter_s": 0.2}, r"jitter_s 0\.2 .*delay_s 0\.1"),
-    ],
-)
-def test_what_no_link_can_be_is_refused(config, words):
-    with pytest.raises(ConfigError, match=words):
-        validate(LinkConfig, config)

@@ -4,8 +4,7 @@ import pytest
 from helpers.network.scripted_tcp import EXACT, Pair, ScriptedLink, options
 
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.errors import ConfigError
-from dva_sim.network.tcp import TcpConnection, TcpOptions
+from dva_sim.network.tcp import TcpConnection
 
 
 def opened(delay=0.05, lose_out=(), lose_back=(), until=200.0, dead=False, opener=EXACT):
@@ -87,11 +86,6 @@ def test_data_opens_the_peer_when_the_last_acknowledgement_was_lost():
     connection.open(lambda: clock.call_after(0.02, connection.opener.write, 400))
     clock.run(0.5)
     assert read == [(0.17, 400)]
-
-
-def test_an_unknown_congestion_control_is_named_with_the_known_ones():
-    with pytest.raises(ConfigError, match=r"'vegas' .*cubic, reno"):
-        TcpOptions(congestion="vegas")
 
 
 def test_what_was_written_before_finishing_is_still_delivered_even_if_it_was_lost():
