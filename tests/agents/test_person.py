@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from dva_sim.agents.population import Person, Population, Trait, draw_person, median_person
-from dva_sim.kernel.errors import ConfigError
 
 
 def test_a_person_is_always_the_same_one_and_another_one_differs_in_every_trait():
@@ -43,16 +42,6 @@ def test_another_median_leaves_the_spread_and_the_population_as_they_were():
 
 def test_no_median_changes_nothing():
     assert Population().with_medians({}) == Population()
-
-
-def test_a_trait_that_nobody_has_is_named_with_those_that_there_are():
-    with pytest.raises(ConfigError, match=r"operator\.traits 'luck' .*known: perceptual"):
-        Population().with_medians({"luck": 1.0})
-
-
-def test_a_median_is_above_zero():
-    with pytest.raises(ConfigError, match=r"operator\.traits 'margin' is 0\.0;"):
-        Population().with_medians({"margin": 0.0})
 
 
 def test_the_person_in_the_middle_has_every_trait_at_its_median():

@@ -3,14 +3,11 @@
 import math
 
 import pytest
-from helpers.wording import unnamed
 
 from dva_sim.agents.robot.battery import BatteryProfile
 from dva_sim.agents.robot.command_queue import ServiceLaw
 from dva_sim.agents.robot.profile import RobotProfile, load_robot
 from dva_sim.agents.robot.sensors import SensorConfig
-from dva_sim.kernel.config import validate
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.drives import DriveSpec
 
 
@@ -49,30 +46,3 @@ def test_a_drive_beside_its_profile_is_found_from_anywhere(tmp_path, monkeypatch
     monkeypatch.chdir(here)
     spec = load_robot("../there/mine.yaml").drive_spec()
     assert spec.drive(spec).drive.pace == 0.5
-
-
-@pytest.mark.parametrize(
-    ("keys", "names"),
-    [
-        ({"max_speed_mps": 3.8}, "max_speed_mps 3.75"),
-        ({"max_speed_mps": 1.3, "radius_m": 0.1}, "max_speed_mps 1.25"),
-        ({"corners_m": [[0.2, 0.05], [-0.2, 0.05], [-0.2, -0.05], [0.2, -0.05]],
-          "max_speed_mps": 0.7}, "max_speed_mps 0.625"),
-        ({"corners_m": [[0.4, 0.1], [-0.2, 0.1], [-0.2, -0.1]]}, "radius_m corner"),
-        ({"corners_m": [[0.2, 0], [0, 0.2]]}, "corners_m counter-clockwise"),
-        ({"corners_m": [[0.2, 0.1], [0.2, -0.1], [-0.2, 0]]}, "corners_m counter-clockwise"),
-        ({"corners_m": [[0.2, 0], [0.02, 0.02], [0, 0.2], [-0.2, -0.2]]}, "corners_m dents"),
-        ({"corners_m": [[0.2, 0.1], [0.1, 0.1], [0.1, 0.05], [0.2, 0.05]]}, "corners_m around"),
-        ({"corners_m": [[0.2, 0.1], [0, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]]},
-         "corners_m dents"),
-        ({"corners_m": [[0.2, 0], [0, 0.2], [-0.2, 0]]}, "corners_m around"),
-        ({"mass_kg": 0}, "mass_kg 0"),
-        ({"battery": {"efficiency": 2}}, "battery.efficiency most"),
-        ({"reverse": True}, "'reverse'"),
-    ],
-)  # fmt: skip
-def test_a_profile_that_cannot_be_is_refused_in_one_line(keys, names):
-    with pytest.raises(ConfigError) as caught:
-        validate(RobotProfile, keys)
-    assert unnamed(caught.value, *names.split()) == []
-    assert "\n" not in str(caught.value)

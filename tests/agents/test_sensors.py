@@ -5,9 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from helpers.wording import unnamed
 from helpers.worlds.robot_fleet import EMPTY, Fleet
-from pydantic import ValidationError
 
 from dva_sim.agents.robot.sensors import (
     BLOCK,
@@ -19,7 +17,6 @@ from dva_sim.agents.robot.sensors import (
     make_ports,
     sources_of,
 )
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.worlds.hazards import Conditions
 from dva_sim.worlds.lidar import Lidar
@@ -147,29 +144,6 @@ def test_faults_by_chance_come_after_their_mean_time_on_average():
     times = [lost_at(seed) for seed in range(400)]
     assert np.mean(times) == pytest.approx(50.0, rel=4 / math.sqrt(400))
     assert lost_at(5) == lost_at(5)
-
-
-@pytest.mark.parametrize(
-    ("config", "names"),
-    [
-        ({"name": "radar"}, "'radar' lidar temperature"),
-        ({"name": "smoke", "rate_hz": 50}, "rate_hz 20"),
-        ({"name": "smoke", "noise": -1}, "noise 0"),
-        ({"name": "smoke", "faults": [{"kind": "lost"}]}, "faults at_s mean_time_s"),
-        ({"name": "smoke", "faults": [{"kind": "late", "at_s": 1}]}, "'lost' 'stuck'"),
-        ({"name": "smoke", "colour": 1}, "colour"),
-    ],
-)
-def test_a_mistake_in_the_configuration_is_told(config, names):
-    with pytest.raises(ValidationError) as error:
-        SensorConfig.model_validate(config)
-    assert unnamed(error.value, *names.split()) == []
-
-
-def test_two_sensors_of_one_name_are_one_too_many():
-    twice = [SensorConfig(name="smoke"), SensorConfig(name="smoke")]
-    with pytest.raises(ConfigError, match="sensor 'smoke'"):
-        make_ports(twice, {"smoke": lambda now: (0.0,)}, Streams(1).fresh)
 
 
 def test_a_fault_is_either_scheduled_or_drawn():

@@ -5,11 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.wording import unnamed
 
 from dva_sim.agents.robot.command_queue import ServiceLaw, mean_of, service_times
-from dva_sim.kernel.errors import ConfigError
-from dva_sim.simulation import scenario as scenarios
 
 
 def draws(count: int = 40_000, **law: Any) -> np.ndarray:
@@ -42,24 +39,6 @@ def test_a_number_is_always_the_same():
     times = service_times(0.05, np.random.default_rng(1))
     assert [times(), times()] == [0.05, 0.05]
     assert mean_of(0.05) == 0.05
-
-
-@pytest.mark.parametrize(
-    ("wrong", "names"),
-    [
-        ({"law": "gamma", "mean_s": 1}, "gamma needs cv"),
-        ({"law": "exponential", "mean_s": 1, "cv": 1}, "exponential no cv"),
-        ({"law": "normal", "mean_s": 1}, "robot.processing_s.law: constant"),
-        ({"law": "constant", "mean_s": -1}, "robot.processing_s.mean_s: 0"),
-        ({"law": "constant", "mean_s": 1, "c": 1}, "'robot.processing_s.c'"),
-        ("long", "robot.processing_s: number"),
-        (-1, "robot.processing_s: 0"),
-    ],
-)
-def test_a_law_that_cannot_be_is_refused(wrong, names):
-    with pytest.raises(ConfigError) as error:
-        scenarios.build({}, {"robot.processing_s": wrong})
-    assert unnamed(error.value, *names.split()) == []
 
 
 def test_robots_draw_their_own_times_the_same_for_the_same_seed():

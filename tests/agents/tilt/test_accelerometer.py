@@ -5,12 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.wording import unnamed
 
 from dva_sim.agents.tilt import Accelerometer, AccelerometerPart, load_part
 from dva_sim.agents.tilt.accelerometer import GRAVITY
-from dva_sim.kernel.config import validate
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import available
 
 MG = GRAVITY / 1000
@@ -107,17 +104,3 @@ def test_every_part_says_where_its_numbers_are_from(name):
     part = load_part(name)
     assert part.data_sheet or part.noise == 0.0
     assert part.noise < 0.05
-
-
-@pytest.mark.parametrize(
-    ("keys", "names"),
-    [
-        ({}, "noise_density_ug bandwidth_hz noise_mg"),
-        ({"noise_density_ug": 100}, "noise_density_ug bandwidth_hz noise_mg"),
-        ({"noise_mg": 1, "assumed": ["price"]}, "assumed 'price'"),
-    ],
-)
-def test_a_part_that_cannot_be_is_refused_by_its_keys(keys, names):
-    with pytest.raises(ConfigError) as error:
-        validate(AccelerometerPart, keys)
-    assert unnamed(error.value, *names.split()) == []

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from helpers.wording import unnamed
 
 from dva_sim.agents.tilt.filters import (
     BatchMedian,
@@ -14,7 +13,6 @@ from dva_sim.agents.tilt.filters import (
     known_filters,
     load_filter,
 )
-from dva_sim.kernel.errors import ConfigError
 
 PERIOD = 1 / 34
 SAMPLES_IN_200_MS = 7  # at 34 Hz
@@ -131,26 +129,6 @@ def test_one_pole_closes_63_percent_of_a_step_in_its_time_constant():
 def test_every_filter_answers_before_any_sample_has_come():
     for name in known_filters():
         assert made(name).value() == (0.0, 0.0)
-
-
-@pytest.mark.parametrize(
-    ("name", "options", "names"),
-    [
-        (
-            "average",
-            {},
-            "'average' median20-copy median20-inplace none one_pole mine.py:Mine",
-        ),
-        ("median", {"size": 5}, "'median' 'size' window"),
-        ("median", {"window": 0}, "'median' 'window' 0; 1 1000"),
-        ("one_pole", {"time_constant_s": 0}, "'one_pole' 'time_constant_s' 0; 60"),
-        ("none", {"window": 3}, "'none' 'window'"),
-    ],
-)
-def test_what_cannot_be_is_told_by_its_names(name, options, names):
-    with pytest.raises(ConfigError) as error:
-        made(name, **options)
-    assert unnamed(error.value, "filter", *names.split()) == []
 
 
 def test_a_filter_of_a_users_file_is_found(tmp_path):

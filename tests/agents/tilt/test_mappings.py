@@ -3,10 +3,8 @@
 import math
 
 import pytest
-from helpers.wording import unnamed
 
 from dva_sim.agents.tilt.mappings import Mapping, known_mappings, load_mapping
-from dva_sim.kernel.errors import ConfigError
 
 DT = 1 / 34
 
@@ -99,20 +97,3 @@ def test_a_new_drive_forgets_what_was_integrated():
         held(mapping, 20.0, 1.0, 10)
         mapping.begin()
         assert mapping.command(0.0, 0.0, DT) == (0.0, 0.0)
-
-
-@pytest.mark.parametrize(
-    ("name", "options", "names"),
-    [
-        ("relative", {}, "'relative' absolute differential leaky slew mine.py:Mine"),
-        ("absolute", {"leak_s": 1}, "'absolute' 'leak_s' gain speed_gain dead_zone"),
-        ("leaky", {"leak_s": 0}, "'leaky' 'leak_s' 0; above"),
-        ("slew", {"slew_deg_s2": 0}, "'slew' 'slew_deg_s2' 0; above"),
-        ("absolute", {"gain": -1}, "'absolute' 'gain' -1; above 0"),
-        ("absolute", {"dead_zone": 1}, "'absolute' 'dead_zone' 1; 0, below"),
-    ],
-)
-def test_what_cannot_be_is_told_by_its_names(name, options, names):
-    with pytest.raises(ConfigError) as error:
-        made(name, **options)
-    assert unnamed(error.value, "mapping", *names.split()) == []

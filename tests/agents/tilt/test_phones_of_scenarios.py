@@ -21,21 +21,6 @@ class Mine(Filter):
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "names"),
-    [
-        ("phone.filter", "mean", "filter 'mean' median"),
-        ("phone.mapping", "cubic", "mapping 'cubic' absolute"),
-        ("phone.accelerometer", "adxl", "accelerometer 'adxl' 'adxl345'?"),
-        ("phone.noise_mps2", 1, "phone 'noise_mps2'"),
-    ],
-)
-def test_a_wrong_stage_is_refused_before_the_run(key, value, names):
-    with pytest.raises(ConfigError) as error:
-        scenarios.build(scenarios.load("drive-to-event"), {key: value})
-    assert unnamed(error.value, *names.split()) == []
-
-
-@pytest.mark.parametrize(
     ("key", "names"),
     [
         ("phone.mapping_options.x", "mapping 'absolute' 'x' gain"),
