@@ -397,14 +397,6 @@ def refusal(file: Path) -> str:
     return line.removeprefix(f"{file}: ")
 
 
-def test_a_folder_is_no_memory(tmp_path):
-    assert refusal(tmp_path).endswith("database file")
-
-
-def test_a_file_in_a_folder_that_is_not_there_is_no_memory(tmp_path):
-    assert "unable to open" in refusal(tmp_path / "nowhere" / "state.sqlite")
-
-
 @pytest.mark.skipif(os.geteuid() == 0, reason="to root no file is read-only")
 def test_a_file_that_may_only_be_read_is_no_memory(file):
     Store(file).close()

@@ -4,14 +4,12 @@ from importlib.metadata import EntryPoint, EntryPoints
 
 import pytest
 from helpers.dva.dispatch_situations import RNG, situation
-from helpers.wording import unnamed
 
 from dva_sim.core.dispatch import POLICIES, MinEta, Policy, known_policies, load_policy
 from dva_sim.kernel import plugins
 from dva_sim.kernel.errors import ConfigError
 
 MINE = """
-from dataclasses import dataclass
 from dva_sim.core.dispatch import Assignment, Policy
 
 class Mine(Policy):
@@ -19,9 +17,6 @@ class Mine(Policy):
         self.pace = 2 / pace
     def advise(self, situation, rng):
         return [Assignment(0, 1)]
-
-class Nothing(Policy): pass
-class Other: pass
 """
 
 
@@ -61,55 +56,6 @@ def test_two_files_of_one_name_do_not_meet_and_a_changed_one_is_read_again(folde
 def test_the_shipped_example_is_found_from_anywhere(folder):
     assert load_policy("patrol.py:Patrol", {"step": 2}).step == 2
     assert load_policy("agents/policies/patrol.py:Patrol").relocates
-
-
-@pytest.mark.parametrize(
-    ("name", "options", "names"),
-    [
-        ("min_ate", {}, "policy 'min_ate' 'min_eta'?"),
-        ("oracle", {}, "policy 'oracle' future"),
-        ("min_eta", {"pace": 1}, "policy 'min_eta' 'pace'"),
-        ("preemptive", {"gain": 1}, "'gain' 'gain_s'?"),
-        ("preemptive", {"margin": 0}, "'margin' 0; number above"),
-        ("preemptive", {"margin": True}, "'margin' True; number above 0"),
-        ("priority_eta", {"ageing_per_s": "x"}, "'ageing_per_s' 'x'; number"),
-        ("coverage", {"gain_s": float("nan")}, "'gain_s' nan; number above 0"),
-        ("batch_optimal", {"objective": "cost"}, "'objective' 'cost'; distance eta"),
-        ("hazard_team", {"dangerous": "fire"}, "'dangerous' 'fire'; list fire, flood"),
-        ("hazard_team", {"dangerous": ["ice"]}, "'dangerous' ['ice']; list"),
-        ("hazard_team", {"dangerous": [["fire"]]}, "'dangerous' list"),
-        ("mine.py", {}, "policy 'mine.py' class mine.py:Mine"),
-        ("none.py:Mine", {}, "policy 'none.py:Mine': 'none.py' not found"),
-        ("mine.py:Yours", {}, "policy 'mine.py:Yours': class 'Yours'"),
-        ("mine.py:Other", {}, "'mine.py:Other' policy; Policy"),
-        ("mine.py:dataclass", {}, "'mine.py:dataclass' policy"),
-        ("mine.py:Nothing", {}, "'mine.py:Nothing' advise(situation, rng)"),
-        ("mine.py:Mine", {"speed": 1}, "'mine.py:Mine' 'speed'; pace"),
-        ("mine.py:Mine", {"pace": 0}, "'mine.py:Mine' ZeroDivisionError"),
-    ],
-)
-def test_a_mistake_is_one_clear_line(folder, name, options, names):
-    with pytest.raises(ConfigError) as caught:
-        load_policy(name, options)
-    assert unnamed(caught.value, *names.split()) == []
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "names"),
-    [
-        ("x = 1\nclass A(:\n", "bad.py:2: Python"),
-        ("\nimport no_such_thing\n", "bad.py:2: ModuleNotFoundError:"),
-        ("def f():\n  1 / 0\nf()\n", "bad.py:2: ZeroDivisionError:"),
-        ("raise SystemExit\n", "bad.py:1: SystemExit"),
-        ("x = '\0'\n", "bad.py Python null"),
-    ],
-)
-def test_a_file_that_cannot_be_loaded_is_told_with_its_line(folder, text, names):
-    (folder / "bad.py").write_text(text)
-    with pytest.raises(ConfigError) as caught:
-        load_policy("bad.py:A")
-    assert unnamed(caught.value, *names.split()) == []
 
 
 def test_an_installed_package_can_offer_policies(monkeypatch):
