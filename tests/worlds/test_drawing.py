@@ -4,10 +4,8 @@ import runpy
 import numpy as np
 import pytest
 from helpers.paths import ROOT
-from helpers.wording import unnamed
 from helpers.worlds.small_site import TWO_ROOMS, feature, square, write_site
 
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.geojson import write_features
 from dva_sim.worlds.maps import FREE
 from dva_sim.worlds.planning import Planner
@@ -98,38 +96,9 @@ def test_wifi_is_a_word_numbers_or_both_and_the_later_covers_the_earlier(tmp_pat
     assert [area.grade for area in site.wifi] == ["fair", "poor", "poor"]
 
 
-CAMERA = feature("camera", "Point", [(1, 1)], field_of_view_deg=400)
-LOW = feature("room", "Polygon", square(0, 4, 2), name="low", ceiling_m=0.4)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "names"),
-    [
-        (feature("zone", "Polygon", square(1, 1, 1), use="secret"), "use: restricted charging"),
-        (feature("wifi", "Polygon", square(1, 1, 1)), "quality good fair poor none numbers"),
-        (feature("wifi", "Polygon", square(1, 1, 1), loss=3), "loss: 1"),
-        (LOW, "ceiling_m: 1.5"),
-        (CAMERA, "field_of_view_deg: 360"),
-        (feature("exit", "LineString", [(8, 1), (8, 1.2)]), "exit 0.5 m wide"),
-        (feature("path", "Polygon", square(8, 0, 2), name="west"), "path name 'west'"),
-    ],
-)
-def test_a_property_that_does_not_fit_is_told_with_its_place(tmp_path, wrong, names):
-    with pytest.raises(ConfigError) as error:
-        site_of(tmp_path, wrong)
-    assert unnamed(error.value, "feature 6: ", *names.split()) == []
-    assert error.value.line > 100
-
-
 def test_what_an_editor_adds_of_its_own_is_left_alone(tmp_path):
     odd = feature("zone", "Polygon", square(1, 1, 1), fid=3, stroke="#fff", name=None)
     assert site_of(tmp_path, odd).zones[0].name == "zone-1"
-
-
-@pytest.mark.parametrize("change", [{"generate": "{kind: office_block}"}, {"plan": "null"}])
-def test_a_site_is_drawn_or_generated(tmp_path, change):
-    with pytest.raises(ConfigError, match=r"a plan .* generate"):
-        site_of(tmp_path, **change)
 
 
 # --- the shipped campus ----------------------------------------------------------------

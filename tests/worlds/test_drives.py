@@ -7,7 +7,6 @@ import pytest
 from helpers.wording import unnamed
 
 from dva_sim.agents.robot.profile import load_robot
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.drives import Differential, DriveSpec, GuardedDrive, ThreeWay, load_drive
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import World, hall
@@ -120,12 +119,6 @@ def test_a_servo_takes_its_time_from_straight_to_a_side():
     assert half == pytest.approx(0.5, abs=0.15)
     world.advance_to(2.0 + 0.15 + 2 * DT)
     assert robot.turn_rate * RADIUS / robot.speed == pytest.approx(1.0, rel=0.01)
-
-
-@pytest.mark.parametrize("option", [{"wheelbase_m": 0}, {"steering_deg": 90}, {"servo_s": -1}])
-def test_a_car_that_cannot_be_is_refused(option):
-    with pytest.raises(ConfigError, match=f"option '{next(iter(option))}' is"):
-        ThreeWay(CAR, **option)
 
 
 # --- of users --------------------------------------------------------------------------
@@ -282,25 +275,6 @@ def test_drives_are_made_by_name_and_by_file(tmp_path, monkeypatch):
     )
     tracked = load_drive("tracked.py:Tracked", {"scrub": 1.0})(DriveSpec())
     assert tracked.set_point(0.5, math.pi / 6) == (0.0, math.pi / 6)
-
-
-@pytest.mark.parametrize(
-    ("name", "options", "names"),
-    [
-        ("four_way", {}, "drive 'four_way' differential, three_way"),
-        ("mine.py", {}, "drive 'mine.py' class mine.py:Mine"),
-        ("mine.py:Mine", {}, "drive 'mine.py:Mine': 'mine.py' not found"),
-        ("tracked.py:Yours", {}, "drive 'tracked.py:Yours': class 'Yours'"),
-        ("tracked.py:DriveSpec", {}, "drive; class dva_sim.worlds"),
-        ("three_way", {"scrub": 1}, "'scrub'; wheelbase_m, steering_deg, servo_s"),
-        ("differential", {"gain": 1}, "drive 'differential' 'gain'"),
-    ],
-)
-def test_a_mistake_is_one_clear_line(name, options, names):
-    with pytest.raises(ConfigError) as caught:
-        load_drive(name, options)(DriveSpec())
-    assert unnamed(caught.value, *names.split()) == []
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["servrobot", "pibot", "tracked"])

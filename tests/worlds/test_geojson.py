@@ -159,33 +159,6 @@ def test_a_plan_far_from_its_origin_is_refused_with_the_distance(tmp_path, turn,
     assert unnamed(str(mistake(tmp_path, room)), "feature 1", *names) == []
 
 
-def test_a_plan_of_too_many_cells_is_refused_before_they_are_made(tmp_path):
-    room = feature("room", "Polygon", square(0, 0, 6_000), name="field")
-    problem = mistake(tmp_path, room)
-    assert unnamed(str(problem), "6,000 by 6,000 m", "0.05 m", "tiny.yaml") == []
-
-
-@pytest.mark.parametrize(
-    ("member", "value", "names"),
-    [
-        ("properties", None, ["'kind'", "room", "wall"]),
-        ("properties", {"name": "helper"}, ["'kind'"]),
-        ("properties", {"kind": None}, ["'kind'"]),
-        ("properties", 3, ["'properties'"]),
-        ("geometry", None, ["room", "geometry"]),
-        ("geometry", {"type": "Polygon"}, ["Polygon"]),
-        ("geometry", {"type": "Polygon", "coordinates": [[["a", 1], [2, 3]]]}, ["Polygon"]),
-        ("geometry", {"type": "Polygon", "coordinates": []}, ["coordinates"]),
-        ("geometry", {"type": "GeometryCollection", "geometries": []}, ["GeometryCollection"]),
-    ],
-)
-def test_what_a_feature_lacks_is_told_in_words_of_geojson(tmp_path, member, value, names):
-    room = feature("room", "Polygon", square(0, 0, 4), name="hall")
-    problem = str(mistake(tmp_path, *TWO_ROOMS, room | {member: value}))
-    assert unnamed(problem, f"feature {len(TWO_ROOMS) + 1}", *names) == []
-    assert not any(word in problem for word in ("None", "NoneType", "KeyError", "Traceback"))
-
-
 def test_a_mistake_among_thousands_of_features_is_told_at_its_line(tmp_path):
     wall = feature("wall", "LineString", [(0, 0), (4, 0)])
     typo = feature("gaurd_post", "Point", [(1, 1)])

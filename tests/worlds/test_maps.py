@@ -5,10 +5,9 @@ import pytest
 import shapely
 from data.make_maps import hall, racks, ragged
 from helpers.paths import TESTS
-from helpers.wording import unnamed
+from helpers.worlds.small_map import write_map
 from PIL import Image
 
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import with_named_files
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.maps import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, load_ros_map, outline
@@ -20,23 +19,6 @@ EACH_MAP = pytest.mark.parametrize(
     [(MAPS / "hall.yaml", 400), (MAPS / "racks.yaml", 800)],
     ids=["hall", "racks"],
 )
-
-
-def write_map(folder, pixels, **changes):
-    """A ROS map of some grey values; `changes` replace or (None) remove keys."""
-    Image.fromarray(np.asarray(pixels, np.uint8)).save(folder / "map.pgm")
-    keys = {
-        "image": "map.pgm",
-        "resolution": 0.5,
-        "origin": "[0, 0, 0]",
-        "negate": 0,
-        "occupied_thresh": 0.65,
-        "free_thresh": 0.196,
-        **changes,
-    }
-    text = "".join(f"{key}: {value}\n" for key, value in keys.items() if value is not None)
-    (folder / "map.yaml").write_text(text)
-    return folder / "map.yaml"
 
 
 def test_black_is_occupied_white_is_free_and_205_is_unknown(tmp_path):
@@ -151,34 +133,6 @@ def test_a_rectangle_has_an_outline_of_four_segments():
     walls = outline(grid, cells == FREE)
     assert len(walls) <= 5  # a ring may start within a side
     assert np.hypot(*(walls[:, 2:] - walls[:, :2]).T).sum() == pytest.approx(1.8)
-
-
-@pytest.mark.parametrize(
-    ("changes", "names"),
-    [
-        ({"resolution": None}, "missing 'resolution'"),
-        ({"resolution": -1}, "map.yaml:2:1: resolution"),
-        ({"image": "gone.pgm"}, "map.yaml:1:1: 'gone.pgm'"),
-        ({"image": "map.yaml"}, "image 'map.yaml'"),
-        ({"free_thresh": 0.9}, "free_thresh 0.9 occupied_thresh 0.65"),
-    ],
-)
-def test_a_mistake_in_a_map_is_told_in_one_line_with_its_place(tmp_path, changes, names):
-    path = write_map(tmp_path, [[254]], **changes)
-    with pytest.raises(ConfigError) as error:
-        load_ros_map(path)
-    assert unnamed(error.value, *names.split()) == []
-    assert "\n" not in str(error.value)
-
-
-def test_a_map_without_room_for_a_robot_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match="no known-free floor"):
-        map_site(write_map(tmp_path, [[0, 254, 0]], resolution=0.1), 1, 1, 1)
-
-
-def test_a_missing_map_is_refused():
-    with pytest.raises(ConfigError, match="not found"):
-        map_site("nowhere/gone.yaml", 1, 1, 1)
 
 
 def test_places_on_a_bare_map_depend_on_the_seed_and_not_on_the_size_of_the_team(tmp_path):

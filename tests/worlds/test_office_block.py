@@ -5,11 +5,9 @@ import numpy as np
 import pytest
 import shapely
 from helpers.processes.search_settings import search
-from helpers.wording import unnamed
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.maps import FREE
 from dva_sim.worlds.office_block import OfficeBlock, assign, lay_out, office_block
 from dva_sim.worlds.planning import Planner
@@ -170,22 +168,3 @@ def test_a_block_of_120_by_60_metres_is_planned_from_end_to_end():
     start, goal = site.exits[0], site.exits[-1]
     way = planner.path((start.x + 1, start.y), (goal.x, goal.y - 1))
     assert way is not None
-
-
-@pytest.mark.parametrize(
-    ("options", "names"),
-    [
-        ({"wdith_m": 80}, "'wdith_m'; 'width_m'?"),
-        ({"width_m": 9}, "'office-block': width_m: least 24"),
-        ({"seed": "x"}, "'office-block': seed: whole 'x'"),
-    ],
-)
-def test_an_option_that_does_not_fit_is_told(options, names):
-    with pytest.raises(ConfigError) as error:
-        load_site("office-block", options)
-    assert unnamed(error.value, *names.split()) == []
-
-
-def test_a_drawn_site_takes_no_options():
-    with pytest.raises(ConfigError, match=r"'caparica' .*no options"):
-        load_site("caparica", {"seed": 1})

@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import World
@@ -124,23 +123,6 @@ def test_a_wall_or_another_person_is_no_contact_with_a_robot(world):
     assert one.contacts == other.contacts == 0
     assert one.impulse == other.impulse == 0.0
     assert other.x > 8.1  # it was asleep, and was woken and pushed on
-
-
-@pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_nobody_walks_at_a_speed_that_is_no_number(world, bad):
-    with pytest.raises(ValueError, match="guard-1 cannot walk at"):
-        world.add_person("guard-1", Pose(4.0, 12.0, 0.0)).walk(bad, 0.0)
-
-
-def test_people_are_placed_where_there_is_room(world):
-    world.add_robot("robot-1", DriveSpec(), Pose(4.0, 12.0, 0.0))
-    with pytest.raises(ConfigError, match=r"'guard-1' .* a robot"):
-        world.add_person("guard-1", Pose(4.4, 12.0, 0.0))
-    world.add_person("guard-1", Pose(6.0, 12.0, 0.0))
-    with pytest.raises(ConfigError, match=r"'guard-2' .* another person"):
-        world.add_person("guard-2", Pose(6.1, 12.0, 0.0))
-    with pytest.raises(ConfigError, match=r"'robot-2' .* a person"):
-        world.add_robot("robot-2", DriveSpec(), Pose(6.5, 12.0, 0.0))
 
 
 def test_neighbours_are_those_within_a_distance_the_nearest_first(world):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from helpers.processes.second_process import run_here_and_elsewhere
 
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import World
@@ -173,14 +172,6 @@ def test_standing_robots_stay_where_they_are_to_the_bit(world):
     world.advance_to(3600.0)
     assert idle.pose() == before
     assert busy.distance == pytest.approx(busy.pose().x - 4.0, abs=1e-6)
-
-
-def test_a_robot_cannot_be_placed_in_a_wall_or_in_another_robot(world):
-    in_corridor(world)
-    with pytest.raises(ConfigError, match=r"'robot-2' .* another robot"):
-        in_corridor(world, 4.3, name="robot-2")
-    with pytest.raises(ConfigError, match=r"'robot-3' .* a wall"):
-        world.add_robot("robot-3", SPEC, Pose(8.1, 5.0, 0.0))
 
 
 DRIVE = """

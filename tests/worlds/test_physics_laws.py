@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dva_sim.agents.robot.profile import load_robot
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.full.physical_world import PHYSICS_TICK
 from dva_sim.simulation.full.team import WET_GRIP
 from dva_sim.worlds.drives import LONGEST_TICK, DriveSpec
@@ -290,13 +289,6 @@ def test_a_crowd_that_drives_into_a_corner_stays_in_the_room():
     world.advance_to(40.0)
     for robot in world.robots:
         assert min(robot.x, robot.y) > 0.5 * SPEC.radius
-
-
-def test_a_body_that_is_too_fast_for_its_size_is_refused():
-    fast = DriveSpec(max_speed=3.8)
-    with pytest.raises(ConfigError, match="'robot-1'"):
-        World(hall(9, 9), LONGEST_TICK).add_robot("robot-1", fast, Pose(4, 4, 0))
-    World(hall(9, 9), 0.02).add_robot("robot-1", fast, Pose(4, 4, 0))
 
 
 def test_runs_use_no_longer_tick_than_profiles_are_made_for():

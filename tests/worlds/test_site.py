@@ -2,7 +2,6 @@ import math
 
 import numpy as np
 import pytest
-from helpers.wording import unnamed
 from helpers.worlds.small_site import TWO_ROOMS, feature, square, write_site
 
 from dva_sim.kernel.errors import ConfigError
@@ -59,11 +58,6 @@ def test_caparica_is_an_institute_of_40_by_24_metres_with_doors_a_robot_can_pass
         assert site.room_at(detector.x, detector.y) is not None
 
 
-def test_an_unknown_room_is_refused_with_the_rooms_there_are():
-    with pytest.raises(ConfigError, match=r"'Archives'.*'Archive'"):
-        load_site("caparica").room("Archives")
-
-
 # --- the format ------------------------------------------------------------------------
 
 
@@ -101,50 +95,3 @@ def test_samples_have_their_clearance_in_rooms_behind_doors_narrower_than_it(tmp
         assert site.is_free(x, y, 0.5)
     with pytest.raises(ConfigError, match="3 m radius"):
         site.sample_free(rng, 3.0)
-
-
-KNOT = [(0, 0), (2, 2), (2, 0), (0, 2), (0, 0)]
-
-
-@pytest.mark.parametrize(
-    ("wrong", "names"),
-    [
-        (feature("robot_base", "Point", [(0.1, 1)]), "robot_base 0.3 m"),
-        (feature("window", "LineString", [(0, 0), (1, 1)]), "kind 'window' wall room"),
-        (feature("room", "Polygon", square(0, 4, 2), name="west"), "room name 'west'"),
-        (feature("wall", "Point", [(1, 1)]), "wall LineString MultiLineString Polygon"),
-        (feature("room", "Polygon", KNOT, name="knot"), "room self-intersection"),
-        ({"type": "Feature"}, "'kind'"),
-    ],
-)
-def test_a_mistake_in_a_plan_is_told_with_line_and_column(tmp_path, wrong, names):
-    with pytest.raises(ConfigError) as error:
-        load_site(write_site(tmp_path, [*TWO_ROOMS, wrong]))
-    assert unnamed(error.value, "tiny.geojson:", "feature 6", *names.split()) == []
-    assert error.value.line > 100
-
-
-@pytest.mark.parametrize(
-    ("changes", "names"),
-    [
-        ({"plan": "gone.geojson"}, "tiny.yaml:3:1: plan 'gone.geojson'"),
-        ({"plam": "x"}, "'plam'; 'plan'?"),
-        ({"origin": "{latitude: 138, longitude: 0}"}, "tiny.yaml:2:10: origin.latitude"),
-    ],
-)
-def test_a_mistake_in_a_site_file_is_told_with_its_place(tmp_path, changes, names):
-    with pytest.raises(ConfigError) as error:
-        load_site(write_site(tmp_path, TWO_ROOMS, **changes))
-    assert unnamed(error.value, *names.split()) == []
-
-
-def test_a_plan_that_is_not_json_is_told_with_line_and_column(tmp_path):
-    path = write_site(tmp_path, TWO_ROOMS)
-    (tmp_path / "tiny.geojson").write_text('{"type": "FeatureCollection",\n "features": [}')
-    with pytest.raises(ConfigError, match=r"tiny.geojson:2:15: "):
-        load_site(path)
-
-
-def test_a_missing_site_is_refused_with_the_sites_there_are():
-    with pytest.raises(ConfigError, match=r"'atlantis' .*caparica"):
-        load_site("atlantis")

@@ -6,7 +6,6 @@ import pytest
 from helpers.wording import unnamed
 from helpers.worlds.small_site import feature, square, write_site
 
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing.files import check_file
 from dva_sim.worlds.site import load_site
 from dva_sim.worlds.storeys import label_of, storeys_of
@@ -51,20 +50,6 @@ def test_a_site_reads_one_storey_of_its_plan(tmp_path, level, rooms):
 
 def test_features_that_share_a_storey_need_no_choice(tmp_path):
     assert len(load_site(write_site(tmp_path, HOUSE[:2])).rooms) == 2
-
-
-@pytest.mark.parametrize(
-    ("features", "changes", "names"),
-    [
-        (HOUSE, {}, ["2 storeys", "0, 1", "'level: 0'"]),
-        (HOUSE, {"level": 2}, ["no storey 2", "0, 1"]),
-        (HOUSE[3:], {"level": 0}, ["no storey 0", "no feature has a 'level'"]),
-    ],
-)
-def test_a_storey_that_is_not_chosen_or_not_there_is_asked_for(tmp_path, features, changes, names):
-    with pytest.raises(ConfigError) as error:
-        load_site(write_site(tmp_path, features, **changes))
-    assert unnamed(str(error.value), "tiny.geojson", *names) == []
 
 
 def test_properties_that_mean_geometry_elsewhere_and_heights_are_named(tmp_path):
