@@ -1,4 +1,4 @@
-"""What is refused of persons, phones, strategies, sensors and profiles of robots."""
+"""Mistakes in what describes persons, phones, strategies, sensors and profiles of robots."""
 
 import math
 from functools import partial

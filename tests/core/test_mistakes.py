@@ -1,4 +1,4 @@
-"""What is refused of policies, of the oracle's instances, and of the memory's file."""
+"""Mistakes in policies, in instances of the oracle, and in the place of the memory."""
 
 from pathlib import Path
 

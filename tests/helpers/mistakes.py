@@ -4,6 +4,7 @@ A room keeps its tables in `test_mistakes.py`, a row a line: the arguments of a 
 codes, names and numbers, between spaces.
 """
 
+import shlex
 from collections.abc import Callable
 from contextlib import chdir
 from functools import partial
@@ -11,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from helpers.processes.command_line import call
 from helpers.wording import unnamed
 
-from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError, ExitCode
 
 each_mistake = partial(pytest.mark.parametrize, ("act", "error", "names"))
 
@@ -32,7 +34,7 @@ def check_mistake(
     with chdir(folder), pytest.raises(error) as caught:
         act()
     line = str(caught.value)
-    assert "\n" not in line, line
+    assert line.splitlines() == [line.strip()], line
     missing = unnamed(line, *names.split())
     assert not missing, f"{missing} are not in: {line}"
 
@@ -45,3 +47,19 @@ def of_file(read: Callable[[str], object], name: str) -> Callable[[str | bytes],
         return read(name)
 
     return read_text
+
+
+class Refused(Exception):
+    """A command that has ended with exit code 2, and the line that says why."""
+
+
+def command(words: str) -> None:
+    """Call `dva-sim WORDS`.
+
+    Raises:
+        Refused: It has ended so, and has printed nothing else.
+    """
+    done = call(*shlex.split(words))
+    if done.returncode == ExitCode.MISTAKE:
+        assert (done.stdout, done.stderr[:7]) == ("", "error: ")
+        raise Refused(done.stderr.removesuffix("\n"))

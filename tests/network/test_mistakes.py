@@ -1,4 +1,4 @@
-"""What the network refuses: links, logs, traces, patterns, tables, transports and their options."""
+"""Mistakes in links, logs, traces, keys, patterns, tables, transports and their options."""
 
 import dataclasses
 import gzip

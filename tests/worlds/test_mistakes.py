@@ -1,4 +1,4 @@
-"""What is refused of sites, plans, maps, hazards, drives and places of bodies."""
+"""Mistakes in sites, plans, maps, hazards and drives, and places where no body fits."""
 
 import math
 from pathlib import Path
