@@ -5,7 +5,7 @@ from helpers.wording import unnamed
 
 from dva_sim.cli import demo as module
 from dva_sim.cli.demo import FILM, PICTURE, STUDY, demo
-from dva_sim.kernel.errors import DvaSimError, ExitCode
+from dva_sim.kernel.errors import ExitCode
 from dva_sim.options.studies import RunOptions
 
 pytestmark = pytest.mark.system
@@ -63,9 +63,3 @@ def test_half_a_film_does_not_pass_for_one(tmp_path, monkeypatch):
     with module._film_under_way(tmp_path / FILM):
         pass
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_folder_that_cannot_be_made_ends_in_one_line(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(DvaSimError, match="cannot be written"):
-        demo(tmp_path / "file", jobs=1)

@@ -35,24 +35,6 @@ def study(tmp_path):
     return write
 
 
-@pytest.mark.parametrize(
-    ("words", "names"),
-    [
-        ("rnu fire-drill", ["'rnu'", "'run'?"]),
-        ("help run", ["'dva-sim run --help'?"]),
-        ("help", ["'dva-sim --help'?"]),
-        ("episode drive-to-event --delay 1", ["--set link.delay_s=VALUE"]),
-        ("run req-rep-vs-pub-sub --persons 4", ["--set persons=VALUE"]),
-        ("run keep-alive --quick", ["'quick'", "req-rep-vs-pub-sub"]),
-        ("show .", ["manifest.json", "'dva-sim run'"]),
-    ],
-)
-def test_a_word_of_the_command_line_that_is_not_there_names_what_is_meant(tmp_path, words, names):
-    result = call(*words.split(), cwd=tmp_path)
-    assert result.returncode == 2
-    assert unnamed(result.stderr, *names) == []
-
-
 PATTERNS = "pattern: [req-rep, latest-wins]"
 
 
@@ -76,26 +58,6 @@ def test_a_misspelt_word_of_a_study_is_the_one_that_is_blamed(study, old, new, l
     block = next(n for n, text in enumerate(path.read_text().splitlines(), 1)
                  if text.startswith(f"{line_of}:"))  # fmt: skip
     assert block < error.value.line < block + 10
-
-
-@pytest.mark.parametrize("command", ["run", "episode", "check"])
-def test_a_file_that_is_not_there_is_told_as_a_file(tmp_path, command):
-    (tmp_path / "mine.yaml").write_text("question: what?\n")
-    ended = call(command, "mine.yml", cwd=tmp_path)
-    assert ended.returncode == 2
-    assert "mine.yml" in ended.stderr
-    if command != "check":
-        assert unnamed(ended.stderr, "file 'mine.yml'", "'mine.yaml'") == []
-    assert "not found; available" not in ended.stderr
-
-
-def test_a_plan_names_its_site(tmp_path):
-    (tmp_path / "plan.geojson").write_text("{}")
-    ended = call("site", "show", "plan.geojson", cwd=tmp_path)
-    assert unnamed(ended.stderr, "plan.geojson", "'plan: plan.geojson'") == []
-    (tmp_path / "hall.yaml").write_text("name: hall\nplan: plan.geojson\n")
-    ended = call("site", "show", "plan.geojson", cwd=tmp_path)
-    assert unnamed(ended.stderr, "plan.geojson", "hall.yaml") == []
 
 
 @pytest.mark.parametrize("words", [["console", "--no-open"], ["robot", "--no-open"]])
@@ -132,21 +94,6 @@ def test_a_mistake_in_yaml_is_told_at_the_line_that_is_wrong(tmp_path, text, lin
     assert error.value.line == line
     assert unnamed(error.value.problem, *names) == []
     assert not any(word in error.value.problem for word in ("<", "token", "stream", "scalar"))
-
-
-@pytest.mark.parametrize(
-    ("words", "names"),
-    [
-        (["episode", "drive-to-event", "--still", "x.jpg2"], ["--still", "'x.jpg2'", ".png"]),
-        (["episode", "drive-to-event", "--record", "x.txt"], ["--record", "'x.txt'", ".mcap"]),
-        (["console", "--audit", "x.txt"], ["--audit", "'x.txt'", ".sqlite"]),
-        (["phone-log", "x.csv", "--rate", "1000"], ["--rate", "at most 100"]),
-    ],
-)
-def test_an_option_is_named_with_its_dashes(tmp_path, words, names):
-    ended = call(*words, cwd=tmp_path)
-    assert ended.returncode == 2
-    assert unnamed(ended.stderr, *names) == []
 
 
 @pytest.mark.system
@@ -187,10 +134,3 @@ def test_a_process_that_cannot_be_started_is_told_with_the_way_around(monkeypatc
     ):
         pool.submit(load_study).result()
     assert unnamed(str(error.value), "Resource temporarily unavailable", "--jobs") == []
-
-
-@pytest.mark.parametrize("name", ["dispatch", "network", "operators"])
-def test_evidence_is_no_study_and_its_command_is_named(name):
-    done = call("run", f"experiments/validation/{name}.yaml")
-    assert done.returncode == 2
-    assert unnamed(done.stderr, f"{name}.yaml", f"dva-sim validate {name}") == []

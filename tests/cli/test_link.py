@@ -3,7 +3,6 @@
 import csv
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from helpers.wording import unnamed
@@ -23,33 +22,6 @@ CALM = LinkReport(
     late_max_s=0.0123456789,
 )
 OVERRUN = replace(CALM, overrun_packets=17)
-
-
-@pytest.mark.parametrize(
-    ("words", "names"),
-    [
-        (["--near", "true"], ("--far",)),
-        (["--near", "true", "--far", " "], ("--far",)),
-        (["--near", "a", "--far", "b", "--set", "delay=1"], ("delay_s", "--set delay=1")),
-        (["--near", "a", "--far", "b", "--set", "up.loss=2"], ("up.loss", "0.9")),
-        (["--near", "a", "--far", "b", "--set", "trace_up=none.trace"], ("none.trace",)),
-        (["none.yaml", "--near", "a", "--far", "b"], ("none.yaml",)),
-        (["bad.yaml", "--near", "a", "--far", "b"], ("bad.yaml:2:3", "up.delay", "delay_s")),
-        (["--near", "a", "--far", "b", "--publish", "0"], ("--publish", "65535")),
-        (["--near", "a", "--far", "b", "-o", "counts.txt"], ("counts.txt", ".csv")),
-        (["--near", "a", "--far", "b", "-o", "kept.csv"], ("kept.csv", "--overwrite")),
-        (["--near", "a", "--far", "b", "-o", "kept.csv/x.csv"], ("kept.csv",)),
-    ],
-)
-def test_what_cannot_be_done_is_refused_in_one_line_before_anything_starts(
-    words, names, tmp_path, monkeypatch, capsys
-):
-    monkeypatch.chdir(tmp_path)
-    Path("bad.yaml").write_text("up:\n  delay: 0.1\n")
-    Path("kept.csv").write_text("kept")
-    assert call(["link", *words]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert not unnamed(line, *names)
 
 
 def test_a_system_without_namespaces_is_named(monkeypatch, capsys):

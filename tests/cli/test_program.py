@@ -6,7 +6,6 @@ import sys
 from itertools import takewhile
 
 import pytest
-from helpers.wording import unnamed
 from typer.main import get_command
 
 from dva_sim import __version__
@@ -81,32 +80,6 @@ def test_the_help_of_the_program_states_every_exit_code(terminal, capsys):
 def test_without_a_command_the_help_is_shown(capsys):
     assert call([]) == 0
     assert capsys.readouterr().out.startswith("Usage: dva-sim")
-
-
-@pytest.mark.parametrize(
-    ("words", "names"),
-    [
-        ("exprt", ["dva-sim: 'exprt'", "'export'"]),
-        ("run", ["dva-sim run", "STUDY: ", "dva-sim run --help"]),
-        ("run x --jbos 2", ["dva-sim run", "'--jbos'", "'--jobs'"]),
-        ("run x --xyz", ["dva-sim run", "'--xyz'", "dva-sim run --help"]),
-        ("run x -j", ["-j", "takes a value"]),
-        ("run x --full=3", ["--full", "no value"]),
-        ("run x y", ["dva-sim run", "'y'", "dva-sim run --help"]),
-        ("run x --seed -1", ["--seed '-1'", "whole number", "at least 0"]),
-        ("run x -j 0", ["--jobs '0'", "whole number", "1 to 1024"]),
-        ("run x -j ²", ["--jobs '²'", "whole number", "1 to 1024"]),
-        ("run x --limit nan", ["--limit 'nan'", "above 0"]),
-        ("run x --limit 5%", ["--limit '5%'", "above 0"]),
-        (f"episode x --seed {'9' * 30}", [f"--seed '{'9' * 30}'", "whole number", "at least 0"]),
-        ("site shwo", ["dva-sim site: 'shwo'", "'show'"]),
-    ],
-)
-def test_a_mistake_in_the_words_is_one_line_that_says_what_would_be_right(capsys, words, names):
-    assert call(words.split()) == 2
-    captured = capsys.readouterr()
-    assert (captured.out, captured.err.count("\n"), captured.err[:7]) == ("", 1, "error: ")
-    assert unnamed(captured.err, *names) == []
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,11 @@
-from pathlib import Path
-
 import pytest
 from rich.console import Console
 
 from dva_sim.cli.stories import tell
-from dva_sim.experiments.report.episode import EpisodeRequest, Played
+from dva_sim.experiments.report.episode import Played
 from dva_sim.experiments.report.figures.trial import draw_trial, trial_figure
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import find
 from dva_sim.kernel.yaml_files import load_yaml
-from dva_sim.options.runs import EpisodeOptions
 from dva_sim.simulation.models import model_for
 from dva_sim.simulation.task import build, trace_of
 
@@ -46,12 +42,6 @@ def test_a_block_is_told_with_its_conditions_and_what_they_come_to():
     assert "amplitude" in text
     assert "4 trials: 100 %" in text
     assert "bit/s" in text
-
-
-@pytest.mark.parametrize("wanted", [{"video": Path("x.gif")}, {"still": Path("x.png"), "at": 3.0}])
-def test_a_task_has_no_film(wanted):
-    with pytest.raises(ConfigError, match="only --still"):
-        EpisodeRequest(EpisodeOptions("tasks/corner", **wanted)).scenarios()
 
 
 def test_a_table_on_80_columns_cuts_no_head_tells_units_and_says_how_many_rows_are_left_out():
