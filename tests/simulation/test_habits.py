@@ -1,10 +1,6 @@
 """Assumed numbers as keys: of scenarios, of populations, and as factors of studies."""
 
-import pytest
-from helpers.wording import unnamed
-
 from dva_sim.agents.population import Population, draw_person
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.labels import with_unit
 from dva_sim.simulation.scenario import Scenario, build
 from dva_sim.simulation.scenario.assumptions import all_assumptions
@@ -40,21 +36,6 @@ def test_a_scenario_changes_the_habits_of_its_population_key_by_key():
 
 def test_a_habit_is_called_by_what_it_is_about():
     assert with_unit("operator.habits.waiting.shortest_s") == "waiting shortest [s]"
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "names"),
-    [
-        ("operator.habits.waiting.shortest", 1.0, ("shortest", "shortest_s")),
-        ("operator.habits.shortest_s", 1.0, ("shortest_s", "operator.habits.waiting.shortest_s")),
-        ("operator.habits.waiting.shortest_s", 0.0, ("shortest_s", "above 0")),
-        ("operator.habits.waiting.shortest_s", "long", ("shortest_s", "number")),
-    ],
-)
-def test_a_wrong_habit_is_answered_with_what_would_be_right(key, value, names):
-    with pytest.raises(ConfigError) as error:
-        build({}, {key: value})
-    assert unnamed(str(error.value), *names) == []
 
 
 def test_every_listed_key_can_be_set_to_both_ends_of_its_band():

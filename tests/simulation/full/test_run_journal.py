@@ -62,9 +62,3 @@ def test_what_has_not_changed_is_not_told_again():
     run.clock.run(5.0)
     assert journal.lines()
     assert journal.lines() == []
-
-
-@pytest.mark.parametrize("lines", [[], [("run", "{}")], [("", '["track", 1]')]])
-def test_other_lines_are_refused(lines):
-    with pytest.raises(ValueError, match="Error"):
-        recording_of(build(load("drive-to-event"), {}), 1, lines)

@@ -62,21 +62,6 @@ def test_what_is_not_installed_is_said_before_the_first_run(monkeypatch):
     assert unnamed(str(refused.value), "[mqtt]", "[zenoh]", "[webrtc]", "[dds]") == []
 
 
-@pytest.mark.parametrize(
-    ("changed", "named"),
-    [
-        ({"transport": {"name": "upd"}}, "udp"),
-        ({"transport": {"name": "mqtt", "options": {"qos": 7}}}, "qos 7"),
-        ({"pictures": {"rate_hz": 5, "bytes": 70_000}}, "bytes"),
-        ({"set_up_s": 0}, "set_up_s"),
-    ],
-)
-def test_a_scenario_that_cannot_be_is_refused(changed, named):
-    with pytest.raises(ConfigError) as refused:
-        build(SHORT | changed)
-    assert named in str(refused.value)
-
-
 def test_a_study_in_real_time_runs_alone_in_an_order_by_chance_that_stays():
     plan = StudyPlan.of(load_study("middleware", version="quick"))
     assert plan.is_real_time

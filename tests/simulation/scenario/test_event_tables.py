@@ -14,7 +14,6 @@ from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.experiments.study.cell_grid import cells
 from dva_sim.experiments.study.hashing import stable_hash
 from dva_sim.experiments.study.loading import load_study
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.live import options as live
 from dva_sim.options.runs import ConsoleOptions, EpisodeOptions, LiveOptions
@@ -89,88 +88,6 @@ def test_tables_of_all_forms_are_the_same_events(
     events = events_of(built(made(tmp_path, model, table, keys)))
     rooms = ["Main corridor"] * 2 if ",x,y" in table else ["Workshop", "Kitchen"]
     assert events == [(0.0, "fire", rooms[0]), (60.0, "flood", rooms[1])]
-
-
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize(
-    ("table", "keys", "line", "words"),
-    [
-        (HEAD + TWO + "2026-03-01T08:02:00Z,Brand,Kitchen\n", "", 4, "events.kinds: {Brand: fire}"),
-        (HEAD + TWO + "2026-03-01T08:02:00Z,fire,Kitchn\n", "", 4, "'Kitchen'"),
-        (HEAD + TWO + "2026-03-01T08:02:00Z,fire\n", "", 4, "has 2 cells, and the header 3"),
-        (HEAD + TWO + "2026-03-01T08:02:00Z,fire,\n", "", 4, "has no place"),
-        (HEAD + TWO + "2026-03-01T08:02:00,fire,Kitchen\n", "", 4, "set events.time_zone"),
-        (HEAD + TWO + "01.03.2026 08:02,fire,Kitchen\n", "", 4, "ISO 8601"),
-        (HEAD + TWO + "120,fire,Kitchen\n", "", 4, "write all in one form"),
-        (HEAD + TWO + "2026-03-01,fire,Kitchen\n", "", 4, "has no time of day"),
-        (HEAD + "1772352000000,fire,Kitchen\n", "", 2, "too large for seconds"),
-        (HEAD + "nan,fire,Kitchen\n", "", 2, "too large for seconds"),
-        (HEAD.replace(",", ";") + "0,5;fire;Kitchen\n1.060;fire;Kitchen\n", "", 3, "has a point"),
-        (HEAD + '"1,060",fire,Kitchen\n', "", 2, "ISO 8601"),
-        (
-            HEAD + "2026-10-25 02:30,fire,Kitchen\n",
-            ", time_zone: Europe/Berlin",
-            2,
-            "occurs twice in Europe/Berlin",
-        ),
-        (
-            HEAD + "2026-03-29 02:30,fire,Kitchen\n",
-            ", time_zone: Europe/Berlin",
-            2,
-            "does not exist in Europe/Berlin",
-        ),
-        ("time,kind\n" + TWO.replace(",Workshop", "").replace(",Kitchen", ""), "", 1, "the place"),
-        (HEAD.replace("time", "when") + TWO, "", 1, "has no column 'time'; it has when"),
-        (HEAD.replace("room", "x") + TWO, "", 1, "has no column 'y'"),
-        ("time,kind,x,y,lat,lon\n0,fire,1,1,1,1\n", "", 1, "keep one pair"),
-        ("time,timestamp,kind,room\n0,0,fire,Kitchen\n", "", 1, "'time' and 'timestamp'"),
-        ("time,kind,x,y\n0,fire,500,5\n", "", 2, "outside the site"),
-        ("time,kind,x,y\n0,fire,0.01,0.01\n", "", 2, "open floor"),
-        ("time,kind,x,y\n0,fire,a,5\n", "", 2, "x should be a number of metres"),
-        ("time,kind,lat,lon\n0,fire,48.1,11.5\n", "", 2, "outside the site"),
-        ("time,kind,room,x,y\n0,fire,Kitchen,20,12\n", "", 2, "'Main corridor', not in 'Kitchen'"),
-        (HEAD[:-1] + ",severity\n0,fire,Kitchen,3\n", "", 2, "share from 0 to 1"),
-        (HEAD[:-1] + ",false_alarm\n0,fire,Kitchen,maybe\n", "", 2, "true or false"),
-        ((HEAD + "0,fire,Küche\n").encode("latin-1"), "", 2, "save it as UTF-8"),
-        ("", "", 1, "is empty"),
-    ],
-)
-def test_a_doubtful_row_is_named_with_its_place(
-    tmp_path: Path, model: str, table: str | bytes, keys: str, line: int, words: str
-) -> None:
-    with pytest.raises(ConfigError) as caught:
-        built(made(tmp_path, model, table, keys))
-    assert (caught.value.file, caught.value.line) == (str(tmp_path / "alarms.csv"), line)
-    assert caught.value.column is not None
-    assert words in caught.value.problem
-    assert "\n" not in caught.value.problem
-
-
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize(
-    ("keys", "words"),
-    [
-        (", time_zone: Europe/Lisbonne", "did you mean 'Europe/Lisbon'?"),
-        (", start: tomorrow", "start 'tomorrow' should be ISO 8601"),
-        (", start: 2027-01-01T00:00:00Z", "2 before events.start"),
-        (", starts: 5", "events.starts"),
-    ],
-)
-def test_a_wrong_key_of_the_table_is_named_in_the_scenario(
-    tmp_path: Path, model: str, keys: str, words: str
-) -> None:
-    with pytest.raises(ConfigError) as caught:
-        built(made(tmp_path, model, HEAD + TWO, keys))
-    assert caught.value.file == str(tmp_path / "desk.yaml")
-    assert words in caught.value.problem
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_a_missing_table_is_named(tmp_path: Path, model: str) -> None:
-    file = made(tmp_path, model, HEAD + TWO)
-    (tmp_path / "alarms.csv").unlink()
-    with pytest.raises(ConfigError, match=r"alarms\.csv' cannot be read: No such file"):
-        built(file)
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -279,19 +196,6 @@ def test_the_name_of_a_file_alone_is_a_table(tmp_path: Path, model: str) -> None
     file = made(tmp_path, model, HEAD + TWO)
     file.write_text(MODELS[model] + "events: alarms.csv\n")
     assert len(events_of(built(file))) == 2
-
-
-@pytest.mark.parametrize(
-    ("position", "words"),
-    [("[500, 5]", "is outside the site"), ("[20, 12], room: Kitchen", "not in 'Kitchen'")],
-)
-def test_a_position_where_no_event_can_be_is_refused(
-    tmp_path: Path, position: str, words: str
-) -> None:
-    file = tmp_path / "desk.yaml"
-    file.write_text(f"{FULL}events: [{{kind: fire, position: {position}}}]\n")
-    with pytest.raises(ConfigError, match=words):
-        built(file)
 
 
 def test_a_hundred_thousand_rows_are_read(tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ from dva_sim.cli.stories import tell
 from dva_sim.experiments.report.episode import Played
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel import resources
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.simulation.measures.sessions import tables
 from dva_sim.simulation.models import model_of
@@ -23,7 +22,6 @@ SHORT = {
     "drive.practice": 0,
     "drive.horizon_s": 100,
 }
-BARE = {"kind": "datagrams"}
 
 
 def played(scenario, seed):
@@ -55,24 +53,6 @@ def test_who_sees_a_picture_per_second_drives_slower():
     rare = build(shipped(), SHORT | {"bottleneck.rate_bps": 4e4, "transport": {"kind": "tcp"}})
     times = [played(s, 3)["runs"][0]["movement_time_s"] for s in (fresh, rare)]
     assert times[1] > 1.5 * times[0]
-
-
-@pytest.mark.parametrize(
-    ("changes", "expected"),
-    [
-        ({"transport": BARE}, "'transport.header_bytes'"),
-        ({"transport": BARE | {"header_bytes": 12, "increase": 1.0}}, "increase and decrease"),
-        ({"transport": BARE | {"header_bytes": 12, "repeats_crucial": True}}, "need increase"),
-        ({"transport": {"kind": "rtnp"}}, "kind 'rtnp' has been retired; use kind: datagrams"),
-        ({"transport.king": "udp"}, "'transport.king'"),
-        ({"drive.plant.speed_mps": None}, r"course .*plant\.speed_mps"),
-        ({"drive.task.kind": "reach"}, "drive.task"),
-        ({"operator.strategy": "nobody"}, "nobody"),
-    ],
-)
-def test_a_mistake_is_told(changes, expected):
-    with pytest.raises(ConfigError, match=expected):
-        build(shipped(), changes)
 
 
 def test_the_command_line_tells_flows_ages_and_the_drive():
