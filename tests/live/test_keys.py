@@ -9,7 +9,6 @@ from helpers.processes.programs import Program, Programs
 from helpers.wording import unnamed
 
 from dva_sim.cli.device_keys import make_keys
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.keys import KeyRing
 from dva_sim.simulation.full.stage import DVA, id_of
 
@@ -48,16 +47,6 @@ def test_keys_that_are_there_are_kept(tmp_path):
     reported = make_keys(tmp_path, ["drive-to-event", "robot-1", "dva"])
     assert unnamed(reported, tmp_path, "made 3 ", " 1 were there") == []
     assert KeyRing(tmp_path).pair(ROBOT) == before
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["", "robot", "robot-0", "robot-01", "robot-10000", "dva-1", "cat-1", "70:1a:04:f9:81:d6"],
-)
-def test_a_name_that_stands_for_nothing_is_refused(tmp_path, name):
-    with pytest.raises(ConfigError, match=f"{name!r} is neither a device"):
-        make_keys(tmp_path / "keys", ["robot-1", name])
-    assert not (tmp_path / "keys").exists()
 
 
 # --- live ----------------------------------------------------------------------------------

@@ -3,14 +3,12 @@
 import json
 import os
 import signal
-from pathlib import Path
 
 import pytest
 from helpers.network.emulated_link import need_link
 from helpers.processes.programs import wait_until
 from helpers.wording import unnamed
 
-from dva_sim.cli.program import call
 from dva_sim.live.options import check, scenario_of
 from dva_sim.network.link import LinkConfig
 from dva_sim.options.runs import LiveOptions
@@ -58,29 +56,3 @@ def test_the_link_becomes_that_of_the_scenario(tmp_path):
     law = '{"law": "gamma", "sd_s": 0.05}'
     assert json.loads(law) == link.model_dump(exclude_defaults=True)["delay_law"]
     assert not any("modelled" in entry for entry in contradictions(scenario_of(options)))
-
-
-@pytest.mark.parametrize(
-    ("words", "names"),
-    [
-        (["--link", "delay=1"], ("--link", "delay_s")),
-        (["--link", "none.yaml"], ("none.yaml",)),
-        (["--link", "a.yaml", "--link", "b.yaml"], ("a.yaml", "b.yaml")),
-        (["--link", "loss=0.1", "--only", "dva"], ("--only", "--link")),
-        (["--link", "loss=0.1", "--dva", "127.0.0.1:5600"], ("--dva", "--link")),
-        (["--link", "loss=0.1", "--host", "127.0.0.2"], ("--host", "--link")),
-        (["--link", "loss=0.1", "--camera-port", "0"], ("--camera-port", "--link")),
-        (["--link", "trace_up=none.trace"], ("none.trace",)),
-        (
-            ["--link", "scenario", "--set", "link.partitions=[{from_s: 0, for_s: 1}]"],
-            ("link.partitions", "link.outages"),
-        ),
-    ],
-)
-def test_what_cannot_be_emulated_is_refused_in_one_line(
-    words, names, tmp_path, monkeypatch, capsys
-):
-    monkeypatch.chdir(tmp_path)
-    Path("a.yaml").write_text("delay_s: 0.1\n")
-    assert call(["live", "drive-to-event", *words]) == 2
-    assert unnamed(capsys.readouterr().err, *names) == []
