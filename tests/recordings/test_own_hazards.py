@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import find
 from dva_sim.recordings.reading import RecordedHazard, read_recording
 from dva_sim.recordings.writing import write_recording
@@ -71,21 +70,6 @@ def test_what_lies_over_the_floor_comes_back_as_it_was_recorded(file, run):
         assert again.values.max() == pytest.approx(there.values.max(), rel=1e-3)
     assert np.allclose(again.values, there.values, rtol=1e-3)
     assert playback.surroundings.raster("water", 20.0).values.max() == 0.0
-
-
-@pytest.mark.parametrize(
-    ("event", "problem"),
-    [
-        ({"kind": "quake"}, "hazard 'quake' is unknown; known: fire, flood, gas_leak"),
-        ({"kind": "steam_leak.py:Steam"}, "there is no class 'Steam'"),
-        ({"kind": "none.py:Mine"}, "file 'none.py' not found"),
-        ({"hazard": {"hole": 20}}, "has no option 'hole'; did you mean 'hole_mm'?"),
-        ({"hazard": {"hole_mm": 51}}, "hole_mm: should be at most 50, not 51"),
-    ],
-)
-def test_what_is_wrong_with_one_is_said_before_anything_runs(event, problem):
-    with pytest.raises(ConfigError, match=problem.replace("?", r"\?")):
-        scenario(**event)
 
 
 def test_a_class_beside_the_scenario_is_found_from_anywhere(tmp_path, monkeypatch):

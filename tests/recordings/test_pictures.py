@@ -13,7 +13,6 @@ from PIL import Image, ImageColor
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import TrackPoint
-from dva_sim.options.runs import PictureOptions
 from dva_sim.recordings.pictures import Wanted, colours, style
 from dva_sim.recordings.pictures.bodies import DrawnBody
 from dva_sim.recordings.pictures.film import Film
@@ -385,41 +384,6 @@ def test_everything_wanted_is_written_and_named(drive, tmp_path):
         assert eye.size == (640, 480)
     list(Wanted(still=tmp_path / "still.pdf").write([drive]))
     assert (tmp_path / "still.pdf").read_bytes().startswith(b"%PDF")
-
-
-@pytest.mark.parametrize(
-    ("options", "expected"),
-    [
-        ({"video": "film.avi"}, "'film.avi' should end in .gif or .mp4"),
-        ({"still": "a.gif"}, ".png, .pdf or .svg"),
-        ({"still": "a.pdf", "camera": "robot-1"}, ".png or .jpg"),
-        ({"still": "no/a.png"}, "folder 'no' for the still"),
-        ({"camera": "robot-1"}, "--camera needs --still"),
-        ({"inset": True}, "--inset needs --video"),
-        ({"at": 3.0}, "--at needs --still"),
-        ({"still": "a.png", "at": "soon"}, "--at 'soon' should be seconds"),
-        ({"still": "a.png", "at": "1,2"}, "--at '1,2' should be seconds"),
-    ],
-)
-def test_what_cannot_be_drawn_is_said_before_the_run(options, expected):
-    with pytest.raises(ConfigError, match=expected):
-        Wanted.of(PictureOptions(**options))
-
-
-@pytest.mark.parametrize(
-    ("options", "expected"),
-    [
-        ({"camera": "robot-9"}, "'robot-9' is unknown; known: robot-1, robot-2"),
-        ({"at": 121.0}, "--at 121 .* 120 s"),
-        ({"at": -1.0}, "--at -1 is not"),
-        ({"at": math.nan}, "--at nan is not"),
-    ],
-)
-def test_what_no_run_of_a_scenario_has_is_said_before_the_run(options, expected, tmp_path):
-    drill = scenarios.build(scenarios.load("fire-drill"), {"horizon_s": 120, "robot.count": 2})
-    Wanted(still=tmp_path / "a.png", at=120.0, camera="robot-2").check(drill)
-    with pytest.raises(ConfigError, match=expected):
-        Wanted(still=tmp_path / "a.png", **options).check(drill)
 
 
 def test_a_moment_after_the_end_is_refused(drive, tmp_path):

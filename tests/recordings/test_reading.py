@@ -246,19 +246,10 @@ def test_a_damaged_file_ends_in_one_line(folder, opened, tmp_path):
     assert all("\n" not in line and "bad.mcap: " in line for line in reports)
 
 
-def test_a_file_that_is_none_another_or_cut_before_the_run_begins_is_told(folder, tmp_path):
-    contents = {
-        "cut short before": (folder / "drive.mcap").read_bytes()[:200],
-        "cut short": b"",
-        "not a recording": b"<xml>not at all</xml>" * 10,
-        "No such file": None,
-    }
-    for number, (problem, content) in enumerate(contents.items()):
-        file = tmp_path / f"{number}.mcap"
-        if content is not None:
-            file.write_bytes(content)
-        with pytest.raises(ConfigError, match=problem):
-            read_recording(file)
+def test_a_file_that_is_cut_before_the_run_begins_is_told(folder, tmp_path):
+    (tmp_path / "cut.mcap").write_bytes((folder / "drive.mcap").read_bytes()[:200])
+    with pytest.raises(ConfigError, match="cut short before"):
+        read_recording(tmp_path / "cut.mcap")
 
 
 def test_a_recording_of_a_later_form_is_refused(tmp_path, monkeypatch):

@@ -10,7 +10,6 @@ from rich.console import Console
 
 from dva_sim.cli.stories import episode
 from dva_sim.experiments.report.episode import EpisodeRequest
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.options.runs import EpisodeOptions
 
 pytestmark = pytest.mark.system
@@ -41,11 +40,6 @@ def test_a_still_shows_both(tmp_path):
     assert "Still: " in output_of(still=tmp_path / "one.png")
     with Image.open(tmp_path / "one.png") as one:
         assert one.width == 1680
-
-
-def test_a_camera_is_one_of_one_run():
-    with pytest.raises(ConfigError, match=r"--camera .*--side-by-side"):
-        output_of(still="eye.png", camera="robot-1")
 
 
 def test_the_same_pattern_may_stand_on_both_sides():

@@ -1,0 +1,86 @@
+"""Mistakes in what is recorded, drawn and read, told before anything runs."""
+
+import math
+from pathlib import Path
+
+from helpers.mistakes import Refused, check_mistake, command, each_mistake, mistakes, of_file
+
+from dva_sim.options.runs import PictureOptions
+from dva_sim.recordings.pictures import Wanted
+from dva_sim.recordings.reading import read_recording
+from dva_sim.simulation import scenario as scenarios
+
+LEAK = {"kind": "steam_leak.py:SteamLeak", "room": "Chemistry lab", "at_s": 5.0}
+
+
+def event(changed):
+    scenarios.build({"events": [LEAK | changed], "guard": {"count": 1}})
+
+
+def drawn(options):
+    Wanted.of(PictureOptions(**options))
+
+
+def drawn_of_drill(options):
+    drill = scenarios.build(scenarios.load("fire-drill"), {"horizon_s": 120, "robot.count": 2})
+    Wanted(still=Path("a.png"), **options).check(drill)
+
+
+def recording(name):
+    read_recording(Path(name))
+
+
+MISTAKES = [
+    *mistakes(
+        event,
+        ({"kind": "quake"}, "hazard 'quake' fire, flood, gas_leak"),
+        ({"kind": "steam_leak.py:Steam"}, "class 'Steam'"),
+        ({"kind": "none.py:Mine"}, "'none.py' not found"),
+        ({"hazard": {"hole": 20}}, "'hole'; 'hole_mm'?"),
+        ({"hazard": {"hole_mm": 51}}, "hole_mm: 50, 51"),
+    ),
+    *mistakes(
+        drawn,
+        ({"video": "film.avi"}, "'film.avi' .gif .mp4"),
+        ({"still": "a.gif"}, ".png, .pdf .svg"),
+        ({"still": "a.pdf", "camera": "robot-1"}, ".png .jpg"),
+        ({"still": "no/a.png"}, "folder 'no'"),
+        ({"camera": "robot-1"}, "--camera --still"),
+        ({"inset": True}, "--inset --video"),
+        ({"at": 3.0}, "--at --still"),
+        ({"still": "a.png", "at": "soon"}, "--at 'soon' seconds"),
+        ({"still": "a.png", "at": "1,2"}, "--at '1,2' seconds"),
+    ),
+    *mistakes(
+        drawn_of_drill,
+        ({"camera": "robot-9"}, "'robot-9' robot-1, robot-2"),
+        ({"at": 121.0}, "--at 121 120 s"),
+        ({"at": -1.0}, "--at -1"),
+        ({"at": math.nan}, "--at nan"),
+    ),
+    *mistakes(
+        of_file(recording, "odd.mcap"),
+        ("", "odd.mcap cut short"),
+        ("<xml>not at all</xml>" * 10, "odd.mcap not a recording"),
+    ),
+    *mistakes(recording, ("none.mcap", "none.mcap file")),
+    *mistakes(
+        command,
+        ("replay none.mcap", "none.mcap:"),
+        ("episode fire-drill --record run.bag", ".mcap"),
+        ("episode fire-drill --record no/run.mcap", "folder 'no'"),
+        ("episode fire-drill --record /proc/a.mcap", "/proc"),
+        ("episode tasks/fitts-tilt --record a.mcap", "full"),
+        ("episode fire-drill --record a.mcap --side-by-side req-rep,pub-sub", "--side-by-side"),
+        (
+            "episode fire-drill --still a.png --camera robot-1 --side-by-side req-rep,pub-sub",
+            "--camera --side-by-side",
+        ),
+        error=Refused,
+    ),
+]
+
+
+@each_mistake(MISTAKES)
+def test_a_mistake_ends_in_one_line_with_its_names(tmp_path, act, error, names):
+    check_mistake(tmp_path, act, error, names)
