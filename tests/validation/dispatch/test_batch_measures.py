@@ -6,12 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.timed import build, simulate_timed
 from dva_sim.validation.dispatch.batch_measures import (
     Batches,
     Sample,
-    check_name,
     many_servers,
     occupied,
     one_server,
@@ -118,25 +116,7 @@ def test_intervals_that_have_not_ended_last_to_the_end():
     assert inside.tolist() == [2.0, 1.0 + 4.0]
 
 
-GUARDS = {"model": "timed", "responders": [{"name": "guard", "count": 2, "look": 3}]}
 RANDOM = {"law": "exponential", "mean_s": 2.0}
-
-
-@pytest.mark.parametrize(
-    ("name", "problem"),
-    [
-        ("waiting", "measure 'waiting' is unknown"),
-        ("wait_s@flood", "stream 'flood' is unknown; known: fire"),
-        ("workload/guard-3", "responder 'guard-3' is unknown; known: guard-1, guard-2"),
-        ("utilisation/robots", "group 'robots' is unknown; known: operators, guard"),
-        ("wait_beyond/long", "should end in a number of seconds"),
-        ("share/guard-1", "stream '' is unknown"),
-    ],
-)
-def test_a_measure_that_there_is_not_is_refused(name, problem):
-    scenario = build(GUARDS | {"demand": [{"between": RANDOM}]})
-    with pytest.raises(ConfigError, match=problem):
-        check_name(name, scenario)
 
 
 def test_one_server_goes_by_rank_and_then_by_who_came_first():

@@ -53,19 +53,6 @@ def test_every_link_meets_every_pair_of_programs():
     ]
 
 
-def test_a_setting_that_no_condition_has_is_refused():
-    block = BlockConfig(group="x", links={"a": {"delay": 3}}, programs={"p": {"pattern": "pub"}})
-    with pytest.raises(ConfigError, match=r"'delay' .*'delay_ms'"):
-        conditions_of(block)
-
-
-def test_a_table_that_is_not_one_of_measurements_is_refused(tmp_path):
-    path = tmp_path / "other.csv"
-    path.write_text("a,b\n1,2\n")
-    with pytest.raises(ConfigError, match="group, seed, n_sent"):
-        read_runs("own", SourceConfig(file=str(path), made_with={}))
-
-
 def test_a_value_that_is_no_number_is_told_with_its_line(tmp_path):
     reference = packages.files("dva_sim").parent / "experiments/validation/network-reference.csv"
     with reference.open() as file:
@@ -79,12 +66,3 @@ def test_a_value_that_is_no_number_is_told_with_its_line(tmp_path):
     assert "age_p50" in NUMBERS
     with pytest.raises(ConfigError, match=r"some\.csv:3"):
         read_runs("own", SourceConfig(file=str(path), made_with={}))
-
-
-def test_a_table_without_runs_is_refused(tmp_path):
-    path = tmp_path / "empty.csv"
-    path.write_text(f"group,seed,{','.join(NUMBERS)}\n")
-    for text in (path.read_text(), ""):
-        path.write_text(text)
-        with pytest.raises(ConfigError, match="holds no runs"):
-            read_runs("own", SourceConfig(file=str(path), made_with={}))

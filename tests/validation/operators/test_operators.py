@@ -4,7 +4,6 @@ import pytest
 
 from dva_sim.agents.operator.published import lines_of, load_split, load_targets
 from dva_sim.cli.validation import validate
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.options.studies import ValidateOptions
 from dva_sim.validation.evidence import RULE, passes, read_evidence
 from dva_sim.validation.operators import experiments
@@ -61,27 +60,6 @@ def test_the_seed_decides_who_the_persons_are_and_the_number_of_processes_nothin
     alone = times(2)
     assert alone == times(2, workers=2)
     assert times(1, seed=2)["more"] != alone["more"][: len(alone["more"]) // 2]
-
-
-def test_an_unknown_strategy_is_refused_before_anything_is_played(monkeypatch):
-    monkeypatch.setattr(experiments, "play_exact", lambda *given: pytest.fail("it was played"))
-    with pytest.raises(ConfigError, match="'telepathy'"):
-        validate(ValidateOptions("operators", quick=True, jobs=1, strategy="telepathy"))
-
-
-@pytest.mark.parametrize(
-    ("what", "options", "words"),
-    [
-        ("robots", {}, "dispatch, operators or network"),
-        ("operators", {"cases": "mine.yaml"}, "--cases .*`validate dispatch`"),
-        ("dispatch", {"strategy": "pursuit"}, "--strategy .*`validate operators`"),
-        ("network", {"strategy": "adaptive"}, "--strategy .*`validate operators`"),
-        ("dispatch", {"ablate": True}, "--ablate, --live, --measure and --beside"),
-    ],
-)
-def test_what_does_not_belong_together_is_refused(what, options, words):
-    with pytest.raises(ConfigError, match=words):
-        validate(ValidateOptions(what, **options))
 
 
 @pytest.mark.soak

@@ -47,16 +47,6 @@ def test_two_campaigns_cannot_write_to_one_table(path):
         Table(path, COLUMNS)
 
 
-def test_another_table_is_not_written_to(path):
-    with pytest.raises(ConfigError, match="other columns"):
-        Table(path, ("cell", "length"))
-
-
-def test_a_place_that_cannot_be_written_is_told(tmp_path):
-    with pytest.raises(ConfigError, match="cannot be written"):
-        Table(tmp_path, COLUMNS)
-
-
 def test_the_machine_stands_beside_the_table(path):
     with Table(path, COLUMNS) as table:
         table.sign({"cores": 2, "libzmq": "4.3.5"})

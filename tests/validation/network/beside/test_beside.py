@@ -15,7 +15,7 @@ from dva_sim.cli import validation
 from dva_sim.experiments.report.kept_answers import read
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.loading import load_study
-from dva_sim.kernel.errors import ConfigError, ExitCode
+from dva_sim.kernel.errors import ExitCode
 from dva_sim.options.studies import ValidateOptions
 from dva_sim.validation.evidence import read_evidence
 from dva_sim.validation.network.beside import measured
@@ -207,12 +207,3 @@ def test_kept_commands_give_the_kept_answer(link):
     ages = [fmean(found[cell.config].values["age_in_force_p95_s"]) for cell in pair]
     [kept] = [row.mean for row in read(ANSWER).rows if row.level == link]
     assert ages[0] - ages[1] == pytest.approx(kept, abs=1e-4)
-
-
-def test_what_is_no_middleware_study_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match="middleware"):
-        validation.validate(ValidateOptions("network", beside="processing-time", quick=True))
-    with pytest.raises(ConfigError, match="results"):
-        validation.validate(ValidateOptions("network", beside=str(tmp_path), quick=True))
-    with pytest.raises(ConfigError, match="--beside"):
-        validation.validate(ValidateOptions("dispatch", beside="middleware"))

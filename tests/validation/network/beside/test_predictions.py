@@ -6,7 +6,6 @@ import pytest
 from helpers.paths import ROOT
 
 from dva_sim.experiments.study.loading import load_study
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.middleware import build
 from dva_sim.validation.network.beside.measured import asked_by
 from dva_sim.validation.network.beside.predictions import (
@@ -66,10 +65,3 @@ def test_of_the_shipped_study_all_that_is_predicted_is_kept():
     for bands in read_kept().values():
         assert set(bands) == set(ALLOWANCES)
         assert all(band.low <= band.predicted <= band.high for band in bands.values())
-
-
-def test_a_table_that_is_none_is_refused(tmp_path):
-    table = tmp_path / "mine.csv"
-    table.write_text("config,seeds\na1,x\n")
-    with pytest.raises(ConfigError, match="mine"):
-        read_kept(str(table))
