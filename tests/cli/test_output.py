@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 
 import pytest
 from generators import json_output
@@ -11,6 +12,7 @@ from helpers.studies.small_study import cheap, run_study, study_in, unlucky
 from helpers.wording import unnamed
 
 from dva_sim.cli import call, names
+from dva_sim.experiments.execution import dry_run, session
 from dva_sim.experiments.execution.dry_run import _Tried
 from dva_sim.kernel.errors import ExitCode
 from dva_sim.testing.promises import plural
@@ -55,7 +57,7 @@ def test_a_terminal_cuts_what_it_has_no_room_for_and_a_pipe_does_not(monkeypatch
     monkeypatch.setenv("COLUMNS", "40")
     names.tell(["x" * 100])
     assert capsys.readouterr().out == "x" * 100 + "\n"
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
     names.tell(["x" * 100, "y" * 40])
     assert capsys.readouterr().out == "x" * 37 + "...\n" + "y" * 40 + "\n"
 
@@ -174,7 +176,7 @@ def test_a_report_is_quiet_or_tells_its_files(folders):
 
 
 def test_a_dry_run_tells_every_configuration_if_asked_to(tmp_path, monkeypatch):
-    monkeypatch.setattr("dva_sim.experiments.execution.dry_run._tried", lambda *_: _Tried({}))
+    monkeypatch.setattr(dry_run, "_tried", lambda *_: _Tried({}))
     path = study_in(tmp_path).file
     out = say("run", path, "--dry-run", "-v", "-o", tmp_path / "out")[1]
     assert len(re.findall(r"^  (?:drive|story), (?:cell \d+|reference): ", out, re.M)) == 9
@@ -182,7 +184,7 @@ def test_a_dry_run_tells_every_configuration_if_asked_to(tmp_path, monkeypatch):
 
 
 def test_runs_that_failed_are_told_on_standard_error_however_quiet(tmp_path, monkeypatch):
-    monkeypatch.setattr("dva_sim.experiments.execution.session.run_job", one_fails)
+    monkeypatch.setattr(session, "run_job", one_fails)
     path = study_in(tmp_path).file
     with blank_pictures():
         code, out, err = say("run", path, "-q", "-j", 1, "-o", tmp_path / "out")

@@ -9,7 +9,7 @@ import pytest
 from typer.main import get_command
 
 from dva_sim import __version__
-from dva_sim.cli import app, call
+from dva_sim.cli import app, call, checks
 from dva_sim.cli.commands import PanelGroup
 from dva_sim.kernel.errors import ConfigError, ExitCode, RunsFailed
 
@@ -96,7 +96,7 @@ def test_what_goes_wrong_ends_in_one_line_and_its_code(monkeypatch, capsys, rais
     def fail(_):
         raise raised
 
-    monkeypatch.setattr("dva_sim.cli.checks.print_schema", fail)
+    monkeypatch.setattr(checks, "print_schema", fail)
     assert call(["schema", "site"]) == code
     assert capsys.readouterr().err == f"{line}\n"
 

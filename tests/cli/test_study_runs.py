@@ -11,6 +11,8 @@ from helpers.wording import unnamed
 
 from dva_sim.cli import study_runs
 from dva_sim.cli.study_runs import RunPace, duration
+from dva_sim.experiments.execution import dry_run as module
+from dva_sim.experiments.execution import session
 from dva_sim.experiments.execution.checkpoint import Checkpoint, RunOutcome
 from dva_sim.experiments.execution.dry_run import DryRun, _spread, dry_run
 from dva_sim.experiments.execution.session import StudySession
@@ -81,7 +83,7 @@ def test_what_is_done_tells_the_pace_of_the_rest(tmp_path):
 
 
 def test_a_probe_ends_when_its_time_is_up_but_not_after_one_or_two(tmp_path, monkeypatch):
-    monkeypatch.setattr("dva_sim.experiments.execution.dry_run.PROBE_S", 0.0)
+    monkeypatch.setattr(module, "PROBE_S", 0.0)
     plan = dry_run(kit.study_in(tmp_path), tmp_path / "out", probe=kit.cheap)
     assert plan.tried == 3
 
@@ -91,8 +93,8 @@ def test_a_run_that_does_not_end_in_time_costs_as_much_at_least(tmp_path, monkey
         while True:
             time.thread_time()
 
-    monkeypatch.setattr("dva_sim.experiments.execution.dry_run.MOST_S", 0.02)
-    monkeypatch.setattr("dva_sim.experiments.execution.dry_run._SHORT_S", 0.02)
+    monkeypatch.setattr(module, "MOST_S", 0.02)
+    monkeypatch.setattr(module, "_SHORT_S", 0.02)
     plan = dry_run(kit.study_in(tmp_path), tmp_path / "out", jobs=1, probe=never)
     assert (plan.tried, plan.is_least) == (1, True)
     assert plan.estimate_s is not None
@@ -149,7 +151,7 @@ def test_what_is_stopped_names_the_command_that_goes_on(tmp_path, monkeypatch, c
     code = study_runs.run(RunOptions(study, tmp_path / "out", jobs=1))
     assert code == 130
     *_, what, how = capsys.readouterr().out.splitlines()
-    assert "0 of 42 runs" in what
+    assert unnamed(what, "0 of 42") == []
     assert unnamed(how, "dva-sim run 'my study.yaml'", "--set seed=3") == []
 
 
@@ -157,6 +159,6 @@ def test_ctrl_c_while_tables_are_written_says_that_all_runs_are_done(tmp_path, m
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("dva_sim.experiments.execution.session.write_tables", stop)
+    monkeypatch.setattr(session, "write_tables", stop)
     with pytest.raises(KeyboardInterrupt, match="42 of 42 runs"):
         kit.run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=1, episode=kit.cheap)

@@ -15,6 +15,7 @@ from helpers.dva.dispatch_office import (
 )
 from helpers.paths import ROOT
 
+from dva_sim.core import events
 from dva_sim.core.assignments import Rules
 from dva_sim.core.event_status import status_of
 from dva_sim.core.events import (
@@ -110,7 +111,7 @@ def test_of_one_event_at_most_64_sources_are_told_apart():
 def test_when_the_event_table_is_full_a_report_is_answered_busy_and_one_of_a_known_event_is_not(
     office, monkeypatch
 ):
-    monkeypatch.setattr("dva_sim.core.events.MOST_OPEN", 1)
+    monkeypatch.setattr(events, "MOST_OPEN", 1)
     office.fire(12)
     new = m.EventReport(None, "fire", east(90), 0.5, 0.9, "detected")
     assert office.say(DETECTOR, new)[0].code == m.BUSY

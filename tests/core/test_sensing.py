@@ -13,6 +13,7 @@ from helpers.dva.dispatch_office import (
 )
 from helpers.wording import counted
 
+from dva_sim.core import events
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import State
 from dva_sim.core.reports import NO_NEWS, REACH
@@ -280,6 +281,6 @@ def test_smoke_at_a_robot_whose_place_is_not_known_means_nothing(office):
 
 
 def test_when_no_more_events_fit_that_is_counted(office, monkeypatch):
-    monkeypatch.setattr("dva_sim.core.events.MOST_OPEN", 0)
+    monkeypatch.setattr(events, "MOST_OPEN", 0)
     assert office.shows(ROBOT, "smoke", *SMOKY) == []
     assert office.core.refused == 1

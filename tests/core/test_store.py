@@ -21,6 +21,7 @@ from helpers.dva.dispatch_office import (
 from helpers.dva.random_days import Walk, snapshot
 from helpers.paths import TESTS
 
+from dva_sim.core import store
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import State
@@ -428,7 +429,7 @@ def test_a_memory_of_another_format_is_refused(file, value):
 
 
 def test_a_file_that_another_holds_cannot_be_opened(file, monkeypatch):
-    monkeypatch.setattr("dva_sim.core.store.OPEN_WITHIN", 0.01)
+    monkeypatch.setattr(store, "OPEN_WITHIN", 0.01)
     other = sqlite3.connect(file, isolation_level=None)
     other.execute("BEGIN EXCLUSIVE")
     assert refusal(file).endswith(": database is locked")

@@ -214,7 +214,7 @@ def test_a_judge_that_has_failed_has_held_nothing():
         judge.hear(WORLD, [b'["seen", 11.0, "nonsense", {}]', b'["here", 12.0, []]'])
     found = judge.verdicts()
     assert {verdict.state for verdict in found} == {"not judged"}
-    assert "from 11.0 s on" in found[0].text
+    assert "11.0 s" in found[0].text
 
 
 # --- who has really said it ----------------------------------------------------------------

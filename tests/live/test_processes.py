@@ -177,7 +177,7 @@ def test_a_run_that_is_interrupted_ends_cleanly(programs):
     run.wait_to_say("mode Teleoperation")
     run.send(signal.SIGTERM)
     assert run.ends() == 0
-    assert "The run ended (interrupted)" in run.output
+    assert "(interrupted)" in run.output
     assert run.output.rindex("mode Idle") > run.output.rindex("mode Teleoperation")
     assert run.complained == []
     assert programs.processes() == {}

@@ -97,21 +97,21 @@ def test_a_folder_can_be_split(folder, tmp_path):
     ring = KeyRing(there)
     assert ring.pair(ROBOT) == KeyRing(folder).pair(ROBOT)
     assert ring.public(GUARD) == KeyRing(folder).public(GUARD)
-    assert f"secret key of {GUARD}" in refused(there, GUARD)
+    assert GUARD in refused(there, GUARD)
     assert create_keys(there, [GUARD]) == []  # its secret is elsewhere
 
 
 def test_two_devices_cannot_have_one_key(folder):
     text = (folder / PUBLIC).read_text()
     (folder / "public" / "copy.key").write_text(text)
-    assert f"another key of {ROBOT}" in refused(folder)
+    assert ROBOT in refused(folder)
     (folder / "public" / "copy.key").write_text(text.replace(ROBOT, "robot-9"))
-    assert "have the same key" in refused(folder)
+    assert "copy.key" in refused(folder)
 
 
 def test_a_secret_does_not_belong_among_the_public_keys(folder):
     shutil.copy(folder / SECRET, folder / PUBLIC)
-    assert "contains a secret key" in refused(folder)
+    assert PUBLIC in refused(folder)
 
 
 def test_keys_that_are_no_pair_are_refused(folder, tmp_path):
@@ -119,7 +119,7 @@ def test_keys_that_are_no_pair_are_refused(folder, tmp_path):
     shutil.copy(tmp_path / "other" / SECRET, folder / SECRET)
     assert "outdated" in refused(folder, ROBOT)
     shutil.copy(folder / "secret" / "02-00-00-02-00-01.key_secret", folder / SECRET)
-    assert f"is the key of {GUARD}" in refused(folder, ROBOT)
+    assert GUARD in refused(folder, ROBOT)
     text = (tmp_path / "other" / SECRET).read_text()
     stranger = zmq.curve_keypair()[0].decode()
     public = KeyRing(tmp_path / "other").public(ROBOT).decode()

@@ -10,6 +10,7 @@ from helpers.paths import ROOT
 from dva_sim.cli import names
 from dva_sim.experiments.report.blocks import TERMS
 from dva_sim.experiments.report.figures.palette import look_of
+from dva_sim.kernel import plugins
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.patterns import PATTERNS, PubSub, load_pattern, meaning_of
 from dva_sim.simulation import scenario as scenarios
@@ -47,7 +48,7 @@ def test_every_pattern_says_all_that_reports_and_pages_tell_of_it():
 
 def test_a_package_offers_patterns_by_name(monkeypatch):
     offered = EntryPoint("plain", "dva_sim.network.patterns:PubSub", "dva_sim.patterns")
-    monkeypatch.setattr("dva_sim.kernel.plugins.entry_points", lambda group: [offered])
+    monkeypatch.setattr(plugins, "entry_points", lambda group: [offered])
     assert isinstance(load_pattern("plain")(), PubSub)
 
 

@@ -4,6 +4,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 from types import SimpleNamespace
 
 import pytest
@@ -159,7 +160,7 @@ def test_a_client_of_another_make_hears_the_heartbeats_of_the_dva(network, tmp_p
 def test_two_lives_of_the_client_within_a_second_differ_in_their_bytes(monkeypatch):
     lives = []
     for now in (1000.25, 1000.5):
-        monkeypatch.setattr("time.time", lambda now=now: now)
+        monkeypatch.setattr(time, "time", lambda now=now: now)
         reported = []
         life = {}
         exec(client().partition("if __name__")[0], life)

@@ -5,6 +5,8 @@ from helpers.processes.command_line import call, ended
 from helpers.wording import unnamed
 from PIL import Image
 
+from dva_sim.simulation.full.run import Run
+
 
 def story(text):
     """The lines that tell of moments and of what came of it, but for the last."""
@@ -27,7 +29,7 @@ def test_pictures_come_from_the_file_alone(folder, tmp_path, monkeypatch):
     def never(*_):
         raise AssertionError("simulated again")
 
-    monkeypatch.setattr("dva_sim.simulation.full.run.Run.__init__", never)
+    monkeypatch.setattr(Run, "__init__", never)
     monkeypatch.chdir(tmp_path)
     wanted = ["--camera", "robot-1", "--still", "eye.png", "--at", "20"]
     assert "Still: eye.png" in call("replay", folder / "drive.mcap", *wanted).stdout

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dva_sim.kernel import plugins
 from dva_sim.kernel.resources import find
 from dva_sim.recordings.reading import RecordedHazard, read_recording
 from dva_sim.recordings.writing import write_recording
@@ -48,7 +49,7 @@ def test_its_air_hides_things_from_cameras(run):
 
 
 def test_a_replay_shows_it_without_its_class(file, run, monkeypatch):
-    monkeypatch.setattr("dva_sim.kernel.plugins._run", None)  # nothing can be loaded
+    monkeypatch.setattr(plugins, "_run", None)  # nothing can be loaded
     playback = read_recording(file).playback
     (incident,), hazard = playback.incidents, run.incidents[0].hazard
     assert isinstance(incident.hazard, RecordedHazard)

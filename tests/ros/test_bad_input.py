@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dva_sim.network.realtime import LiveClock
+from dva_sim.ros import mjpeg
 from dva_sim.ros.client import RosbridgeClient, Subscribed
 from dva_sim.ros.mjpeg import MjpegReader
 from dva_sim.ros.peers import RosPeer
@@ -167,5 +168,5 @@ def test_a_stream_of_pictures_that_is_none_is_read_without_an_error(pieces, leng
     ["http://[", "http://127.0.0.1:99999/", "http://camera.example/x", "ftp://127.0.0.1/", "", "x"],
 )
 def test_a_place_of_pictures_that_is_none_is_never_looked_for(url, monkeypatch):
-    monkeypatch.setattr("dva_sim.ros.mjpeg.Dialling", None)
+    monkeypatch.setattr(mjpeg, "Dialling", None)
     MjpegReader(LiveClock(), url, "secret", lambda *_: None).close()

