@@ -15,7 +15,6 @@ from helpers.wording import unnamed
 
 from dva_sim.cli import checks
 from dva_sim.experiments.study import cell_grid
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.audit_log import BEGIN, END, AuditEntry, AuditLog
 from dva_sim.testing import file_kinds
 
@@ -275,12 +274,6 @@ def test_the_printed_schema_can_be_written_to_a_file(here):
     wrong = call("schema", "sites")
     assert wrong.returncode == 2
     assert re.fullmatch("error: .*'sites'.*'site'.*\n", wrong.stderr)
-
-
-def test_there_is_one_emulated_link_without_names_and_options():
-    for given, options in ((["link", "wifi"], []), (["link"], ["delay_s=1"])):
-        with pytest.raises(ConfigError, match="check link"):
-            checks.check(given, options)
 
 
 def test_a_file_named_link_is_asked_for_by_its_path(check):

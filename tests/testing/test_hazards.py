@@ -10,7 +10,6 @@ import pytest
 from helpers.wording import unnamed
 
 from dva_sim.cli import checks
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing.hazards import check_hazard
 from dva_sim.testing.promises import tried
 from dva_sim.worlds.hazards import CLEAR, Conditions, Hazard, HazardField, make_hazard
@@ -169,20 +168,6 @@ def test_a_slow_hazard_and_one_that_nothing_notices_earn_warnings():
     slow, unnoticed = tried(check_hazard, but(detectors=()), slow=0.0).warnings[::2]
     assert slow.startswith("is slow")
     assert not unnamed(unnoticed, "no detector")
-
-
-@pytest.mark.parametrize(
-    "words", ['reported_as = "quake"', 'reported_as, shows = "fire", ("dust",)']
-)
-def test_a_class_that_nobody_could_be_told_of_is_refused_when_it_is_made(words, tmp_path):
-    file = tmp_path / "mine.py"
-    file.write_text(
-        "from dva_sim.worlds.hazards import Hazard\n"
-        f"class Mine(Hazard):\n    {words}\n    def field(self, site): ...\n"
-    )
-    with pytest.raises(ConfigError, match="Mine") as found:
-        make_hazard(f"{file}:Mine", (0.0, 0.0), 0.0)
-    assert found.value.file == str(file)
 
 
 def test_check_hazard_tries_one_by_name_with_options(capsys):

@@ -8,7 +8,6 @@ from dva_sim.agents.operator.strategies import Pursuit
 from dva_sim.agents.tilt.filters import MovingMedian
 from dva_sim.cli import checks
 from dva_sim.core.dispatch import MinEta
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing.docstring_words import from_docstrings
 from dva_sim.testing.promises import TRIALS, plural
 from dva_sim.testing.shipped_words import shipped_words
@@ -101,13 +100,7 @@ def test_what_breaks_them_fails_the_test_with_a_line_for_each():
     assert failed.value.outcome.broken == tuple(str(failed.value).splitlines())
 
 
-def test_what_cannot_be_had_is_a_mistake_in_the_call():
-    with pytest.raises(ConfigError, match=r"'Greedy' .* 'speed'"):
-        testing.check_policy(Greedy, {"speed": 3})
-    with pytest.raises(ConfigError, match="'mean'"):
-        testing.check_filter("mean")
-    with pytest.raises(ConfigError, match=r"'Pursuit' .*policy"):
-        testing.check_policy(Pursuit)
+def test_there_is_no_check_of_what_is_no_kind():
     with pytest.raises(AttributeError, match="'check_car'"):
         _ = testing.check_car
 

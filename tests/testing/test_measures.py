@@ -96,24 +96,6 @@ def test_a_measure_of_no_model_of_ours_cannot_be_tried():
         tried(check_measure, measure(mean_time, models=("mine.py:Mine",)))
 
 
-@pytest.mark.parametrize(
-    ("body", "expected"),
-    [
-        ("def of(self, recording): return 1.0", "should say what it is: about = Measure"),
-        ("about = Measure('a b', 'x')\n    def of(self, r): return 1.0", "is called 'a b'; should"),
-        ("about = Measure('b_s', 'x')", "has no of(recording); should define it"),
-    ],
-)
-def test_a_class_that_is_no_measure_is_refused_in_one_line(tmp_path, body, expected):
-    head = (
-        "from dva_sim.kernel.measure import Measure\n"
-        "from dva_sim.simulation.run_measures import RunMeasure\n"
-    )
-    (tmp_path / "mine.py").write_text(f"{head}class Mine(RunMeasure):\n    {body}\n")
-    with pytest.raises(ConfigError, match=expected.replace("(", r"\(").replace(")", r"\)")):
-        load_measure("mine.py:Mine", tmp_path)
-
-
 def test_a_file_that_changed_is_read_again(tmp_path):
     import os
 

@@ -17,7 +17,6 @@ from dva_sim.agents.operator.strategies import (
     known_strategies,
     load_strategy,
 )
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing.operators import check_operator
 from dva_sim.testing.promises import tried
 
@@ -112,11 +111,6 @@ def test_who_is_only_slow_is_warned(fewer):
     assert any(text.startswith("is slow: ") for text in outcome.warnings)
     (text,) = tried(check_operator, steers(lambda wanted, _: wanted), slow=0.0).warnings
     assert text.startswith("thinks slowly: ")
-
-
-def test_the_oracle_sees_nothing_and_so_there_is_nothing_to_try():
-    with pytest.raises(ConfigError, match="sees nothing"):
-        tried(check_operator, "oracle")
 
 
 def test_a_strategy_is_tried_without_the_limits_that_it_is_held_within_when_it_runs(tmp_path):

@@ -7,7 +7,6 @@ import pytest
 from helpers.paths import ROOT
 
 from dva_sim.cli import checks
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing.promises import tried
 from dva_sim.testing.robots import check_robot
 from dva_sim.worlds.drives import Differential
@@ -82,8 +81,3 @@ def test_a_mistake_is_one_line(names, options, expected, capsys):
     out = capsys.readouterr().out
     assert expected in out
     assert len(out.splitlines()) == 2
-
-
-def test_a_robot_has_to_be_named():
-    with pytest.raises(ConfigError, match=r"mine.py:Mine, .*pibot, servrobot"):
-        checks.check(["robot"])

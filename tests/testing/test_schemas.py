@@ -149,8 +149,3 @@ def test_the_printed_xsd_is_the_schema_and_accepts_the_samples():
     assert samples
     for path in samples:
         schema.assertValid(etree.parse(path))
-
-
-def test_a_schema_of_nothing_is_refused_with_what_there_is():
-    with pytest.raises(ConfigError, match="'site'"):
-        schema_text("sites")
