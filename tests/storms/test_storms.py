@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers.wording import unnamed
 
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.storms.drawing import PROFILES, draw
 from dva_sim.storms.faults import FAULTS
 from dva_sim.storms.plan import Fault, StormPlan, load_plan
@@ -49,20 +47,6 @@ def test_every_kind_of_fault_is_drawn_and_ends_before_the_calm():
 def test_a_profile_draws_its_own_kinds_alone(profile):
     kinds = {fault.kind for seed in range(40) for fault in draw(seed, profile).faults}
     assert kinds <= set(PROFILES[profile])
-
-
-def test_an_unknown_profile_is_refused():
-    with pytest.raises(ConfigError) as refused:
-        draw(1, "massages")
-    assert unnamed(str(refused.value), "massages", "messages") == []
-
-
-@pytest.mark.parametrize("text", ["seed: 1\n", "seed: 1\nfaults: [{kind: x}]\ncalm_s: 2\n", "[]\n"])
-def test_what_is_no_plan_is_refused(tmp_path, text):
-    file = tmp_path / "plan.yaml"
-    file.write_text(text, encoding="utf-8")
-    with pytest.raises(ConfigError):
-        load_plan(file)
 
 
 def test_a_driver_keeps_a_robot_moving_and_gives_it_back():
