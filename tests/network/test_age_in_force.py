@@ -33,7 +33,7 @@ def test_age_in_force_is_what_one_finds_at_every_moment(found):
     seen = moments - np.concatenate([[START], made])[newest]
 
     force = AgeInForce(made, applied, START)
-    assert force.at(moments) == pytest.approx(seen)
+    assert np.allclose(force.at(moments), seen, rtol=1e-6)
     ages = force.over(SINCE, UNTIL)
     assert ages.mean == pytest.approx(seen.mean(), abs=0.01)
     assert ages.share_above(1.0) == pytest.approx((seen > 1.0).mean(), abs=0.01)

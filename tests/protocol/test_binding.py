@@ -99,7 +99,7 @@ def test_the_binding_and_the_codec_read_the_same_in_a_sample(binding, path):
 
 
 @given(st.data())
-@search(30)
+@search(10)
 def test_a_value_changed_in_the_binding_is_noticed(binding, data):
     """The comparison can fail: it would be worth nothing otherwise."""
     sent = data.draw(messages)

@@ -78,7 +78,7 @@ def test_two_robots_share_the_eyes_and_each_turn_costs_the_switch():
 
 def test_looks_differ_as_the_spread_of_their_logarithm_says():
     clock, robots = Clock(), (Robot(), Robot())
-    habits = AttentionHabits(reconsiders_s=0.01)
+    habits = AttentionHabits(reconsiders_s=0.05)
     noise = iter(np.random.default_rng(1).normal(size=2000).tolist())
     attention = Attention(clock, 1.0, habits, noise)
     for robot in robots:

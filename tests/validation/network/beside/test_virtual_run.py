@@ -10,7 +10,6 @@ from dva_sim.validation.network.beside.carriers import IN_FLIGHT, MqttLeg, why_n
 from dva_sim.validation.network.beside.virtual_run import PROGRAM_S, ProgramTimes, VirtualRun
 
 TIMES = ProgramTimes(near=0.4, far=0.41, ending=0.1)
-NODELAY = {"nodelay": True}
 EVERY = (
     ("udp", {}),
     ("websocket", {}),
