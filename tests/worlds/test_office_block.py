@@ -52,18 +52,6 @@ def test_a_robot_reaches_every_room_and_exit_of_every_block(options):
 @few
 @given(blocks)
 @example(SMALLEST)
-def test_the_rooms_of_a_block_cover_it_and_do_not_overlap(options):
-    site = load_site("office-block", options)
-    areas = [shapely.Polygon(room.polygon) for room in site.rooms]
-    width, depth = round(options["width_m"], 1), round(options["depth_m"], 1)
-    assert sum(area.area for area in areas) == pytest.approx(width * depth)
-    assert shapely.union_all(areas).area == pytest.approx(width * depth)
-    assert site.extent == pytest.approx((0, 0, width, depth), abs=0.51)
-
-
-@few
-@given(blocks)
-@example(SMALLEST)
 def test_every_room_of_a_block_but_the_ways_has_one_door_in_its_wall(options):
     site = load_site("office-block", options)
     doors = [o for o in site.openings if o.kind == "door"]
