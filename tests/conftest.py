@@ -6,7 +6,11 @@ import signal
 from helpers.processes.search_settings import search
 from hypothesis import settings
 
-pytest_plugins = ["helpers.reporting.cpu_by_room", "helpers.reporting.left_out"]
+pytest_plugins = [
+    "helpers.processes.programs",
+    "helpers.reporting.cpu_by_room",
+    "helpers.reporting.left_out",
+]
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # As for a command that a script starts with `&`: then nothing that is started here would hear

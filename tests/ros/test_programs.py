@@ -9,26 +9,12 @@ import pytest
 from helpers.foxglove.viewer import Viewer
 from helpers.paths import ROOT
 from helpers.processes.patience import PATIENCE_S, becomes
-from helpers.processes.programs import all_gone_after
-from helpers.ros.ros_machine import RosMachine
 from helpers.ros.served_world import ScriptedRosClient
 from helpers.wording import unnamed
 
 from dva_sim.console.robots.robot_station import two_free_ports
 
 pytestmark = pytest.mark.system
-
-
-@pytest.fixture
-def programs(tmp_path):
-    yield from all_gone_after(tmp_path)
-
-
-@pytest.fixture
-def machine():
-    machine = RosMachine()
-    yield machine
-    machine.stop()
 
 
 def address(program, name):

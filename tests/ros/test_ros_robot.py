@@ -7,7 +7,7 @@ import urllib.request
 
 import pytest
 from helpers.ros.bridged_robot import BridgedRobot
-from helpers.ros.ros_machine import JPEG, RosMachine, fixture
+from helpers.ros.ros_machine import JPEG, fixture
 from helpers.wording import counted, unnamed
 
 from dva_sim.cameras.service import PictureService
@@ -19,13 +19,6 @@ from dva_sim.serving.listening import listen
 pytestmark = pytest.mark.system
 
 SHORT = RosLimits(watchdog_s=0.5, stands_within_s=0.5)
-
-
-@pytest.fixture
-def machine():
-    machine = RosMachine()
-    yield machine
-    machine.stop()
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 """Control of a robot that is asked for before its connections stand."""
 
 import pytest
-from helpers.processes.patience import PATIENCE_S
+from helpers.processes.patience import Patient
 from helpers.ros.served_world import SOURCE
 
 from dva_sim.console.world.world import ConsoleWorld
@@ -12,7 +12,7 @@ from dva_sim.simulation.scenario import build
 pytestmark = pytest.mark.system
 
 
-class FarRobots:
+class FarRobots(Patient):
     """Two robots behind a link, and a driver who has just heard of them."""
 
     def __init__(self):
@@ -25,19 +25,13 @@ class FarRobots:
         self.driver = self.gateway.driver()
         self.answers = []
 
-    def until(self, true):
-        end = self.clock.now + PATIENCE_S
-        while not true() and self.clock.now < end:
-            self.clock.run(self.clock.now + 0.01)
-        return true()
-
     def take(self):
         self.driver.take(self.robot, lambda done, text: self.answers.append((done, text)))
 
     def revoke(self):
         """The permission ends while the robot is asked to be driven."""
         held = self.driver._person.robots
-        assert self.until(lambda: self.robot in held and held[self.robot].phase == "starting")
+        self.until(lambda: self.robot in held and held[self.robot].phase == "starting")
         held[self.robot].revoked(held[self.robot].session)
 
 
@@ -51,7 +45,7 @@ def far():
 def test_a_permission_that_runs_out_before_the_drive_is_asked_for_again(far):
     far.take()
     far.revoke()
-    assert far.until(lambda: far.answers)
+    far.until(lambda: far.answers)
     assert far.answers[0][0]
     assert far.driver.drive(far.robot, 0.3, 0.0) == ""
 
@@ -60,6 +54,6 @@ def test_a_client_that_is_gone_asks_no_more(far):
     far.take()
     far.revoke()
     far.driver.release_all()
-    assert far.until(lambda: far.answers)
+    far.until(lambda: far.answers)
     assert not far.answers[0][0]
     assert not far.driver.is_driving

@@ -2,13 +2,11 @@
 
 import os
 import signal
-from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
 from helpers.network.emulated_link import need_link
-from helpers.processes.programs import Program, Programs, all_gone_after, wait_until
+from helpers.processes.programs import Program, Programs, wait_until
 from helpers.wording import unnamed
 
 pytestmark = pytest.mark.system
@@ -55,11 +53,6 @@ USERS = {
         None,
     ),
 }
-
-
-@pytest.fixture
-def programs(tmp_path: Path) -> Iterator[Programs]:
-    yield from all_gone_after(tmp_path)
 
 
 @pytest.fixture(params=USERS)

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from helpers.processes.patience import PATIENCE_S
+from helpers.processes.patience import Patient
 
 from dva_sim.agents.device import command_topic
 from dva_sim.agents.operator.scripted import Ask, Pause, Script, ScriptedOperator, drill
@@ -195,11 +195,13 @@ def _stage(network: Transport, changes: dict[str, object], **address: object) ->
     return Stage(scenario, 1, network, Recorder(), **address)  # type: ignore[arg-type]
 
 
-class Scene:
+class Scene(Patient):
     """The DVA, a robot in a building, its decisions, and added devices."""
 
+    step_s = STEP
+
     def __init__(self, stage: Stage, trace: Path | None = None) -> None:
-        self.stage, self.dva = stage, add_dva(stage)
+        self.stage, self.clock, self.dva = stage, stage.clock, add_dva(stage)
         self.dva.core.registry.silent_after = SILENT_AFTER
         self.field = Field(stage)
         self.field.populate()
@@ -217,12 +219,6 @@ class Scene:
         operator = ScriptedOperator(device, script)
         operator.start()
         return operator
-
-    def until(self, condition: Callable[[], object]) -> None:
-        clock, end = self.stage.clock, self.stage.clock.now + PATIENCE_S
-        while not condition():
-            assert clock.now < end, "has not come true"
-            clock.run(clock.now + STEP)
 
 
 def _act_out(stage: Stage, way: Way, trace: Path | None = None) -> list[Decided]:

@@ -4,6 +4,7 @@ import functools
 import subprocess
 import time
 from collections.abc import Callable
+from typing import Any
 
 PATIENCE_S = 240.0
 """Less than the time-out of a test, so that who waits in vain can tell what for."""
@@ -22,3 +23,20 @@ def becomes(true: Callable[[], object]) -> bool:
             return False
         time.sleep(LOOK_S)
     return True
+
+
+class Patient:
+    """Something on a clock of its own, which lets time pass."""
+
+    clock: Any
+    step_s = 0.01
+
+    def until(self, true: Callable[[], object]) -> None:
+        """Let time pass until something is true."""
+        end = self.clock.now + PATIENCE_S
+        while not true():
+            assert self.clock.now < end, "has not come true"
+            self.clock.run(self.clock.now + self.step_s)
+
+    def pause(self, seconds: float) -> None:
+        self.clock.run(self.clock.now + seconds)

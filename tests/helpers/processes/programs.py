@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
+import pytest
 from helpers.processes.patience import LOOK_S, PATIENCE_S, becomes
 
 WIDE = "200"  # columns, so that no line is broken
@@ -127,8 +128,14 @@ class Programs:
             program.process.wait()
 
 
+@pytest.fixture
+def programs(tmp_path: Path) -> Iterator[Programs]:
+    """Programs of one test, in its folder."""
+    yield from all_gone_after(tmp_path)
+
+
 def all_gone_after(folder: Path) -> Iterator[Programs]:
-    """For a fixture: programs of one test."""
+    """Programs that are ended, whatever happens."""
     programs = Programs(folder)
     try:
         yield programs

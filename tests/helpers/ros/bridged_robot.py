@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from helpers.dva.permissions import confirmation
-from helpers.processes.patience import PATIENCE_S
+from helpers.processes.patience import Patient
 from helpers.ros.ros_machine import RosMachine
 
 from dva_sim.kernel.recorder import Recorder
@@ -21,7 +21,7 @@ from dva_sim.simulation.full.stage import DVA
 ANA, SESSION = "02:00:00:00:00:77", 5
 
 
-class BridgedRobot:
+class BridgedRobot(Patient):
     """The robot, its machine, and the DVA.
 
     Attributes:
@@ -59,16 +59,6 @@ class BridgedRobot:
         if isinstance(message.body, m.GetGrant):
             reply = replace(confirmation(self._grant), answers=message.message_id)
         request.answer(encode(m.Message(message.source, 1, DVA, "12:00:00", 0, reply)))
-
-    def until(self, true) -> None:
-        """Let time pass until something is true."""
-        end = self.clock.now + PATIENCE_S
-        while not true():
-            assert self.clock.now < end, "waited in vain"
-            self.clock.run(self.clock.now + 0.01)
-
-    def pause(self, seconds: float) -> None:
-        self.clock.run(self.clock.now + seconds)
 
     def ask(self, body, source: str = ANA) -> m.Reply:
         """Send the robot a request: the reply."""

@@ -4,7 +4,7 @@ import contextlib
 import json
 import threading
 
-from helpers.processes.patience import PATIENCE_S
+from helpers.processes.patience import Patient
 from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
 from websockets.sync.client import connect
 
@@ -26,7 +26,7 @@ SOURCE = {
 }
 
 
-class ServedWorld:
+class ServedWorld(Patient):
     """Everything on one clock; clients are in threads of their own.
 
     Attributes:
@@ -44,15 +44,6 @@ class ServedWorld:
         self.gateway = RosGateway(stage, lambda: self.world.console)
         self.server = RosbridgeServer(self.clock, door, self.gateway, stage.site, self.lines.append)
         self.until(lambda: len(self.gateway.robots) == 2)
-
-    def until(self, true) -> None:
-        end = self.clock.now + PATIENCE_S
-        while not true():
-            assert self.clock.now < end, "waited in vain"
-            self.clock.run(self.clock.now + 0.01)
-
-    def pause(self, seconds: float) -> None:
-        self.clock.run(self.clock.now + seconds)
 
     def robot(self, label: str):
         robots = self.world.run.field.robots.values()

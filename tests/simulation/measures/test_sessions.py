@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 
 from dva_sim.kernel.config import validate
@@ -12,10 +11,6 @@ from dva_sim.simulation.measures.sessions import (
     flow_rows,
     jain,
 )
-
-
-def times(*values: float) -> np.ndarray:
-    return np.array(values)
 
 
 @pytest.mark.parametrize(
