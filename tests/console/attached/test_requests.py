@@ -39,7 +39,7 @@ def server(page: AttachedPage) -> dict[str, Any]:
 
 
 def test_requests_of_others_come_with_header_code_and_service_time(page):
-    device = page.world.world.persons[0].device
+    device = page.world.world.seating.persons[0].device
     device.ask(DVA, m.GetDeviceList())
     device.ask(DVA, m.PermissionRevocation(id_of("robot", 9), device.id_tag, 77 << 32 | 5))
     page.let(1.0)
