@@ -1,4 +1,4 @@
-"""Releases of several robots after emergencies, answered as one."""
+"""Robots that are released after emergencies, or taken from their holders, by the DVA."""
 
 from __future__ import annotations
 
@@ -45,3 +45,20 @@ def release_robots(
 
     for robot in robots:
         ask(m.ReleaseEmergency(robot), partial(ended, robot), partial(ended, robot))
+
+
+def revoke_permission(robot: str, label: str, ask: AskDva, on_result: OnResult) -> None:
+    """Ask the DVA to end the permission for a robot.
+
+    Args:
+        robot: Id of the robot.
+        label: Label of the robot.
+        ask: Sends a request to the DVA.
+        on_result: Callback for the result.
+    """
+
+    def answered(reply: m.Reply) -> None:
+        text = reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
+        on_result(reply.code == m.OK, f"{label}: {text}")
+
+    ask(m.Revoke(robot), answered, partial(unanswered, on_result))

@@ -10,7 +10,7 @@ from functools import partial
 from dva_sim.agents.device import do_nothing
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import NO_ANSWER, OnResult, Refused, unanswered
-from dva_sim.console.asking.releases import NOBODY_STOPPED, release_robots
+from dva_sim.console.asking.releases import NOBODY_STOPPED, release_robots, revoke_permission
 from dva_sim.console.attached.lines import emergency_of
 from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.attached.people import AttachedPeople
@@ -201,15 +201,9 @@ class AttachedActions:
 
     @does("revoke")
     def _revoke(self, _: str, line: OfDevice, on_result: OnResult) -> None:
-        robot = line["device"]
-        if robot not in self._system.robots():
-            raise Refused(f"there is no robot {robot!r}")
-
-        def answered(reply: m.Reply) -> None:
-            done = f"the permission for {self._system.label_of(robot)} is revoked"
-            on_result(reply.code == m.OK, reply.text or done)
-
-        self._system.decide(m.Revoke(robot), answered, partial(unanswered, on_result))
+        robot = self._driving.robot(line["device"])
+        label = self._system.label_of(robot)
+        revoke_permission(robot, label, self._system.decide, on_result)
 
     @does("fake_add")
     def _add_fake(self, _: str, line: FakeAsked, on_result: OnResult) -> None:

@@ -68,7 +68,7 @@ class AttachedAudit(Audited):
     def answered(self, what: str, client: str, line: Asked, on_result: OnResult) -> OnResult:
         # A decision waits a moment for the DVA's record of it.
         report = super().answered(what, client, line, on_result)
-        if ACTIONS[what].audit is not Audit.DVA and what != "revoke":
+        if ACTIONS[what].audit is not Audit.DVA:
             return report
         number = str(line["id"])
         asked = self._asked[number] = AskedDecision(_action(what), line.get("event"))

@@ -13,10 +13,10 @@ from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.strategies import Reach
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.asking.refusal import OnResult
-from dva_sim.console.attached.lines import UNKNOWN_ROOM
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.driving.driven_system import DrivenSystem
 from dva_sim.console.driving.seating import Seating
+from dva_sim.console.views.event_rows import UNKNOWN_ROOM
 from dva_sim.console.views.things import UNKNOWN_ROBOT
 from dva_sim.core.registry import OPERATOR
 from dva_sim.network.patterns import Pattern, load_pattern

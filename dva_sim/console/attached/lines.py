@@ -10,11 +10,9 @@ from dva_sim.console.attached.system_state import DeviceState
 from dva_sim.console.dva.device_rows import link_of
 from dva_sim.console.robots.shown_mode import EMERGENCY, EMERGENCY_LAPSES, emergency_shown
 from dva_sim.console.run.lag import LIMIT
-from dva_sim.console.views.feed import SEVERITIES
 from dva_sim.console.views.foreign_devices import foreign_robot_row
 from dva_sim.console.views.scene import RULES, legend, patterns_of, site_of
 from dva_sim.console.views.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
-from dva_sim.console.wire.events import EventFacts
 from dva_sim.console.wire.rows import DeviceRow, EmergencyShown, RobotRow
 from dva_sim.console.wire.scenes import LinkShown, SceneLine, SiteShown, ThingBody, ThingShown
 from dva_sim.core.registry import GUARD, ROBOT
@@ -24,7 +22,6 @@ from dva_sim.worlds.site import Site
 
 LINK: Final[LinkShown] = {"kind": "attached", "processing_s": None}
 AROUND: Final = 40.0  # of the first position, where no site is known [m]
-UNKNOWN_ROOM: Final = "unknown room"  # where no site is known
 KINDS: Final = {ROBOT: "robot", GUARD: "guard"}
 BODIES: Final[Mapping[str, ThingBody]] = {"robot": UNKNOWN_ROBOT, "guard": UNKNOWN_PERSON}
 SILENT_AFTER: Final = 10.0  # without a place on the list: the DVA's own time-out [s]
@@ -209,33 +206,4 @@ def device_row(
         "revocable": may_revoke,
         "camera": device_state.camera,
         "sensors": sensors_of(device_state),
-    }
-
-
-def event_row(
-    status: m.EventStatus,
-    received_at: float,
-    labels: Mapping[str, str],
-    site: Site | None,
-    frame: GeoFrame,
-) -> EventFacts:
-    """An event, as the DVA tells it."""
-    x, y = frame.to_xy(status.position.latitude, status.position.longitude)
-    sent = dict.fromkeys((status.responder, status.operator, status.actor))
-    over = status.closed_for is not None
-    return {
-        "number": status.event_id,
-        "kind": status.kind,
-        "x_m": round(x, 2),
-        "y_m": round(y, 2),
-        "latitude_deg": status.position.latitude,
-        "longitude_deg": status.position.longitude,
-        "room": site.room_at(x, y) if site is not None else UNKNOWN_ROOM,
-        "severity": next(name for least, name in SEVERITIES if status.severity >= least),
-        "severity_value": round(status.severity, 2),
-        "state": status.event_state.replace("_", " "),
-        "over": over,
-        "since_ms": round(1000 * (received_at - status.state_for)),
-        "reported_ms": round(1000 * (received_at - status.age)),
-        "assigned": [] if over else [labels.get(i, i) for i in sent if i is not None],
     }

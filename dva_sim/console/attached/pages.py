@@ -21,15 +21,16 @@ from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.driving.seat_lines import SeatLines
 from dva_sim.console.events.console_alarms import ConsoleAlarms
-from dva_sim.console.events.decisions import about_event, dispatch_shown
+from dva_sim.console.events.decisions import dispatch_shown
 from dva_sim.console.run.lag import LagRule
+from dva_sim.console.views.event_rows import event_rows
 from dva_sim.console.views.feed import story_of
 from dva_sim.console.views.news import News, clock_shown
 from dva_sim.console.wire.arguments import LogsLooked
 from dva_sim.console.wire.events import SiteEventShown
 from dva_sim.console.wire.lines import Tell
 from dva_sim.console.wire.rows import DoingShown, Hearing, RobotRow, ServerShown
-from dva_sim.core.registry import GUARD, ROBOT
+from dva_sim.core.registry import ROBOT
 from dva_sim.protocol import messages as m
 
 # From one line to the next, real time [s].
@@ -73,7 +74,7 @@ class AttachedPages:
         self.people = AttachedPeople()
         self.sensors = WatchedSensors(system.device, system.state, system.id_of)
         self.requests = RequestReader(system.agent, lambda line: self.tell(line))
-        self.alarms = ConsoleAlarms(RemoteAlarmFacts(system))
+        self.alarms = ConsoleAlarms(RemoteAlarmFacts(system), system.agent)
         self.audited = AttachedAudit(audit, system, self.people.author)
         system.on_record = self.audited.heard
         self._hearing: Hearing = "never"
@@ -242,20 +243,7 @@ class AttachedPages:
 
     def _events(self) -> list[SiteEventShown]:
         system = self.system
-        agent = self.system.agent
-        return [
-            {
-                **lines.event_row(
-                    status,
-                    received_at=agent.received_at[number],
-                    labels=system.labels,
-                    site=system.site,
-                    frame=system.frame,
-                ),
-                **about_event(agent.events, agent.received_at, number),
-            }
-            for number, status in sorted(agent.events.items())
-        ]
+        return event_rows(system.agent, system.labels, system.site, system.frame)
 
     def _tell_devices(self) -> None:
         if self.looked:
@@ -295,17 +283,6 @@ class RemoteAlarmFacts:
     def broken(self) -> tuple[()]:
         """None is known: the rules are judged where robots and DVA are."""
         return ()
-
-    def is_somebody_free(self) -> bool:
-        """Return True if somebody is listed who is assigned to no open event."""
-        events = self._system.agent.events.values()
-        engaged = {status.responder for status in events if status.closed_for is None}
-        return any(
-            entry.device.device_type in (ROBOT, GUARD)
-            and not self._is_long_ago(entry.listed)
-            and id_tag not in engaged
-            for id_tag, entry in self._system.state.devices.items()
-        )
 
     def _is_long_ago(self, when: float) -> bool:
         return self._system.clock.now - when > SILENT_AFTER

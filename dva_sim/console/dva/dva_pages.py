@@ -123,19 +123,6 @@ class DvaPages(ServerActions):
         rows = self._rows.rows(self._fakes.devices)
         return {"k": "devices", "t": now_ms, "devices": rows}
 
-    @does("revoke")
-    def _revoke(self, _: str, line: OfDevice, on_result: OnResult) -> None:
-        robot = line["device"]
-        grant = self._run.dva.core.sessions.permissions.grants.get(robot)
-        if grant is None:
-            raise Refused(f"nobody has a permission for {robot}")
-        self._run.dva.revoke(grant.robot, None, notify_holder=True)
-        labels = self._run.stage.labels
-        holder = labels.get(grant.holder, grant.holder)
-        on_result(
-            True, f"{holder} has no permission for {labels.get(grant.robot, grant.robot)} any more"
-        )
-
     @does("fake_add")
     def _add(self, _: str, line: FakeAsked, on_result: OnResult) -> None:
         self._fakes.add(line, on_result)

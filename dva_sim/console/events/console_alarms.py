@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, Protocol
 
+from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.events.alarms import AlarmCondition, Alarms
@@ -27,9 +28,6 @@ class AlarmFacts(Protocol):
 
     def lost(self, robots: Sequence[RobotRow]) -> Iterable[tuple[str, str]]:
         """The labels of robots that are lost in drive, by the rows that pages get, and why."""
-
-    def is_somebody_free(self) -> bool:
-        """Return True if a guard or a robot could be sent somewhere."""
 
     def broken(self) -> Iterable[Breach]:
         """The safety rules that are broken, as far as anybody can tell."""
@@ -54,30 +52,27 @@ class RunFacts:
         """Return the breaches that the audit of the run has found."""
         return self._run.recorder.broken.values()
 
-    def is_somebody_free(self) -> bool:
-        """Return True if some reachable device has no order."""
-        core = self._run.dva.core
-        return any(
-            entry.device.device_type in (ROBOT, GUARD)
-            and not entry.silent
-            and entry.device.id_tag not in core.orders.engaged
-            for entry in core.registry.entries.values()
-        )
-
 
 class ConsoleAlarms:
     """The alarms of a console.
 
     Args:
         facts: Facts about the displayed system.
+        agent: Control room that knows events and devices.
         clock: Real time [s]: what people can bear does not hang on the pace of a run.
 
     Attributes:
         alarms: Rules that raise and fold alarms.
     """
 
-    def __init__(self, facts: AlarmFacts, clock: Callable[[], float] | None = None) -> None:
+    def __init__(
+        self,
+        facts: AlarmFacts,
+        agent: ControlRoomAgent,
+        clock: Callable[[], float] | None = None,
+    ) -> None:
         self._facts = facts
+        self._agent = agent
         self._clock = clock or (lambda: time.monotonic())
         self.alarms = Alarms()
         self._since: dict[str, int] = {}
@@ -134,7 +129,7 @@ class ConsoleAlarms:
     def _nobody(self, events: Iterable[SiteEventShown]) -> Iterator[AlarmCondition]:
         """Events wait, and nobody is free to go."""
         waits = sum(1 for event in events if event["state"] == "pending")
-        if waits and not self._facts.is_somebody_free():
+        if waits and not _is_somebody_free(self._agent):
             text = f"nobody is left to send, and {waits} wait"
             yield AlarmCondition("nobody", "nobody left to send", "high", place="", text=text)
 
@@ -173,6 +168,16 @@ class ConsoleAlarms:
         """They are back in the list."""
         for key in keys:
             self.alarms.unshelve(key, self._clock())
+
+
+def _is_somebody_free(agent: ControlRoomAgent) -> bool:
+    """Return True if a guard or a robot is listed that no open event engages."""
+    open_events = [status for status in agent.events.values() if status.closed_for is None]
+    engaged = {who for e in open_events for who in (e.responder, e.operator, e.actor)}
+    return any(
+        device.device_type in (ROBOT, GUARD) and id_tag not in engaged
+        for id_tag, device in agent.devices.items()
+    )
 
 
 def _of_events(events: Iterable[SiteEventShown], now_ms: int) -> Iterator[AlarmCondition]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import OnResult, Refused
-from dva_sim.console.asking.releases import NOBODY_STOPPED, release_robots
+from dva_sim.console.asking.releases import NOBODY_STOPPED, release_robots, revoke_permission
 from dva_sim.console.driving.drive_actions import Driving
 from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, place_of, report_of
 from dva_sim.console.events.missions import inspection_of, send_on_mission
@@ -15,6 +15,7 @@ from dva_sim.console.events.rooms import ConsoleRoom
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import (
     MissionAsked,
+    OfDevice,
     OfSome,
     ReportAsked,
     RoomName,
@@ -140,6 +141,16 @@ class RoomActions:
             send_on_mission(room.device, robot, label, body, on_result)
 
         self._room(client, line, on_result, send)
+
+    @does("revoke")
+    def _revoke(self, client: str, line: OfDevice, on_result: OnResult) -> None:
+        robot = self._driving.robot(line["device"])
+        label = self._world.driven.label_of(robot)
+
+        def revoke(room: ConsoleRoom, answer: OnResult) -> None:
+            revoke_permission(robot, label, room.agent.ask, answer)
+
+        self._room(client, line, on_result, revoke)
 
     @does("release_emergency")
     def _release(self, client: str, line: OfSome, on_result: OnResult) -> None:

@@ -23,7 +23,8 @@ from dva_sim.console.replay.moments import (
 )
 from dva_sim.console.replay.robot_lines import RobotLines, about
 from dva_sim.console.robots.shown_mode import EMERGENCY
-from dva_sim.console.views.feed import event_facts, moment_shown
+from dva_sim.console.views.event_rows import event_facts
+from dva_sim.console.views.feed import moment_shown
 from dva_sim.console.views.fields import HazardFeed
 from dva_sim.console.views.scene import scene_of
 from dva_sim.console.views.things import UNKNOWN_PERSON, Things, camera_shown
@@ -37,6 +38,7 @@ from dva_sim.console.wire.rows import (
     RobotWindowLine,
 )
 from dva_sim.console.wire.scenes import Happened, LinkShown, SceneLine, ThingBody
+from dva_sim.core.event_status import status_of
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.recorder import DriveLog, Sent
 from dva_sim.protocol import messages as m
@@ -363,7 +365,13 @@ class RecordedRun:
         known = (event_at(event, now) for event in self.playback.events)
         lines: list[SiteEventShown] = [
             {
-                **event_facts(event, site, labels),
+                **event_facts(
+                    status_of(event, None, now),
+                    received_at=now,
+                    labels=labels,
+                    site=site,
+                    frame=site.frame,
+                ),
                 **decided_on(playback.facts, event.number, now),
             }
             for event in known

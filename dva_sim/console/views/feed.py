@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from dva_sim.agents.people.bystander import SAFE
 from dva_sim.agents.people.person_guard import PersonGuard
@@ -13,24 +13,15 @@ from dva_sim.console.robots.shown_mode import latch_shown, shown_mode
 from dva_sim.console.robots.stop_reasons import stop_reason
 from dva_sim.console.run.played_run import PlayedRun
 from dva_sim.console.views.things import Things, camera_shown
-from dva_sim.console.wire.events import EventFacts, StoryLine
+from dva_sim.console.wire.events import StoryLine
 from dva_sim.console.wire.rows import DoingShown, PlacesLine, RobotRow
 from dva_sim.console.wire.scenes import Happened, ThingBody
-from dva_sim.core.event_status import state_since
-from dva_sim.core.events import FINAL, Event, EventTable
 from dva_sim.kernel.recorder import Moment, Recorder
 from dva_sim.live.parts import Rate
-from dva_sim.worlds.site import Site
-
-SEVERITIES = ((0.75, "critical"), (0.5, "high"), (0.25, "medium"), (0.0, "low"))
-KEPT_EVENTS = 50  # of those that are over
 
 
 class Feed:
     """Lines about a run.
-
-    Args:
-        events: Events of its DVA, if there is one here.
 
     Attributes:
         things: Everybody.
@@ -38,9 +29,8 @@ class Feed:
         stoppers: Device and name of the person who stopped a robot from a page, by its id.
     """
 
-    def __init__(self, run: PlayedRun, events: EventTable | None = None) -> None:
+    def __init__(self, run: PlayedRun) -> None:
         self._run = run
-        self._events = events or EventTable()
         self.things = Things()
         self.numbers = self.things.numbers
         self.stoppers: dict[str, tuple[str, str]] = {}
@@ -153,15 +143,6 @@ class Feed:
 
     # --- what happens ----------------------------------------------------------------------
 
-    def events(self) -> list[EventFacts]:
-        """All that are open, and the last that are over."""
-        events = self._events
-        over = list(events.closed.values())[-KEPT_EVENTS:]
-        return [
-            event_facts(event, self._run.stage.site, self._run.stage.labels)
-            for event in (*over, *events.open.values())
-        ]
-
     def story(self) -> Iterator[StoryLine]:
         """Yield the story since the last call; it is forgotten then."""
         return story_of(self._run.recorder)
@@ -179,31 +160,3 @@ def moment_shown(moment: Moment) -> Happened:
     """A moment of a story."""
     time, who, what, kind = moment
     return {"t": round(1000 * time), "who": who, "what": what, "kind": kind}
-
-
-def event_facts(event: Event, site: Site, labels: Mapping[str, str]) -> EventFacts:
-    """Return the state of an event; labels by id."""
-    where = event.position
-    x, y = site.frame.to_xy(where.latitude, where.longitude)
-    return {
-        "number": event.number,
-        "kind": event.kind,
-        "x_m": round(x, 2),
-        "y_m": round(y, 2),
-        "latitude_deg": where.latitude,
-        "longitude_deg": where.longitude,
-        "room": site.room_at(x, y),
-        "severity": next(name for least, name in SEVERITIES if event.severity >= least),
-        "severity_value": round(event.severity, 2),
-        "state": str(event.state),
-        "over": not event.open,
-        "since_ms": round(1000 * state_since(event)),
-        "reported_ms": round(1000 * event.times.get("detected", 0.0)),
-        "assigned": [labels.get(name, name) for name in _sent(event)],
-    }
-
-
-def _sent(event: Event) -> Iterator[str]:
-    """Yield the devices at an event now."""
-    if event.state not in FINAL:
-        yield from (n for n in (event.responder, event.operator, event.actor) if n is not None)

@@ -280,7 +280,12 @@ _LIST = (
     # --- the DVA's server and devices
     Action("server_start", "starts the DVA's server", PortAsked, at=_RUN, role=Role.DRIVE),
     Action("server_stop", "stops the DVA's server", at=_RUN, role=Role.DRIVE),
-    Action("revoke", "ends the permission for a robot", OfDevice, at=_RUN, role=Role.SUPERVISE),
+    Action(
+        "revoke",
+        "ends the permission for a robot",
+        OfDevice,
+        **_DECIDE | {"role": Role.SUPERVISE},
+    ),
     Action(
         "fake_add",
         "registers a device that is not there",

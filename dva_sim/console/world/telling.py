@@ -12,7 +12,6 @@ from dva_sim.console.audit.audited import Audited
 from dva_sim.console.driving.seat_lines import SeatLines
 from dva_sim.console.dva.dva_pages import DvaPages
 from dva_sim.console.events.console_alarms import ConsoleAlarms
-from dva_sim.console.events.decisions import about_event
 from dva_sim.console.events.rooms import ConsoleRooms
 from dva_sim.console.guards.played_guards import PlayedGuards
 from dva_sim.console.phones.phones import Phones
@@ -21,6 +20,7 @@ from dva_sim.console.robots.stop_reasons import stop_reason
 from dva_sim.console.run.lag import LagRule
 from dva_sim.console.run.recorder import ConsoleRecorder
 from dva_sim.console.run.sliders import LinkSliders
+from dva_sim.console.views.event_rows import event_rows
 from dva_sim.console.views.feed import Feed
 from dva_sim.console.views.fields import HazardFeed
 from dva_sim.console.views.foreign_devices import ForeignDevices
@@ -43,7 +43,7 @@ ROWS = 0.5
 HAZARDS = 1.0
 DEVICES = 1.0
 TIDY = 1.0
-CAMERAS = 5.0
+ASK = 2.0
 SOON = 0.05  # from one look at what has changed to the next, real time [s]
 
 
@@ -83,6 +83,7 @@ class PublishingWorld:
         self._modes: list[object] = []
         self._events: list[SiteEventShown] = []
         self._contained: dict[int, float] = {}
+        self._is_asking = False
 
     def show_scene(self) -> None:
         """Send the whole scene to the renderer."""
@@ -100,7 +101,7 @@ class PublishingWorld:
         self.clock.pulse(LOG_PERIOD, self._tell_logs)
         self.clock.pulse(DEVICES, self._tell_devices)
         self.clock.pulse(TIDY, self.recorder.tidy)
-        self.clock.pulse(CAMERAS, self._ask_for_cameras)
+        self.clock.pulse(ASK, self._ask_the_dva)
 
     def tell_scene(self) -> None:
         """Tell what does not change, but for where the DVA listens."""
@@ -147,8 +148,16 @@ class PublishingWorld:
         self.tell(rows)
         self._tell_alarms(rows["robots"])
 
-    def _ask_for_cameras(self) -> None:
-        """Ask the DVA where robots from outside show their pictures."""
+    def _ask_the_dva(self) -> None:
+        """Ask who is there, and for cameras from outside, unless an answer is still to come."""
+        if self._is_asking:
+            return
+        self._is_asking = True
+
+        def ended(*_: object) -> None:
+            self._is_asking = False
+
+        self.rooms.listener.ask(m.GetDeviceList(), ended, ended)
         if self.foreign.is_anybody:
             self.rooms.listener.ask(m.GetSensorInfo(), self.foreign.note_cameras)
 
@@ -190,12 +199,9 @@ class PublishingWorld:
 
     def _tell_events(self) -> None:
         """Events with what was decided on them, and who decides."""
-        listener = self.rooms.listener
+        stage = self.run.stage
         now_ms = self.feed.now_ms
-        self._events = [
-            {**event, **about_event(listener.events, listener.received_at, event["number"])}
-            for event in self.feed.events()
-        ]
+        self._events = event_rows(self.rooms.listener, stage.labels, stage.site, stage.site.frame)
         self._news.tell({"k": "events", "t": now_ms, "events": self._events})
         self._news.tell(self.rooms.line(now_ms))
 

@@ -99,7 +99,7 @@ class ConsoleWorld(PublishingWorld):
             if self.sockets is not None:
                 self.sockets.close()
             raise
-        self.feed = Feed(self.run, self.run.dva.core.events)
+        self.feed = Feed(self.run)
         self.lag = LagRule()
         self.tell: Tell = lambda *_: None
         self.show: Show = lambda *_: None
@@ -131,7 +131,7 @@ class ConsoleWorld(PublishingWorld):
         self.seat_lines = SeatLines(self.driven, self.phones.by_client)
         self.guards = PlayedGuards(self.run, self.feed)
         self.rooms = ConsoleRooms(self.run, self.run.dva.core.roles)
-        self.alarms = ConsoleAlarms(RunFacts(self.run))
+        self.alarms = ConsoleAlarms(RunFacts(self.run), self.rooms.listener)
         self.audited: Audited | None = None
         self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)
         self.recorder.on_applied = self.seat_lines.applied

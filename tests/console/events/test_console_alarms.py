@@ -29,7 +29,7 @@ def page(monkeypatch: pytest.MonkeyPatch) -> PhonePage:
 @pytest.fixture
 def alarms(page: PhonePage) -> ConsoleAlarms:
     page.let(5.0)  # everybody has registered
-    return ConsoleAlarms(RunFacts(page.world.run))
+    return ConsoleAlarms(RunFacts(page.world.run), page.world.rooms.listener)
 
 
 def texts(alarms: ConsoleAlarms, *events: Any, robots: Any = (), now_ms: int = 10_000) -> list[str]:
@@ -96,8 +96,7 @@ def test_a_robot_that_waits_for_its_first_command_is_not(alarms):
 def test_nobody_left_to_send_is_an_alarm_only_while_something_waits(page, alarms):
     waits = event(state="pending")
     assert texts(alarms, waits) == ["Gas leak, Lab"]  # somebody is free
-    for entry in page.world.run.dva.core.registry.entries.values():
-        entry.silent = True
+    page.world.rooms.listener.devices.clear()
 
     assert any(unnamed(text, "nobody", "1 wait") == [] for text in texts(alarms, waits))
     rows = alarms.look([event()], [], 10_000)["alarms"]

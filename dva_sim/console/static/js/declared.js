@@ -36,7 +36,7 @@ export const PATIENCE_MS = {
  "guard_report": 65000,
  "server_start": 10000,
  "server_stop": 10000,
- "revoke": 10000,
+ "revoke": 65000,
  "fake_add": 65000,
  "fake_remove": 10000,
  "room_join": 65000,

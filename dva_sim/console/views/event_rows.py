@@ -1,0 +1,76 @@
+"""Rows about events for pages, as the DVA publishes them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from dva_sim.agents.control_room.control_room import ControlRoomAgent
+from dva_sim.console.events.decisions import about_event
+from dva_sim.console.wire.events import EventFacts, SiteEventShown
+from dva_sim.protocol import messages as m
+from dva_sim.worlds.geo import GeoFrame
+from dva_sim.worlds.site import Site
+
+SEVERITIES: Final = ((0.75, "critical"), (0.5, "high"), (0.25, "medium"), (0.0, "low"))
+UNKNOWN_ROOM: Final = "unknown room"  # where no site is known
+MOST_OVER: Final = 50  # events that are over
+
+
+def event_rows(
+    agent: ControlRoomAgent, labels: Mapping[str, str], site: Site | None, frame: GeoFrame
+) -> list[SiteEventShown]:
+    """Return the events that a control room knows: the latest that are over, and all open ones.
+
+    Args:
+        agent: Control room.
+        labels: Labels of devices, by id.
+        site: Site, if one is known.
+        frame: Origin of the map.
+    """
+    events = agent.events
+    over = sorted(number for number, status in events.items() if status.closed_for is not None)
+    numbers = (*over[-MOST_OVER:], *sorted(events.keys() - set(over)))
+    return [
+        {
+            **event_facts(
+                events[number],
+                received_at=agent.received_at[number],
+                labels=labels,
+                site=site,
+                frame=frame,
+            ),
+            **about_event(events, agent.received_at, number),
+        }
+        for number in numbers
+    ]
+
+
+def event_facts(
+    status: m.EventStatus,
+    *,
+    received_at: float,
+    labels: Mapping[str, str],
+    site: Site | None,
+    frame: GeoFrame,
+) -> EventFacts:
+    """Return an event as the DVA states it at a time [s]."""
+    x, y = frame.to_xy(status.position.latitude, status.position.longitude)
+    sent = dict.fromkeys((status.responder, status.operator, status.actor))
+    is_over = status.closed_for is not None
+    return {
+        "number": status.event_id,
+        "kind": status.kind,
+        "x_m": round(x, 2),
+        "y_m": round(y, 2),
+        "latitude_deg": status.position.latitude,
+        "longitude_deg": status.position.longitude,
+        "room": site.room_at(x, y) if site is not None else UNKNOWN_ROOM,
+        "severity": next(name for least, name in SEVERITIES if status.severity >= least),
+        "severity_value": round(status.severity, 2),
+        "state": status.event_state.replace("_", " "),
+        "over": is_over,
+        "since_ms": round(1000 * (received_at - status.state_for)),
+        "reported_ms": round(1000 * (received_at - status.age)),
+        "assigned": [] if is_over else [labels.get(i, i) for i in sent if i is not None],
+    }
