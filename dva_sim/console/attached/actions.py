@@ -11,7 +11,6 @@ from dva_sim.agents.device import do_nothing
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import NO_ANSWER, OnResult, Refused, unanswered
 from dva_sim.console.asking.releases import NOBODY_STOPPED, release_robots, revoke_permission
-from dva_sim.console.attached.lines import emergency_of
 from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.attached.people import AttachedPeople
 from dva_sim.console.attached.system import AttachedSystem
@@ -20,6 +19,7 @@ from dva_sim.console.driving.drive_actions import LOOK, Driving, is_gone_for_goo
 from dva_sim.console.events.alarm_actions import AlarmActions
 from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, place_of, report_of
 from dva_sim.console.events.missions import inspection_of, send_on_mission
+from dva_sim.console.views.published_rows import emergency_of
 from dva_sim.console.wire.actions import ActionPlace, Asked
 from dva_sim.console.wire.arguments import (
     FakeAsked,

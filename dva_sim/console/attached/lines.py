@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from dva_sim.console.attached.system_state import DeviceState
 from dva_sim.console.dva.device_rows import link_of
-from dva_sim.console.robots.shown_mode import EMERGENCY, EMERGENCY_LAPSES, emergency_shown
+from dva_sim.console.robots.shown_mode import EMERGENCY
 from dva_sim.console.run.lag import LIMIT
-from dva_sim.console.views.foreign_devices import foreign_robot_row
+from dva_sim.console.views.published_rows import (
+    SILENT_AFTER,
+    emergency_of,
+    holder_named,
+    sensors_of,
+)
 from dva_sim.console.views.scene import RULES, legend, patterns_of, site_of
+from dva_sim.console.views.system_state import DeviceState
 from dva_sim.console.views.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
-from dva_sim.console.wire.rows import DeviceRow, EmergencyShown, RobotRow
+from dva_sim.console.wire.rows import DeviceRow
 from dva_sim.console.wire.scenes import LinkShown, SceneLine, SiteShown, ThingBody, ThingShown
 from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.protocol import messages as m
@@ -24,7 +28,6 @@ LINK: Final[LinkShown] = {"kind": "attached", "processing_s": None}
 AROUND: Final = 40.0  # of the first position, where no site is known [m]
 KINDS: Final = {ROBOT: "robot", GUARD: "guard"}
 BODIES: Final[Mapping[str, ThingBody]] = {"robot": UNKNOWN_ROBOT, "guard": UNKNOWN_PERSON}
-SILENT_AFTER: Final = 10.0  # without a place on the list: the DVA's own time-out [s]
 
 
 def things_of(devices: Iterable[DeviceState], numbers: dict[str, int]) -> list[ThingShown]:
@@ -80,89 +83,6 @@ def nowhere(frame: GeoFrame) -> SiteShown:
         "doors_m": [],
         "exits_m": [],
     }
-
-
-def positions(
-    devices: Mapping[str, DeviceState], numbers: dict[str, int], frame: GeoFrame
-) -> list[list[int]]:
-    """Return the positions of everybody who has reported one."""
-    rows = []
-    for id_tag, entry in devices.items():
-        status = entry.status
-        if status is None:
-            continue
-        x, y = frame.to_xy(status.position.latitude, status.position.longitude)
-        heading = 0.0
-        speed = 0.0
-        if isinstance(status, m.RobotStatus):
-            heading = math.remainder(status.heading, 2.0 * math.pi)
-            speed = status.speed
-        whole = round(100 * x), round(100 * y), round(1000 * heading), round(1000 * speed)
-        rows.append([numbers[id_tag], *whole])
-    return rows
-
-
-def emergency_of(
-    device_state: DeviceState, now: float, labels: Mapping[str, str]
-) -> EmergencyShown | None:
-    """Describe the emergency that a robot reports; it does so each second while it is stopped."""
-    emergency, heard = device_state.emergency or (None, now)
-    is_silent = device_state.heard is None or now - device_state.heard > EMERGENCY_LAPSES
-    if emergency is None or (now - heard > EMERGENCY_LAPSES and not is_silent):
-        return None
-    return emergency_shown(emergency, heard, labels)
-
-
-def robot_row(
-    device_state: DeviceState, number: int, now: float, labels: Mapping[str, str]
-) -> RobotRow:
-    """A robot, as it says itself."""
-    status = device_state.status
-    holder = device_state.holder
-    known = status if isinstance(status, m.RobotStatus) else None
-    holding, since = holder if holder is not None else (None, now)
-    held = holding is not None and holding.holder is not None
-    return {
-        **foreign_robot_row(
-            number,
-            known.mode if known is not None else "unknown",
-            emergency_of(device_state, now, labels),
-        ),
-        "holder": holding.holder if holding is not None else None,
-        "holder_label": holder_named(holding, labels),
-        "session_age_s": round(holding.held_for + now - since, 1) if holding and held else None,
-        "camera": device_state.camera,
-        "sensors": readings_of(device_state, now),
-    }
-
-
-def sensors_of(device_state: DeviceState) -> list[str]:
-    """Describe what a device can measure."""
-    return [f"{sensor.name} [{sensor.unit}]" for sensor in device_state.sensors]
-
-
-def readings_of(device_state: DeviceState, now: float) -> list[str]:
-    """Describe the values of its sensors; a value that is no longer reported is unknown."""
-    return [
-        f"{sensor.name} {_reading(sensor, device_state, now)}" for sensor in device_state.sensors
-    ]
-
-
-def _reading(sensor: m.Sensor, device_state: DeviceState, now: float) -> str:
-    value, heard = device_state.values.get(sensor.name, (None, 0.0))
-    if value is None or now - heard > SILENT_AFTER:
-        return "unknown"
-    if len(value.values) > 1:
-        return f"nearest {min(value.values):.3g} {value.unit}"
-    unit = "" if value.unit == "1" else f" {value.unit}"
-    return f"{value.values[0]:.3g}{unit}"
-
-
-def holder_named(holding: m.RobotHolder | None, labels: Mapping[str, str]) -> str | None:
-    """Return the label of a robot's holder: the robot's word for it, or the list's."""
-    if holding is None or holding.holder is None:
-        return None
-    return holding.label or labels.get(holding.holder)
 
 
 def device_row(

@@ -13,7 +13,6 @@ from dva_sim.cameras.lines import Show
 from dva_sim.console.attached import lines
 from dva_sim.console.attached.audit import AttachedAudit
 from dva_sim.console.attached.driven import DrivenAttached
-from dva_sim.console.attached.lines import SILENT_AFTER
 from dva_sim.console.attached.people import AttachedPeople
 from dva_sim.console.attached.requests import LOG, RequestReader
 from dva_sim.console.attached.sensing import WatchedSensors
@@ -26,6 +25,7 @@ from dva_sim.console.run.lag import LagRule
 from dva_sim.console.views.event_rows import event_rows
 from dva_sim.console.views.feed import story_of
 from dva_sim.console.views.news import News, clock_shown
+from dva_sim.console.views.published_rows import SILENT_AFTER, positions, robot_row
 from dva_sim.console.wire.arguments import LogsLooked
 from dva_sim.console.wire.events import SiteEventShown
 from dva_sim.console.wire.lines import Tell
@@ -145,7 +145,7 @@ class AttachedPages:
         if system.find_place():
             self._tell_scene()
         if self._is_shown:
-            rows = lines.positions(system.state.devices, system.numbers, system.frame)
+            rows = positions(system.state.devices, system.numbers, system.frame)
             self._news.tell({"k": "pos", "t": system.now_ms, "p": rows})
 
     def _tell_rows(self) -> None:
@@ -186,7 +186,7 @@ class AttachedPages:
         labels = self.system.labels
         return [
             {
-                **lines.robot_row(entry, numbers[id_tag], now, self._stopper_named(id_tag, labels)),
+                **robot_row(entry, numbers[id_tag], now, self._stopper_named(id_tag, labels)),
                 "pattern": self.driven.pattern_of(id_tag),
             }
             for id_tag, entry in self.system.state.devices.items()

@@ -9,7 +9,7 @@ from typing import Final
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.operator.steps import give_back, start
 from dva_sim.agents.robot.sensors import sensor_topic
-from dva_sim.console.attached.system_state import DeviceState, SystemState
+from dva_sim.console.views.system_state import DeviceState, SystemState
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 

@@ -12,10 +12,10 @@ from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice, do_nothing
 from dva_sim.console.attached.links import AttachedLinks
 from dva_sim.console.attached.options import scenario_shown
-from dva_sim.console.attached.system_state import SystemState
 from dva_sim.console.bench import Bench
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.run.real_links import start_of_day
+from dva_sim.console.views.system_state import SystemState
 from dva_sim.console.wire.rows import Hearing
 from dva_sim.core.registry import CONTROL_ROOM, ROBOT
 from dva_sim.options.runs import ConsoleOptions

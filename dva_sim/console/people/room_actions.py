@@ -115,9 +115,9 @@ class RoomActions:
         Raises:
             Refused: there is none.
         """
-        entries = self._world.run.dva.core.registry.entries
-        found = (i for i, entry in entries.items() if entry.device.label == label)
-        id_tag = next(found, None)
+        labels = self._world.run.stage.labels
+        listed = self._rooms.listener.devices
+        id_tag = next((i for i in listed if labels.get(i) == label), None)
         if id_tag is None:
             raise Refused(f"there is no device {label!r}")
         return id_tag
@@ -156,9 +156,8 @@ class RoomActions:
     def _release(self, client: str, line: OfSome, on_result: OnResult) -> None:
         """Release robots that an emergency holds; the DVA decides whether this person may."""
         run = self._world.run
-        stopped = run.dva.core.emergencies.stopped()
         latched = (i for i, robot in run.field.robots.items() if robot.controller.latch.holds)
-        robots = list(dict.fromkeys((*latched, *stopped)))
+        robots = [*latched, *self._world.foreign.stopped()]
         named = line.get("robots", "all")
         if named != "all":
             numbers = self._world.feed.numbers

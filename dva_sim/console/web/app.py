@@ -210,7 +210,7 @@ class Pages:
     async def _relayed(self, request: Request, robot: int, url: str | None) -> Response:
         """A stream from the address that a robot elsewhere has stated."""
         if not url:
-            return problem(503, f"{request.path_params['label']} offers no picture")
+            return Response(status_code=204, headers=NOT_KEPT)
         viewer = self._cameras.admit(robot, request.scope[ROLE])
         if viewer is None:
             return problem(503, "64 viewers are looking already")

@@ -62,7 +62,7 @@ class RemoteCamera:
                 if len(buffer) > MOST_BYTES:
                     return
         finally:
-            self.close()
+            await _close(self.writer)
 
     async def _next(self) -> bytes | None:
         """Return the next bytes of the response's body; None at its end."""
@@ -72,10 +72,6 @@ class RemoteCamera:
                 if isinstance(event, h11.Data):
                     return bytes(event.data)
         return None
-
-    def close(self) -> None:
-        """Look no more."""
-        self.writer.close()
 
 
 async def open_camera(url: str) -> RemoteCamera:
@@ -103,24 +99,40 @@ async def open_camera(url: str) -> RemoteCamera:
 
 async def _asked(host: str, port: int, path: str, query: str) -> RemoteCamera:
     reader, writer = await asyncio.open_connection(host, port)
-    protocol = h11.Connection(h11.CLIENT)
-    target = f"{path or '/'}{'?' if query else ''}{query}"
-    headers = [("Host", f"{host}:{port}"), ("Connection", "close")]
-    asked = protocol.send(h11.Request(method="GET", target=target, headers=headers))
-    writer.write((asked or b"") + (protocol.send(h11.EndOfMessage()) or b""))
-    event = await _event(reader, protocol)
-    while isinstance(event, h11.InformationalResponse):
+    try:
+        protocol = h11.Connection(h11.CLIENT)
+        target = f"{path or '/'}{'?' if query else ''}{query}"
+        headers = [("Host", f"{host}:{port}"), ("Connection", "close")]
+        asked = protocol.send(h11.Request(method="GET", target=target, headers=headers))
+        writer.write((asked or b"") + (protocol.send(h11.EndOfMessage()) or b""))
         event = await _event(reader, protocol)
-    if not isinstance(event, h11.Response):
-        writer.close()
-        raise OSError("it has ended")
+        while isinstance(event, h11.InformationalResponse):
+            event = await _event(reader, protocol)
+        boundary = _boundary_of(event)
+        if boundary is None:
+            raise NoPictures(f"{host}:{port} answers with no motion JPEG")
+    except BaseException:
+        await _close(writer)
+        raise
+    return RemoteCamera(reader, writer, protocol, boundary)
+
+
+def _boundary_of(event: object) -> bytes | None:
+    """Return what stands between the pictures of a response; None if it holds none."""
+    if not isinstance(event, h11.Response) or event.status_code != 200:
+        return None
     kind = Message()
     kind["Content-Type"] = dict(event.headers).get(b"content-type", b"").decode("latin-1")
     boundary = kind.get_boundary()
-    if event.status_code != 200 or kind.get_content_type() != KIND or not boundary:
-        writer.close()
-        raise NoPictures(f"{host}:{port} answers {event.status_code}, and no motion JPEG")
-    return RemoteCamera(reader, writer, protocol, b"--" + boundary.removeprefix("--").encode())
+    if kind.get_content_type() != KIND or not boundary:
+        return None
+    return b"--" + boundary.removeprefix("--").encode()
+
+
+async def _close(writer: asyncio.StreamWriter) -> None:
+    writer.close()
+    with suppress(OSError):
+        await writer.wait_closed()
 
 
 async def _event(reader: asyncio.StreamReader, protocol: h11.Connection) -> object:

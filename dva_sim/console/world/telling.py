@@ -128,8 +128,6 @@ class PublishingWorld:
         self._news.tell(line)
 
     def _tell_rows(self) -> None:
-        if self.foreign.come():
-            self.tell_scene()
         self.lag.measured(time.monotonic(), self.clock.worst_lag())
         rows: RowsLine = {
             "k": "rows",
@@ -154,8 +152,11 @@ class PublishingWorld:
             return
         self._is_asking = True
 
-        def ended(*_: object) -> None:
+        def ended(reply: m.Reply | None = None) -> None:
             self._is_asking = False
+            listed = reply.content if reply is not None else None
+            if isinstance(listed, m.DeviceList) and self.foreign.take_list(listed.devices):
+                self.tell_scene()
 
         self.rooms.listener.ask(m.GetDeviceList(), ended, ended)
         if self.foreign.is_anybody:

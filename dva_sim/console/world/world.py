@@ -114,7 +114,8 @@ class ConsoleWorld(PublishingWorld):
         self.screens = Screens(
             self.run, id_of("console", SCREEN), self.feed.numbers, self._show_frame
         )
-        self.foreign = ForeignDevices(self.run, self.feed)
+        self.rooms = ConsoleRooms(self.run, self.run.dva.core.roles)
+        self.foreign = ForeignDevices(self.run, self.feed, self.rooms.listener.device)
         self.driven = DrivenRun(
             self.run,
             clock=self.clock,
@@ -130,7 +131,6 @@ class ConsoleWorld(PublishingWorld):
         self.feed.things.add(DVA, "dva", "dva")
         self.seat_lines = SeatLines(self.driven, self.phones.by_client)
         self.guards = PlayedGuards(self.run, self.feed)
-        self.rooms = ConsoleRooms(self.run, self.run.dva.core.roles)
         self.alarms = ConsoleAlarms(RunFacts(self.run), self.rooms.listener)
         self.audited: Audited | None = None
         self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)

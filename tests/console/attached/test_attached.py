@@ -15,8 +15,9 @@ from helpers.wording import unnamed
 
 from dva_sim.console.attached import lines
 from dva_sim.console.attached.options import check, own_id
-from dva_sim.console.attached.system_state import DeviceState
 from dva_sim.console.views.event_rows import event_facts
+from dva_sim.console.views.published_rows import positions, robot_row
+from dva_sim.console.views.system_state import DeviceState
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.keys import KeyRing, create_keys
 from dva_sim.options.runs import ConsoleOptions
@@ -39,7 +40,7 @@ def device_state(kind: str = "Robot", **more: object) -> DeviceState:
 
 
 def test_of_a_robot_that_has_said_nothing_everything_is_unknown():
-    row = lines.robot_row(device_state(), 0, 5.0, {})
+    row = robot_row(device_state(), 0, 5.0, {})
     assert (row["mode"], row["holder"], row["camera"]) == ("unknown", None, None)
     assert (
         lines.device_row(device_state(), 5.0, {}, is_fake=False, may_revoke=False)["link"] is None
@@ -48,7 +49,7 @@ def test_of_a_robot_that_has_said_nothing_everything_is_unknown():
         lines.device_row(device_state(), 5.0, {}, is_fake=False, may_revoke=False)["holder_known"]
         is False
     )
-    assert lines.positions({ROBOT: device_state()}, {ROBOT: 0}, HERE) == []
+    assert positions({ROBOT: device_state()}, {ROBOT: 0}, HERE) == []
 
 
 def test_a_robot_is_shown_as_it_says_itself():
@@ -56,10 +57,10 @@ def test_a_robot_is_shown_as_it_says_itself():
     status = m.RobotStatus("Teleoperation", m.Position(latitude, longitude), 1.0, 0.25, 0.0, 7)
     holder = m.RobotHolder(id_of("operator", 1), "ana", 10.0), 2.0
     robot = device_state(status=status, holder=holder, heard=4.0)
-    row = lines.robot_row(robot, 3, 5.0, {})
+    row = robot_row(robot, 3, 5.0, {})
     shown = (row["mode"], row["holder_label"], row["session_age_s"])
     assert shown == ("Teleoperation", "ana", 13.0)
-    assert lines.positions({ROBOT: robot}, {ROBOT: 3}, HERE) == [[3, 300, -400, 1000, 250]]
+    assert positions({ROBOT: robot}, {ROBOT: 3}, HERE) == [[3, 300, -400, 1000, 250]]
     shown = lines.device_row(robot, 5.0, {}, is_fake=False, may_revoke=True)
     assert (shown["doing"], shown["heard_s"], shown["link"]) == ("Teleoperation", 1.0, "good")
     assert (shown["commands_hz"], shown["level"], shown["ends_s"]) == (None, None, None)

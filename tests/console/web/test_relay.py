@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 
 import pytest
 
@@ -26,6 +27,8 @@ def with_server(answer: bytes, use: Use, stays: bool = False) -> object:
         if stays:
             await reader.read()
         writer.close()
+        with suppress(OSError):
+            await writer.wait_closed()
 
     async def run() -> object:
         async with await asyncio.start_server(answered, "127.0.0.1", 0) as server:

@@ -2,6 +2,7 @@
 
 const HEAD_END = [13, 10, 13, 10];
 const WAIT_MS = 1000;
+const NO_CAMERA = 204; // the status of a robot that states no camera
 
 /**
  * @typedef {{bitmap: ImageBitmap, number: number, capturedMs: number, bytes: number}} Frame
@@ -18,6 +19,7 @@ export async function play(url, show, tell, signal) {
   while (!signal.aborted) {
     try {
       const answer = await fetch(url, { signal, cache: 'no-store' });
+      if (answer.status === NO_CAMERA) throw new Error('This robot offers no picture.');
       if (!answer.ok || !answer.body) throw new Error(await reasonOf(answer));
       tell('');
       await readParts(answer.body.getReader(), show, signal);

@@ -1,0 +1,122 @@
+"""Rows about robots of which only messages are known; what is unknown is null."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+from dva_sim.console.robots.shown_mode import EMERGENCY, EMERGENCY_LAPSES, emergency_shown
+from dva_sim.console.views.system_state import DeviceState
+from dva_sim.console.wire.rows import EmergencyShown, RobotRow
+from dva_sim.protocol import messages as m
+from dva_sim.worlds.geo import GeoFrame
+
+SILENT_AFTER: Final = 10.0  # without a place on the list: the DVA's own time-out [s]
+
+
+def positions(
+    devices: Mapping[str, DeviceState], numbers: dict[str, int], frame: GeoFrame
+) -> list[list[int]]:
+    """Return the positions of everybody who has reported one."""
+    rows = []
+    for id_tag, entry in devices.items():
+        status = entry.status
+        if status is None:
+            continue
+        x, y = frame.to_xy(status.position.latitude, status.position.longitude)
+        heading = 0.0
+        speed = 0.0
+        if isinstance(status, m.RobotStatus):
+            heading = math.remainder(status.heading, 2.0 * math.pi)
+            speed = status.speed
+        whole = round(100 * x), round(100 * y), round(1000 * heading), round(1000 * speed)
+        rows.append([numbers[id_tag], *whole])
+    return rows
+
+
+def emergency_of(
+    device_state: DeviceState, now: float, labels: Mapping[str, str]
+) -> EmergencyShown | None:
+    """Describe the emergency that a robot reports; it does so each second while it is stopped."""
+    emergency, heard = device_state.emergency or (None, now)
+    is_silent = device_state.heard is None or now - device_state.heard > EMERGENCY_LAPSES
+    if emergency is None or (now - heard > EMERGENCY_LAPSES and not is_silent):
+        return None
+    return emergency_shown(emergency, heard, labels)
+
+
+def robot_row(
+    device_state: DeviceState, number: int, now: float, labels: Mapping[str, str]
+) -> RobotRow:
+    """A robot, as it says itself."""
+    status = device_state.status
+    holder = device_state.holder
+    known = status if isinstance(status, m.RobotStatus) else None
+    holding, since = holder if holder is not None else (None, now)
+    held = holding is not None and holding.holder is not None
+    return {
+        **_unknown_robot(
+            number,
+            known.mode if known is not None else "unknown",
+            emergency_of(device_state, now, labels),
+        ),
+        "holder": holding.holder if holding is not None else None,
+        "holder_label": holder_named(holding, labels),
+        "session_age_s": round(holding.held_for + now - since, 1) if holding and held else None,
+        "camera": device_state.camera,
+        "sensors": readings_of(device_state, now),
+    }
+
+
+def _unknown_robot(number: int, mode: str, emergency: EmergencyShown | None) -> RobotRow:
+    """A robot of which little is known; what is not is null."""
+    return {
+        "i": number,
+        "mode": mode if emergency is None else EMERGENCY,
+        "emergency": emergency,
+        "stop_reason": "",
+        "pattern": None,
+        "battery": None,
+        "holder": None,
+        "holder_label": None,
+        "session_age_s": None,
+        "watchdog_left_s": None,
+        "set_speed_mps": None,
+        "set_turn_rate_radps": None,
+        "queue": None,
+        "lost": None,
+        "commands_hz": None,
+        "refused": None,
+        "timeouts": None,
+        "camera": None,
+    }
+
+
+def sensors_of(device_state: DeviceState) -> list[str]:
+    """Describe what a device can measure."""
+    return [f"{sensor.name} [{sensor.unit}]" for sensor in device_state.sensors]
+
+
+def readings_of(device_state: DeviceState, now: float) -> list[str]:
+    """Describe the values of its sensors; a value that is no longer reported is unknown."""
+    return [
+        f"{sensor.name} {_reading(sensor, device_state, now)}" for sensor in device_state.sensors
+    ]
+
+
+def _reading(sensor: m.Sensor, device_state: DeviceState, now: float) -> str:
+    value, heard = device_state.values.get(sensor.name, (None, 0.0))
+    if value is None or now - heard > SILENT_AFTER:
+        return "unknown"
+    if len(value.values) > 1:
+        return f"nearest {min(value.values):.3g} {value.unit}"
+    unit = "" if value.unit == "1" else f" {value.unit}"
+    return f"{value.values[0]:.3g}{unit}"
+
+
+def holder_named(holding: m.RobotHolder | None, labels: Mapping[str, str]) -> str | None:
+    """Return the label of a robot's holder: the robot's word for it, or the list's."""
+    if holding is None or holding.holder is None:
+        return None
+    return holding.label or labels.get(holding.holder)
