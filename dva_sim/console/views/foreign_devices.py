@@ -12,7 +12,6 @@ from typing import Final
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.views.feed import Feed
 from dva_sim.console.views.published_rows import (
-    SILENT_AFTER,
     emergency_of,
     positions,
     robot_row,
@@ -42,6 +41,7 @@ class ForeignDevices:
         self._run = run
         self._feed = feed
         self._state = SystemState(device, {}, lambda: None)
+        self._listed = 0.0  # time of the newest list [s]
 
     @property
     def is_anybody(self) -> bool:
@@ -50,6 +50,7 @@ class ForeignDevices:
 
     def take_list(self, devices: Iterable[m.Device]) -> bool:
         """Take the DVA's list of devices; True if somebody is new, who has a number then."""
+        self._listed = self._run.clock.now
         known = self._state.devices.keys()
         named = [self._named(device) for device in devices if self._is_foreign(device)]
         there = [one for one in named if one.id_tag in known]
@@ -116,7 +117,7 @@ class ForeignDevices:
         return [id_tag for id_tag, entry in devices if emergency_of(entry, now, {}) is not None]
 
     def _here(self) -> Iterator[tuple[str, DeviceState]]:
-        now = self._run.clock.now
+        """Yield the devices on the newest list of the DVA."""
         for id_tag, entry in self._state.devices.items():
-            if now - max(entry.listed, entry.heard or 0.0) < SILENT_AFTER:
+            if entry.listed >= self._listed:
                 yield id_tag, entry

@@ -284,14 +284,14 @@ def test_the_link_of_a_device_is_judged_by_when_it_was_heard(heard_s, silent, li
 
 def test_who_joins_is_shown_with_what_the_dva_knows(page):
     page.do("fake_add", label="robot-1", type="Robot", id_tag=GHOST)
-    page.let(1.0)
+    page.let(3.0)
     scene, rows = page.lines_of("scene")[-1], page.lines_of("rows")[-1]
     (ghost,) = [thing for thing in scene["things"] if thing["id"] == GHOST]
     assert (ghost["kind"], ghost["label"]) == ("robot", f"robot-1 ({GHOST})")
     (row,) = [row for row in rows["robots"] if row["i"] == ghost["i"]]
-    assert (row["mode"], row["battery"], row["commands_hz"]) == ("Idle", None, None)
+    assert (row["mode"], row["battery"], row["commands_hz"]) == ("unknown", None, None)
     assert page.do("take", robots=["robot-1"])[0]  # leads to the one of that label alone
     assert page.seat()["drives"][0]["i"] == 0
     page.do("fake_remove", device=GHOST)
-    page.let(1.0)
+    page.let(3.0)
     assert ghost["i"] not in [row["i"] for row in page.lines_of("rows")[-1]["robots"]]
