@@ -10,6 +10,7 @@ from collections import deque
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from dva_sim.core.wire_size import sent_time
 from dva_sim.protocol import messages as m
 
 MOST_KEPT = 10_000  # facts that nobody has taken yet; older ones are lost, and counted
@@ -111,11 +112,8 @@ class Fact:
         )
 
 
-LONGEST = 1e6  # no longer time is told [s]
-
-
 def _span(seconds: float | None) -> float | None:
-    return None if seconds is None else max(0.0, min(seconds, LONGEST))
+    return None if seconds is None else sent_time(seconds)
 
 
 @dataclass

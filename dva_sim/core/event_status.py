@@ -6,12 +6,11 @@ from collections.abc import Iterable
 
 from dva_sim.core.events import LOOKING, Choice, Event, State
 from dva_sim.core.questions import Question, Questions
-from dva_sim.core.wire_size import LIST_BYTES, xml_size
+from dva_sim.core.wire_size import LIST_BYTES, sent_time, xml_size
 from dva_sim.protocol import messages as m
 
 MOST_LISTED = 16
 EVENT_BYTES = 950  # of one event without what people have written, at most [B]
-LONGEST = 1e6  # no longer time is told [s]
 _BEGINS = {State.ASSIGNED: "assigned", State.ON_SCENE: "arrived", State.CONFIRMED: "confirmed"}
 
 
@@ -39,10 +38,10 @@ def status_of(event: Event, question: Question | None, now: float) -> m.EventSta
         severity=event.severity,
         confidence=round(max(0.0, min(event.confidence, 1.0)), 6),
         event_state=event.state.value.replace(" ", "_"),
-        age=_span(times.get("detected", now), now),
-        state_for=_span(state_since(event), now),
+        age=sent_time(now - times.get("detected", now)),
+        state_for=sent_time(now - state_since(event)),
         decisions=handling.decisions,
-        closed_for=None if event.open else _span(times.get("closed", now), now),
+        closed_for=None if event.open else sent_time(now - times.get("closed", now)),
         waits_for=event.waits_for if event.open else None,
         responder=event.responder if looks else None,
         operator=event.operator if looks else None,
@@ -71,13 +70,13 @@ def by_whom(choice: Choice | None, now: float) -> m.ByWhom | None:
     """Return the author of a choice; None if nobody chose."""
     if choice is None:
         return None
-    return m.ByWhom(choice.author, choice.label[:64], _span(choice.time, now))
+    return m.ByWhom(choice.author, choice.label[:64], sent_time(now - choice.time))
 
 
 def _last(choice: Choice | None, now: float) -> m.LastDecision | None:
     if choice is None:
         return None
-    ago = _span(choice.time, now)
+    ago = sent_time(now - choice.time)
     return m.LastDecision(
         choice.author, choice.label[:64], choice.action, ago, choice.reason[:256] or None
     )
@@ -86,12 +85,8 @@ def _last(choice: Choice | None, now: float) -> m.LastDecision | None:
 def _proposed(question: Question | None, now: float) -> m.Proposed | None:
     if question is None:
         return None
-    arrival = _span(now, question.expected)
-    return m.Proposed(question.device, question.task, arrival, _span(now, question.until))
-
-
-def _span(start: float, end: float) -> float:
-    return max(0.0, min(end - start, LONGEST))
+    arrival = sent_time(question.expected - now)
+    return m.Proposed(question.device, question.task, arrival, sent_time(question.until - now))
 
 
 def _written(status: m.EventStatus) -> int:

@@ -13,6 +13,7 @@ from enum import StrEnum
 
 from dva_sim.core.orders import Orders
 from dva_sim.core.sessions import Send, Sessions
+from dva_sim.core.wire_size import sent_time
 from dva_sim.protocol import messages as m
 
 ANSWER_WITHIN = 30.0  # a holder that has not answered so long after it was asked declines [s]
@@ -20,7 +21,6 @@ STOP_WITHIN = 30.0  # a robot that is not seen to stand by then is not handed ov
 FETCH_WITHIN = 30.0  # whoever has not come for it by then wants it no longer [s]
 DECLINED_FOR = 10.0  # a holder that has declined is not asked again for so long [s]
 STANDING = 0.02  # [m/s, rad/s]
-LONGEST = 1e6  # no longer time is told [s]
 
 
 class Step(StrEnum):
@@ -80,7 +80,7 @@ class Handovers:
 
     def _named(self, device: str, held_for: float) -> m.Holder:
         label = self.orders.label_of(device)
-        return m.Holder(device, label, max(0.0, min(held_for, LONGEST)))
+        return m.Holder(device, label, sent_time(held_for))
 
     def _noted(self, robot: str, session: int, now: float) -> float:
         """Since when a session is known to hold a robot [s]."""

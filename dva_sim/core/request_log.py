@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Final
 
-from dva_sim.core.wire_size import LIST_BYTES, xml_size
+from dva_sim.core.wire_size import LIST_BYTES, sent_time, xml_size
 from dva_sim.protocol import limits
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.exchange import LOW_BITS
@@ -23,7 +23,6 @@ MOST_LISTED: Final = 32  # of one answer
 KEPT_FOR: Final = 60.0  # after the last question for them, as a `DevSub` [s]
 SHOWN_BYTES: Final = 4096  # of a request [B]
 ENTRY_BYTES: Final = 280  # of one request without its bytes and the text of its answer, at most [B]
-LONGEST: Final = 1e6  # no longer time is told [s]
 _NAMES: Final = "|".join(
     sorted(name for name in limits.names() if limits.types_of(name) & {"Session", "SessionID"})
 )
@@ -98,10 +97,10 @@ def _entry(request: KeptRequest, now: float) -> m.LoggedRequest:
     took = request.service_time
     return m.LoggedRequest(
         request_number=request.number,
-        ago=max(0.0, min(now - request.arrived, LONGEST)),
+        ago=sent_time(now - request.arrived),
         size=request.size,
         request=b64encode(without_sessions(request.data)).decode(),
-        service_time=None if took is None else max(0.0, min(took, LONGEST)),
+        service_time=None if took is None else sent_time(took),
         code=None if reply is None else reply.code,
         text=None if reply is None else reply.text or None,
     )

@@ -64,7 +64,7 @@ class ServedDva:
 
 
 class Beside(Protocol):
-    """Something that runs beside a DVA."""
+    """Program that runs beside a DVA."""
 
     def begin(self, dva: ServedDva) -> None:
         """Begin once the DVA listens."""

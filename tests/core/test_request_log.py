@@ -21,7 +21,7 @@ SESSION = 17 << 32 | 0xDEAD_BEEF
 
 
 def filled(count: int, data: bytes = b"<msg>", reply: m.Reply | None = None) -> KeptRequests:
-    """A log of so many requests, one a second, for which somebody has asked at 0 s."""
+    """Return a log that was asked for at 0 s, with one request a second."""
     log = KeptRequests()
     log.above(0, 0.0)
     for second in range(1, count + 1):

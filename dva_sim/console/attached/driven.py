@@ -8,7 +8,6 @@ from typing import Final
 from typing_extensions import override
 
 from dva_sim.agents.device import AgentDevice
-from dva_sim.agents.operator.attention import OperatorSetup
 from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.strategies import Reach
 from dva_sim.agents.robot.controller import Mode
@@ -21,7 +20,8 @@ from dva_sim.console.views.things import UNKNOWN_ROBOT
 from dva_sim.core.registry import OPERATOR
 from dva_sim.network.patterns import Pattern, load_pattern
 from dva_sim.protocol import messages as m
-from dva_sim.simulation.scenario import Scenario, command_timeout_s, phone_profile
+from dva_sim.simulation.full.control_room import setup_by
+from dva_sim.simulation.scenario import Scenario, phone_profile
 
 REACH: Final = Reach(UNKNOWN_ROBOT["max_speed_mps"], UNKNOWN_ROBOT["max_turn_rate_radps"])
 
@@ -55,17 +55,7 @@ class DrivenAttached(DrivenSystem):
         self.seating = Seating(self._make_seat, self._console(scenario), lambda _: None)
 
     def _console(self, scenario: Scenario) -> Console:
-        command = scenario.command
-        setup = OperatorSetup(
-            pattern=self._pattern_for,
-            window=command.window,
-            heeds=command.heeds,
-            rate_hz=command.rate_hz,
-            timeout=command_timeout_s(scenario),
-            attempts=command.attempts,
-            guarded=False,
-            topic=lambda _: None,
-        )
+        setup = setup_by(scenario, pattern=self._pattern_for, topic=lambda _: None)
         return Console(setup=setup, phone=phone_profile(scenario), reach=self.reach)
 
     def _pattern_for(self, robot: str) -> Pattern:

@@ -245,7 +245,7 @@ class Driving:
         robots = self._known_robots(line)
         device = self._system.emergency_device if own is None else own.device
         self._system.note_emergency(robots, device, client)
-        # Who drives a robot from here learns of its end at once, whoever pressed the button.
+        # Drivers at this console learn at once that somebody has stopped their robot.
         for person in self._seating.persons.values():
             if person is not own:
                 person.ended_by_others(robots)

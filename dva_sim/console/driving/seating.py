@@ -17,7 +17,7 @@ LAST_WORDS = 0.2  # of the run's time, for robots that are told to stop [s]
 
 
 class Seating:
-    """All seats, with and without somebody in them.
+    """Seats of a console, taken and free.
 
     Args:
         make: Function that returns the device of a new seat, by its number from 1.

@@ -73,11 +73,11 @@ class RunBench:
         on_result(True, "the server is stopped")
 
     def let_decide(self, then: Callable[[], object]) -> None:
-        """See `Bench`: each person has a control room with a role of its own."""
+        """Call `then` at once: each person has a control room with its own role."""
         then()
 
     def let_nobody_decide(self) -> None:
-        """See `Bench`: a person who leaves takes the control room along."""
+        """Do nothing: the control room of a person who leaves is gone as well."""
 
 
 class DvaPages(ServerActions):

@@ -219,7 +219,12 @@ class Pages:
         except NoPictures as error:
             self._cameras.leave(viewer)
             return problem(503, f"no picture: {error}")
-        return PictureStream(camera.pictures(), partial(self._cameras.leave, viewer))
+
+        def leave() -> None:
+            self._cameras.leave(viewer)
+            camera.writer.close()  # also if the viewer left before the first picture
+
+        return PictureStream(camera.pictures(), leave)
 
     async def still(self, request: Request) -> Response:
         """`GET /camera/LABEL.jpg`: one picture of a robot's camera."""

@@ -23,7 +23,7 @@ Digests = dict[str, str]
 
 
 class SampledRun(NamedTuple):
-    """One of the few runs.
+    """Run whose digest is kept, to be compared with the same run of another version.
 
     Attributes:
         job: The run.

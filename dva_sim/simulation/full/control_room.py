@@ -31,6 +31,7 @@ from dva_sim.core.store import Store
 from dva_sim.core.travel_times import Floats, SiteKnowledge, Start, WaitingPlace
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
+from dva_sim.network.patterns import Pattern
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.simulation.full.dva_server import DvaAgent
@@ -223,16 +224,32 @@ def add_dispatcher(stage: Stage) -> ScriptedDispatcher | None:
 
 def setup_of(stage: Stage, scenario: Scenario) -> OperatorSetup:
     """Pattern, rate and time-outs of operators, for a scenario with the link as it is now."""
+    return setup_by(scenario, pattern=stage.pattern_for, topic=stage.cameras.topic)
+
+
+def setup_by(
+    scenario: Scenario,
+    *,
+    pattern: Callable[[str], Pattern],
+    topic: Callable[[str], str | None],
+) -> OperatorSetup:
+    """Return what operators of a scenario drive with.
+
+    Args:
+        scenario: Rates and time-outs.
+        pattern: Function that returns the pattern of a robot's commands, by its id.
+        topic: Topic of the frames of a camera's URL; see `Cameras`.
+    """
     command = scenario.command
     return OperatorSetup(
-        pattern=stage.pattern_for,
+        pattern=pattern,
         window=command.window,
         heeds=command.heeds,
         rate_hz=command.rate_hz,
         timeout=command_timeout_s(scenario),
         attempts=command.attempts,
         guarded=scenario.control == "coordinated",
-        topic=stage.cameras.topic,
+        topic=topic,
     )
 
 

@@ -6,15 +6,13 @@ from typing import Any
 
 import pytest
 from helpers.console.attached_console import AttachedPage
+from helpers.console.foreign_device import LABEL, foreign_device
 from helpers.console.simulated_phone import PhonePage
 from helpers.wording import unnamed
 
-from dva_sim.agents.device import STATUS, AgentDevice
-from dva_sim.core.registry import ROBOT
+from dva_sim.agents.device import STATUS
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.run import Run
-
-FOREIGN = "AA:BB:CC:00:00:01"
 
 
 class ForeignRobot:
@@ -24,7 +22,7 @@ class ForeignRobot:
         run: Run of the DVA at which it registers.
     """
 
-    label = "theirs"
+    label = LABEL
 
     def __init__(self, run: Run) -> None:
         ours = run.dva.device
@@ -32,18 +30,7 @@ class ForeignRobot:
         self.heard: list[type] = []
         self._here = m.Position(*ours.frame.to_latlon(1.0, 1.0))
         self._mode = "Idle"
-        self._device = AgentDevice(
-            id_tag=FOREIGN,
-            label=self.label,
-            device_type=ROBOT,
-            address="192.0.2.7",
-            dva=ours.id_tag,
-            network=run.network,
-            recorder=run.stage.recorder,
-            frame=ours.frame,
-            timeout=ours.timeout,
-            attempts=ours.attempts,
-        )
+        self._device = foreign_device(run)
         self._device.serve(self._answer)
         self._device.register()
         run.clock.every(1.0, self._tell)

@@ -1,18 +1,16 @@
 """The tables of a session are written whenever a participant of any kind leaves it."""
 
 import pytest
+from helpers.console.foreign_device import FOREIGN, LABEL, foreign_device
 from helpers.console.simulated_phone import PhonePage
 
-from dva_sim.agents.device import AgentDevice
 from dva_sim.console.world.kept_results import KeptResults
-from dva_sim.core.registry import ROBOT
 from dva_sim.experiments.results.results import Results
 from dva_sim.protocol import messages as m
 from dva_sim.ros.gateway import RosGateway
 
 SHORT = 1.0  # before the end [s]
 LONG = 150.0  # after that the DVA and the console have forgotten a participant that left [s]
-FOREIGN = "AA:BB:CC:00:00:01"
 
 
 class Phone:
@@ -101,23 +99,10 @@ class RosClient:
 class ForeignRobot(RosClient):
     """A robot of another make, driven by a client of ROS, that goes away."""
 
-    robot = "theirs"
+    robot = LABEL
 
     def __init__(self, page):
-        run = page.world.run
-        ours = run.dva.device
-        self.device = AgentDevice(
-            id_tag=FOREIGN,
-            label="theirs",
-            device_type=ROBOT,
-            address="192.0.2.7",
-            dva=ours.id_tag,
-            network=run.network,
-            recorder=run.stage.recorder,
-            frame=ours.frame,
-            timeout=ours.timeout,
-            attempts=ours.attempts,
-        )
+        self.device = foreign_device(page.world.run)
         self.device.serve(lambda message: m.Reply(message.message_id, m.OK, ""))
         self.device.register()
         super().__init__(page)

@@ -26,7 +26,7 @@ def becomes(true: Callable[[], object]) -> bool:
 
 
 class Patient:
-    """Something on a clock of its own, which lets time pass."""
+    """Test subject with its own clock, which lets time pass."""
 
     clock: Any
     step_s = 0.01
