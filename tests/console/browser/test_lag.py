@@ -52,6 +52,7 @@ def test_silence_makes_the_page_look_old(fake, page):
     silent: list[bool] = []
     sockets_of(page, "state", lambda text: None if silent else text)
     page.goto(f"{fake(*SMALL).drive}#/map")
+    expect(page.locator(".map-canvas")).to_have_count(3)
     expect(page.locator(".age")).to_have_text(re.compile(r"^data \d+\.\d s old$"))
     silent.append(True)
 
