@@ -1,7 +1,9 @@
-"""Requests and decisions of control rooms: allowed by role, carried out once, and recorded.
+"""Requests and decisions about events: allowed by role, carried out once, and recorded.
 
-People decide; the rules hold all the same: an event is in one state, has one responder and loses
-no time of its own, and nobody acts on a robot without its permission. The policy only advises.
+Control rooms send them, and so may any other device, such as a phone: what each may is a matter of
+its role alone. People decide; the rules hold all the same: an event is in one state, has one
+responder and loses no time of its own, and nobody acts on a robot without its permission. The
+policy only advises.
 """
 
 from __future__ import annotations
@@ -85,13 +87,11 @@ class ControlRooms:
     # --- what comes in -----------------------------------------------------------------
 
     def answer(self, body: ControlRoomBody, sender: m.Device, now: float) -> DvaAnswer:
-        """Answer what a control room has asked, or decided."""
+        """Answer what a device has asked, or decided."""
         need, action = NEEDS.get(type(body), (R.SUPERVISE, ""))
         if not action:
             name = type(body).__name__
             return DvaAnswer(m.NOT_SUPPORTED, f"{name} is what the DVA says")
-        if sender.device_type != CONTROL_ROOM:
-            return DvaAnswer(m.NOT_PERMITTED, f"{sender.label} is no control room")
         if (refusal := self.may(sender, need, action)) is not None:
             return self._refuse(body, sender, action, m.NOT_PERMITTED, refusal, now)
         match body:
@@ -110,7 +110,7 @@ class ControlRooms:
         return self._about_event(body, sender, action, now)
 
     def may(self, sender: m.Device, need: ControlRoomRole, action: str) -> str | None:
-        """Return why a control room may not do something, or None."""
+        """Return why a device may not do something, or None."""
         role = self._roles.of(sender.id_tag)
         if role.includes(need):
             return None

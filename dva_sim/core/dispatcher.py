@@ -27,7 +27,7 @@ from dva_sim.core.dispatch.situation import (
 from dva_sim.core.events import Event, State
 from dva_sim.core.orders import Orders
 from dva_sim.core.questions import Questions
-from dva_sim.core.registry import CONTROL_ROOM, ROBOT, DeviceEntry, Registry
+from dva_sim.core.registry import ROBOT, DeviceEntry, Registry
 from dva_sim.core.roles import ControlRoomRole, Roles
 from dva_sim.core.sessions import DvaAnswer, Send, Sessions
 from dva_sim.core.situation_builder import PolicyView, SituationBuilder, same_place
@@ -226,10 +226,14 @@ class Dispatcher:
         return self.questions.ask(event, _task_of(choice, view), device.id_tag, way, now)
 
     def somebody_decides(self) -> bool:
-        """Return True if a control room is connected whose people may decide."""
-        rooms = self.orders.registry.of_type(CONTROL_ROOM)
-        least = ControlRoomRole.DISPATCH
-        return any(self.roles.of(room.device.id_tag).includes(least) for room in rooms)
+        """Return True if a device is there whose people may decide."""
+        entries = self.orders.registry.entries
+        return any(
+            role.includes(ControlRoomRole.DISPATCH)
+            and (entry := entries.get(device)) is not None
+            and not entry.silent
+            for device, role in self.roles.known.items()
+        )
 
     def _note(self, event: Event, choice: Assignment, view: PolicyView, now: float) -> None:
         """The policy has decided: a fact, and what people are compared with later."""

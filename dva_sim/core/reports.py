@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dva_sim.core.control_rooms import ControlRooms
 from dva_sim.core.dispatcher import Dispatcher
 from dva_sim.core.events import Cause, Event, EventTable, State, apart
-from dva_sim.core.registry import CONTROL_ROOM, ROBOT, DeviceEntry
+from dva_sim.core.registry import CONTROL_ROOM, DRIVERS, ROBOT, DeviceEntry
 from dva_sim.core.roles import ControlRoomRole
 from dva_sim.core.sensing import Sensing
 from dva_sim.core.sessions import DvaAnswer, Send
@@ -75,17 +75,25 @@ class Reports:
     # --- by anybody ----------------------------------------------------------------------
 
     def sighted(self, source: DeviceEntry, body: m.EventReport, now: float) -> DvaAnswer:
-        """Book what a device sees that was not sent; a control room needs a role for it."""
+        """Book what a device sees that was not sent; a control room needs a role for it.
+
+        A device by which people report gets the event in return, and can follow it from then on.
+        """
         device = source.device
-        if device.device_type != CONTROL_ROOM:
+        if device.device_type not in DRIVERS:
             return self._sighted(device.id_tag, body, now)
-        need = ControlRoomRole.DRIVE
-        if (text := self.control_rooms.may(device, need, "report an event")) is not None:
-            return DvaAnswer(m.NOT_PERMITTED, text)
+        is_room = device.device_type == CONTROL_ROOM
+        if is_room:
+            refusal = self.control_rooms.may(device, ControlRoomRole.DRIVE, "report an event")
+            if refusal is not None:
+                return DvaAnswer(m.NOT_PERMITTED, refusal)
         answer = self._sighted(device.id_tag, body, now)
-        if (event := self.events.near(body.kind, body.position)) is not None:
+        event = self.events.near(body.kind, body.position)
+        if event is None:
+            return answer
+        if is_room:
             self.control_rooms.raised(event, device, now)
-        return answer
+        return replace(answer, content=self.control_rooms.event_status(event, now))
 
     def _sighted(self, source: str, body: m.EventReport, now: float) -> DvaAnswer:
         if body.finding == "refuted":

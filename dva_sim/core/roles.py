@@ -1,4 +1,4 @@
-"""Roles of control rooms, assigned by configuration; no device can claim one.
+"""Roles of control rooms and of any other device, by configuration; no device can claim one.
 
 A role goes with the id of a device: with keys an id is proven, without them anybody can claim
 to be anybody, as everywhere.
@@ -11,7 +11,7 @@ from enum import StrEnum
 
 
 class ControlRoomRole(StrEnum):
-    """Role of a control room; each includes those before it."""
+    """Role of a control room, or of another device; each includes those before it."""
 
     LOOK = "look"
     DRIVE = "drive"
@@ -26,7 +26,7 @@ class ControlRoomRole(StrEnum):
 
 @dataclass
 class Roles:
-    """Role of each control room: by configuration, or by the process that runs the DVA.
+    """Role of each device: by configuration, or by the process that runs the DVA.
 
     Attributes:
         known: Role by id of the device; others may look.
@@ -35,7 +35,7 @@ class Roles:
     known: dict[str, ControlRoomRole] = field(default_factory=dict)
 
     def of(self, device: str) -> ControlRoomRole:
-        """The role of a control room, by its id."""
+        """Return the role of a device, by its id."""
         return self.known.get(device, ControlRoomRole.LOOK)
 
     def appoint(self, device: str, role: ControlRoomRole | str) -> None:

@@ -10,8 +10,8 @@ import zmq
 from client import DVA, field
 
 
-def listen(address):
-    """Return a socket that gets the heartbeats of the DVA at that address."""
+def listen(address, topic):
+    """Return a socket that gets what the DVA at that address publishes on a topic."""
     socket = zmq.Context.instance().socket(zmq.SUB)
     # Without probes a DVA whose machine lost its power and restarted would stay silent.
     socket.setsockopt(zmq.TCP_KEEPALIVE, 1)
@@ -19,12 +19,12 @@ def listen(address):
     socket.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
     host, port = address.split(":")
     socket.connect(f"tcp://{host}:{int(port) + 1}")
-    socket.subscribe("heartbeat|")
+    socket.subscribe(topic)
     return socket
 
 
 if __name__ == "__main__":
-    beats, heard = listen(sys.argv[1]), time.monotonic()
+    beats, heard = listen(sys.argv[1], "heartbeat|"), time.monotonic()
     while True:
         if beats.poll(1000):
             _, message = beats.recv_multipart()

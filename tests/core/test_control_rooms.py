@@ -102,18 +102,48 @@ def test_a_role_allows_what_it_includes_and_nothing_else(role, body, needs):
         assert f"needs {needs}" in reply.text
 
 
-def test_a_control_room_of_which_the_dva_was_told_nothing_may_look():
+UNLISTED = "02:00:00:07:00:09"
+TYPES = ("ControlRoom", "TeleOp", "Teleoperation", "Remote Control", "Guard", "Sensor", "Robot")
+
+
+@pytest.mark.parametrize("kind", TYPES)
+def test_a_device_of_which_the_dva_was_told_nothing_may_look_and_no_more(kind):
     office = staffed()
-    office.register("02:00:00:07:00:09", "ControlRoom")
-    reply, _ = decide(office, m.GetDispatch(), room="02:00:00:07:00:09")
-    assert reply.content == m.DispatchStatus("automatic", 60.0, None, "look")
-
-
-def test_who_is_no_control_room_decides_nothing_whatever_it_is_called():
-    office = Office(roles={OPERATOR: "supervise"})
     office.fire(12)
-    assert decide(office, m.FalseAlarm(1, "toast"), room=OPERATOR)[0].code == m.NOT_PERMITTED
+    office.register(UNLISTED, kind)
+    reply, _ = decide(office, m.GetDispatch(), room=UNLISTED)
+    assert reply.content == m.DispatchStatus("automatic", 60.0, None, "look")
+    reply, _ = decide(office, m.GetEventList(), room=UNLISTED)
+    assert [status.event_id for status in reply.content.events] == [1]
+    reply, _ = decide(office, m.FalseAlarm(1, "toast"), room=UNLISTED)
+    assert (reply.code, "needs dispatch" in reply.text) == (m.NOT_PERMITTED, True)
     assert office.event().open
+
+
+@pytest.mark.parametrize("kind", ["TeleOp", "Remote Control"])
+def test_a_phone_decides_as_its_role_allows_and_is_asked_first(kind):
+    office = Office(roles={UNLISTED: "dispatch"}, ask_first=True)
+    office.register(UNLISTED, kind)
+    office.fire(12)
+    assert office.event().state is State.PENDING
+    assert decide(office, m.FalseAlarm(1, "toast"), room=UNLISTED)[0].code == m.OK
+    assert office.event().state is State.REFUTED
+
+
+@pytest.mark.parametrize(
+    ("kind", "follows"),
+    [("TeleOp", True), ("Remote Control", True), ("Sensor", False), ("Robot", False)],
+)
+def test_people_who_report_an_event_get_its_number_and_state(kind, follows):
+    office = staffed()
+    office.register(UNLISTED, kind)
+    report = m.EventReport(None, "flood", east(30), 0.5, 0.9, "detected")
+    reply, _ = decide(office, report, room=UNLISTED)
+    if follows:
+        assert (reply.content.event_id, reply.content.kind) == (1, "flood")
+        assert reply.content.event_state == office.event().state
+    else:
+        assert (reply.code, reply.content) == (m.OK, None)
 
 
 @pytest.mark.parametrize(("role", "code"), [("dispatch", m.NOT_PERMITTED), ("supervise", m.BUSY)])

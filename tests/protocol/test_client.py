@@ -42,10 +42,10 @@ def scenario_of(name="drive-to-event", changes=QUIET):
     return scenarios.build(scenarios.load(name), changes)
 
 
-def a_dva(network, scenario):
+def a_dva(network, scenario, attended=False):
     """A DVA, and the world of its devices."""
     join = lambda kind, number: network.join(id_of(kind, number))  # noqa: E731
-    stage = Stage(scenario, 1, network, Recorder(), join)
+    stage = Stage(scenario, 1, network, Recorder(), join, attended=attended)
     dva, field = add_dva(stage), Field(stage)
     field.populate()
     return dva, field
@@ -65,7 +65,8 @@ def run(code, dva, folder, *words):
     """Output of a program that gets the address of a DVA."""
     program = folder / "program.py"
     program.write_text(code)
-    shutil.copy(CLIENTS / "client.py", folder)
+    for module in ("client.py", "heartbeats.py"):
+        shutil.copy(CLIENTS / module, folder)
     process = subprocess.Popen(
         [sys.executable, str(program), dva.device.address, *words],
         stdout=subprocess.PIPE,
@@ -143,6 +144,15 @@ def test_the_control_room_of_the_specification_acknowledges_and_sends_as_propose
     event = dva.core.events.get(1)
     assert event.handling.acknowledged.author == me
     assert [f.overrides for f in dva.facts if f.action == "assign"] == [False]
+
+
+def test_the_phone_of_the_specification_reports_an_event_and_follows_it(network, tmp_path):
+    changes = QUIET | {"dispatch.escalate_after_s": 2}
+    dva, _ = a_dva(network, scenario_of(changes=changes), attended=True)
+    dva.start()
+    out, err = run((CLIENTS / "phone.py").read_text(), dva, tmp_path)
+    told = list(dict.fromkeys(out.splitlines()))
+    assert (told, err) == (["event 1 is pending", "event 1 was escalated"], "")
 
 
 def test_a_client_of_another_make_hears_the_heartbeats_of_the_dva(network, tmp_path):

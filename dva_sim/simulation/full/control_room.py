@@ -66,7 +66,8 @@ def add_dva(
     """
     draw = stage.streams["dva/sessions"]
     permissions = permissions or Permissions(lambda: int(draw.integers(2**LOW_BITS)))
-    return DvaAgent(stage.device("dva", 1), make_core(stage, permissions), memory, keep_events)
+    core = make_core(stage, permissions)
+    return DvaAgent(stage.device("dva", 1), core, memory, keep_events, is_public=stage.attended)
 
 
 def make_core(stage: Stage, permissions: Permissions) -> Dva:

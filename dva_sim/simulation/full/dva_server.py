@@ -55,6 +55,10 @@ class DvaAgent:
     Args:
         device: Its identity and ways to talk.
         core: Core that makes the decisions.
+        memory: State that survives it.
+        keep_events: True to keep all past events, for a recording.
+        is_public: True if devices may join that the scenario does not know: any of them may listen
+            to what it publishes.
 
     Attributes:
         beats: Heartbeats heard, by device.
@@ -67,7 +71,12 @@ class DvaAgent:
     """
 
     def __init__(
-        self, device: AgentDevice, core: Dva, memory: Store | None = None, keep_events: bool = True
+        self,
+        device: AgentDevice,
+        core: Dva,
+        memory: Store | None = None,
+        keep_events: bool = True,
+        is_public: bool = False,
     ) -> None:
         self.device = device
         self.core = core
@@ -77,6 +86,7 @@ class DvaAgent:
         self._asks = core.dispatcher.questions.asks
         self._memory = memory
         self._keep_events = keep_events
+        self._is_public = is_public
         self._last_reported: dict[int, State] = {}
         self._policy_failures = 0
         self.leave_after = device.timeout
@@ -346,16 +356,16 @@ class DvaAgent:
             if self._keep_events:
                 self.events[event.number] = event
             self._tell(event)
-        self._tell_control_rooms(changed)
+        self._publish_news(changed)
 
-    def _tell_control_rooms(self, changed: Iterable[Event]) -> None:
-        """Publish what is new, if anybody is there who listens for it; facts are kept anyway."""
+    def _publish_news(self, changed: Iterable[Event]) -> None:
+        """Publish what is new, if anybody may listen for it; facts are kept anyway."""
         core = self.core
         now = self.device.clock.now
         facts = self.core.trail.take()
         for fact in facts:
             self.on_fact(fact)
-        if not any(core.registry.of_type(CONTROL_ROOM)):
+        if not self._is_public and not any(core.registry.of_type(CONTROL_ROOM)):
             return
         for event in changed:
             self.device.publish(EVENT, core.control_rooms.event_status(event, now))

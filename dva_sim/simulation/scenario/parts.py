@@ -463,7 +463,7 @@ class DvaConfig(Config):
         sensor_rate_hz: Rate at which it requests their values.
         supervisors: Operators who may take a robot from its holder, by label or id.
         control_rooms: Roles of control rooms, `look`, `drive`, `dispatch` or `supervise`, by label,
-            such as `control-room-1`, or id. Others may look.
+            such as `control-room-1`, and of other devices by id. Others may look.
     """
 
     sensors: tuple[Literal["temperature", "smoke", "gas"], ...] = ()
