@@ -33,6 +33,7 @@ EMERGENCY = "emergency|"
 EVENT = "event|"
 AUDIT = "audit|"
 HEARTBEAT_PERIOD = 2.0  # design: [s]
+FIRST_WORD = 2.0  # design: after it a DVA that people have named is said not to answer [s]
 REGISTER_AGAIN = 2.0  # design: pause after a registration that was not answered, or refused [s]
 REPORT_AGAIN = 5.0  # design: pause after a finding that the DVA could not keep [s]
 LONGEST_BID = 1e6  # design: no offer to go somewhere is longer [s]
@@ -134,6 +135,16 @@ class AgentDevice:
             hear = self._on_dva_beat
             self._dva_beats = self.network.subscribe(self.id_tag, self.dva, HEARTBEAT, hear)
         self.clock.every(HEARTBEAT_PERIOD, partial(self._heartbeat, self._life))
+
+    def look_for_dva_at(self, address: str) -> None:
+        """Name an address when telling of the DVA, and tell soon if nobody answers there."""
+        self.dva_address = address
+        self.clock.call_after(FIRST_WORD, self._expect_dva)
+
+    def _expect_dva(self) -> None:
+        if self.dva_watch.heard is None:  # long before all attempts have failed
+            self.dva_watch.failed()
+            self._look_for_dva()
 
     def register_once(
         self, on_reply: Callable[[m.Reply], object], on_failure: Callable[[], object]

@@ -60,7 +60,8 @@ class Reports:
         """Book the progress of an order."""
         event = self.dispatcher.orders.engaged.find(device, body.event_id)
         if event is None or not self.dispatcher.orders.has_order(event, device):
-            text = f"device {device} has no order for event {body.event_id}"
+            label = self.dispatcher.orders.label_of(device)
+            text = f"{label} has no order for event {body.event_id}"
             return DvaAnswer(m.UNKNOWN_EVENT, text)
         sends: list[Send] = []
         if body.state == "departed":

@@ -72,7 +72,7 @@ class RobotAccess:
         wish = m.PermissionRequest(body.device, body.level, sensors)
         granted = self._sessions.grant(robot.device, asker, wish)
         if granted is None:
-            return DvaAnswer(m.BUSY, f"robot {body.device} is held by another")
+            return DvaAnswer(m.BUSY, f"{robot.device.label} is held by another")
         content, sends = granted
         if body.level != "sensors":
             self._handovers.granted(body.device, content.session, now)

@@ -212,8 +212,9 @@ def _run_part(
         if options.dva is not None and name != "dva":
             network.introduce(DVA, options.dva)
         part = make_part(name, stage, options, number, door)
-        for device in stage.devices:
-            device.dva_address = options.dva or ""
+        if options.dva is not None:
+            for device in stage.devices:
+                device.look_for_dva_at(options.dva)
         recorder.here(d.id_tag for d in stage.devices if recorder.is_own(d.id_tag))
         if service is not None and isinstance(part, WorldPart):
             part.film(service)

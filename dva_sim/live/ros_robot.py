@@ -108,7 +108,7 @@ def run_ros_robot(options: RobotOptions, say: Say) -> None:
             pictures.serve(robot.agent.device.label)
             robot.on_picture = pictures.show
         network.introduce(DVA, options.dva)
-        robot.agent.device.dva_address = options.dva
+        robot.agent.device.look_for_dva_at(options.dva)
         robot.agent.device.other_id = OTHER_NUMBER
         writer(f"Robot: {robot.agent.device.address}")
         clock.every(TELL_PERIOD, lambda: _say_news(recorder, writer))

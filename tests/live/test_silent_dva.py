@@ -56,7 +56,7 @@ def simulated(absent: bool, _: Path, at_end: ExitStack) -> Listener:
     def story() -> list[str]:
         return [moment.what for moment in run.recorder.timeline if moment.who == "robot-1"]
 
-    run.field.robots[robot].device.dva_address = "10.0.0.1:5600"
+    run.field.robots[robot].device.look_for_dva_at("10.0.0.1:5600")
     if absent:
         silence()
     else:
@@ -69,7 +69,7 @@ def bridged(absent: bool, _: Path, at_end: ExitStack) -> Listener:
     at_end.callback(machine.stop)
     robot = BridgedRobot(machine)
     at_end.callback(robot.close)
-    robot.agent.device.dva_address = "10.0.0.1:5600"
+    robot.agent.device.look_for_dva_at("10.0.0.1:5600")
     if absent:
         robot.dva.leave(DVA)
     else:
@@ -126,6 +126,16 @@ def test_a_dva_that_never_answered_is_called_that_and_nobody_is_said_to_obey_as_
     assert ":5600" in line or "198.51.100.1" in line
     assert listener.says("silent") == []
     assert listener.says("as before") == []
+
+
+def test_a_robot_says_within_three_seconds_that_nobody_answers_where_it_was_told_to_look():
+    run = Run(build({"robot": {"count": 1}, "guard": {"count": 0}}, {}), seed=1)
+    run.field.robots[id_of("robot", 1)].device.look_for_dva_at("10.0.0.1:5600")
+    run.network.leave(DVA)
+    run.dva.silence(True)
+    run.clock.run(3.0)
+    said = [moment.what for moment in run.recorder.timeline if moment.who == "robot-1"]
+    assert said == ["no DVA has answered at 10.0.0.1:5600 yet: it was never registered"]
 
 
 @WHO
