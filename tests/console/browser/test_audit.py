@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -15,12 +16,12 @@ from dva_sim.recordings.audit_log import verify_plain
 
 def decided(page: Page) -> None:
     """Somebody acknowledges the first event and overrules the policy."""
-    page.get_by_role("button", name="Event 1", exact=True).click()
+    page.get_by_role("button", name=re.compile("^Event 1 ")).click()
     page.get_by_role("button", name="Acknowledge").click()
-    expect(page.get_by_role("button", name="Acknowledge")).to_be_disabled()
-    page.get_by_label("guard-1").check()
+    expect(page.get_by_role("button", name="Acknowledge")).to_have_count(0)
+    page.get_by_role("radio", name="guard-1").check()
     page.get_by_label("Reason or note").fill("=1+1, a person has to look")
-    page.get_by_role("button", name="Assign").click()
+    page.get_by_role("button", name="Send guard-1").click()
     expect(page.get_by_role("region", name="Event in hand")).to_contain_text("assign by")
 
 

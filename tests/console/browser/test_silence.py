@@ -24,7 +24,7 @@ HAND = {"width": 360, "height": 740, "has_touch": True, "is_mobile": True}
 PAGES: dict[str, tuple[str, ...]] = {
     "drive": (".watchdog", ".stop-reason", ".picture-age", ".mode-status", ".latency .figures b"),
     "map": (".lists .state", ".card dd", ".bar .time .figure", ".bar .age"),
-    "events": (".alarm > b", ".events-table td.aside", ".facts dd"),
+    "events": (".desk-row .state small", ".facts dd", ".picture-age"),
     "robots": (".robots-page td.n",),
     "robots/robot-1": (".robot-bar .mode-status", ".sensors dd", ".view-panel b", ".picture-age"),
     "devices": (".devices-page td.n",),
@@ -39,7 +39,7 @@ PAGES: dict[str, tuple[str, ...]] = {
 TEXTS = """listed => {
   const AGE = /\\d ?(s|ms|m\\/s|rad\\/s|%|°|°C)( |$)|\\d:\\d\\d/;
   const SET = '.slider, .presets, .scale-bar, .legend, .warnings, .alerts, .log, .requests, h3, '
-    + 'dt, .chart, .raise, .link, .events-head, .robot-view, option, .station, .faults, button';
+    + 'dt, .chart, .raise, .link, .desk-head, .robot-view, option, .station, .faults, button';
   const found = new Set(document.querySelectorAll(listed.join()));
   for (const one of document.querySelectorAll('#app *')) {
     const own = [...one.childNodes].filter(n => n.nodeType === 3).map(n => n.data).join('');
@@ -167,7 +167,7 @@ CHANGE = """async pace => {
     await new Promise(done => rows.subscribe(now => now !== before && done()));
   } }"""
 AGES = """() => [Date.now() / 1000, ...[...document.querySelectorAll(
-  '.alarm > b, .events-table tr:not(.over) td:nth-child(5)')].map(one =>
+  '.alarm > b, .desk-row:not(.over) .state small')].map(one =>
     one.textContent.split(':').reduce((sum, part) => 60 * sum + Number(part), 0))]"""
 
 
@@ -189,8 +189,7 @@ def test_ages_of_alarms_and_events_follow_the_time_of_the_world(
     before = page.evaluate(AGES)
     page.clock.run_for(SILENCE_MS)
     after = page.evaluate(AGES)
-    print(before, after)
-    assert len(before) > 2
+    assert len(before) > 1
     passed, *older = [b - a for a, b in zip(before, after, strict=True)]
     assert passed >= SILENCE_MS / 1000
     later = factor * passed

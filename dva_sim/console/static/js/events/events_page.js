@@ -1,26 +1,28 @@
-/** Events page: alarms, events, the current one with its actions, and how orders are given. */
+/**
+ * Events page: what is wrong, who could go, send, see, close.
+ *
+ * Three columns: the list, the map with a picture, and the event in hand. None is below the fold.
+ */
 import { html, useEffect } from '../../vendor/preact.js';
-import { allowed, connection, control, isDispatcher, isPast, mayDispatch, maySupervise, you } from '../store.js';
+import { connection, isPast, mayDispatch, you } from '../store.js';
 import { act, ask, showRefusal } from '../net/actions.js';
-import { Choice, Field } from '../ui/fields.js';
-import { AlarmList } from './alarm_list.js';
+import { workByKeys } from './desk_keys.js';
+import { DeskHead } from './desk_head.js';
+import { DeskList } from './desk_list.js';
 import { EventPanel } from './event_panel.js';
-import { EventsTable } from './events_table.js';
 import { Raise } from './raise.js';
-import { mode, ownName, rename } from './shared.js';
-
-const MODES = /** @type {[string, string][]} */ ([
-  ['automatic', 'the policy, by itself'],
-  ['ask_first', 'people: the policy asks first'],
-]);
+import { ownName, raising } from './shared.js';
+import { Sight } from './sight.js';
 
 /** The page. */
 export function EventsPage() {
   useEffect(keepJoining, [you.value?.client, connection.value, mayDispatch.value]);
+  useEffect(workByKeys, []);
   return html`<main class="page events-page" id="main" tabindex="-1">
     <h1 class="hidden">Events</h1>
-    <div class="events-list">${!isPast.value && html`<${Head} /><${AlarmList} />`}<${EventsTable} /></div>
-    <div class="events-side"><${EventPanel} />${!isPast.value && html`<${Raise} />`}</div>
+    <div class="desk-list">${!isPast.value && html`<${DeskHead} join=${join} />`}<${DeskList} /></div>
+    <${Sight} />
+    <div class="desk-panel">${raising.value ? html`<${Raise} />` : html`<${EventPanel} />`}</div>
   </main>`;
 }
 
@@ -42,24 +44,4 @@ function keepJoining() {
   return () => {
     over = true;
   };
-}
-
-const byDva = () => `The DVA lets this console ${allowed.value}.`;
-const byAddress = () => `This address may ${you.value?.role ?? 'look'}. Those for dispatch and for
-  supervision are printed where the console was started.`;
-
-function Head() {
-  if (!mayDispatch.value) {
-    return html`<p class="soft events-head">${isDispatcher.value ? byDva() : byAddress()}</p>`;
-  }
-  const me = control.value?.rooms?.find((room) => room.client === you.value?.client);
-  const asked = control.value?.dispatch;
-  return html`<section class="events-head" aria-label="You">
-    <${Field} name="Your name" value=${ownName.value} onInput=${rename}
-      hint=${me ? `The log shows you as ${me.label}` : 'As shown in the log'} />
-    <button type="button" onClick=${join}>Use this name</button>
-    ${asked && html`<${Choice} name="Who decides" value=${mode.value} options=${MODES}
-      disabled=${!maySupervise.value} onInput=${(/** @type {string} */ to) => act('dispatch_mode', { mode: to })} />`}
-    ${asked?.switched && html`<small class="soft">set by ${asked.switched.label}</small>`}
-  </section>`;
 }

@@ -1,6 +1,6 @@
 /** Proposal panel: the policy's choice with its reason, beside all other candidates. */
 import { computed, html, signal, useEffect } from '../../vendor/preact.js';
-import { connection, mayDispatch } from '../store.js';
+import { connection, mayDispatch, modeOf, robots, rowOf } from '../store.js';
 import { act, ask as askQuietly } from '../net/actions.js';
 import { sinceSent, worldNow } from '../net/world_time.js';
 import { isOpen } from '../map/shown.js';
@@ -9,6 +9,7 @@ import { reason } from './shared.js';
 
 /** @typedef {import('../lines.js').SiteEvent} SiteEvent */
 /** @typedef {import('../lines.js').Proposal} Proposal */
+/** @typedef {import('../lines.js').Candidate} Candidate */
 
 const AGAIN_MS = 4000;
 const SOON_MS = 500; // where it could not be asked, as while the page connects
@@ -17,22 +18,42 @@ const known = signal(/** @type {Proposal & {t: number} | null} */ (null));
 const refusal = signal('');
 const wanted = signal('');
 
-/** Responder that Assign sends: the one picked, else the one proposed, else the first free one. */
+/** Candidates for the event in hand, the policy's proposal first. */
+const candidates = computed(() => known.value?.candidates ?? []);
+
+/** Responder whom the panel would send: the one picked, else the one proposed, else the first who can go. */
 export const chosen = computed(() => {
-  const proposal = known.value;
-  if (!proposal) return '';
-  const able = proposal.candidates.filter((who) => who.can);
+  const able = candidates.value.filter((who) => waysOf(who).length);
   if (able.some((who) => who.label === wanted.value)) return wanted.value;
-  return proposal.label || able.find((who) => who.free)?.label || '';
+  return known.value?.label || (able.find((who) => who.free) ?? able[0])?.label || '';
 });
 
-/** Free guard who would arrive first. */
-export const nearestGuard = computed(() => first((who) => !who.robot));
-/** Free robot that would arrive first. */
-export const nearestRobot = computed(() => first((who) => who.robot));
+/** Candidate of that name. @param {string} label */
+export const candidateOf = (label) => candidates.value.find((who) => who.label === label);
 
-/** @param {(who: import('../lines.js').Candidate) => boolean} fits */
-const first = (fits) => known.value?.candidates.find((who) => who.free && fits(who))?.label ?? '';
+/** Free robot that would arrive first. */
+export const nearestRobot = computed(() => candidates.value.find((who) => who.free && who.robot)?.label ?? '');
+
+/** Name of a candidate and the time until its arrival. @param {string} label */
+export const estimateOf = (label) => {
+  const time = candidateOf(label)?.arrival_s ?? null;
+  return time === null ? label : `${label}, ${secondsText(time)}`;
+};
+
+/**
+ * Ways to send a candidate: by the DVA's order, on a mission without a driver, or driven from this page.
+ * @param {Candidate | undefined} who
+ * @returns {string[]}
+ */
+export function waysOf(who) {
+  if (!who) return [];
+  const robot = who.robot && robots.value.find((one) => one.label === who.label);
+  const isIdle = robot && modeOf(robot.i) === 'Idle' && !rowOf(robot.i)?.holder;
+  return [who.can && 'order', isIdle && 'mission', robot && (who.can || isIdle) && 'drive'].filter((way) => typeof way === 'string');
+}
+
+/** Choose a candidate by place in the list, from 0. @param {number} place */
+export const chooseCandidate = (place) => (wanted.value = candidates.peek()[place]?.label ?? wanted.peek());
 
 /**
  * Assign a responder; an event decided on by somebody else in the meantime is left unchanged.
@@ -59,23 +80,21 @@ export function ProposalPanel({ event }) {
   const proposal = known.value?.event === event.number ? known.value : null;
   if (refusal.value) return html`<p class="warning" role="alert">No proposal: ${refusal.value}</p>`;
   if (!proposal) return html`<p class="none">Asking the policy …</p>`;
-  const rival = proposal.candidates.find((who) => who.free && who.label !== proposal.label);
   return html`<section class="proposal reported" aria-label="Proposal">
-    <p><b>${proposal.label ? `${proposal.label}, ${timeText(proposal.arrival_s)}` : 'nobody'}</b>
-      ${rival ? ` (${rival.label}: ${timeText(rival.arrival_s)}, ${rival.reason})` : ''}
-      <small>${proposal.policy}: ${proposal.reason}</small></p>
+    <p>The policy proposes <b>${proposal.label || 'nobody'}</b> <small>${proposal.policy}: ${proposal.reason}</small></p>
     ${proposal.decide_within_s !== null &&
     html`<p class="ask" role="status">The policy sends them by itself in ${secondsText(Math.max(0, proposal.decide_within_s - sinceSent(proposal)))} unless you decide.</p>`}
     <fieldset><legend>Whom to send</legend>
-      ${proposal.candidates.map((who) => html`<${Candidate} key=${who.label} who=${who} />`)}
+      ${proposal.candidates.map((who) => html`<${CandidateRow} key=${who.label} who=${who} />`)}
     </fieldset></section>`;
 }
 
-/** @param {{who: import('../lines.js').Candidate}} props */
-function Candidate({ who }) {
-  return html`<label class=${who.can ? 'candidate' : 'candidate cannot'}>
+/** @param {{who: Candidate}} props */
+function CandidateRow({ who }) {
+  const able = waysOf(who).length > 0;
+  return html`<label class=${able ? 'candidate' : 'candidate cannot'}>
     <input type="radio" name="candidate" value=${who.label} checked=${chosen.value === who.label}
-      disabled=${!who.can} onInput=${() => (wanted.value = who.label)} />
+      disabled=${!able} onInput=${() => (wanted.value = who.label)} />
     <span>${who.label}</span><span class="figure">${timeText(who.arrival_s)}</span>
     <small>${who.reason}</small></label>`;
 }

@@ -1,12 +1,11 @@
-/** Raise an event at a place: a click on the map, a room, or two numbers. */
+/** Form for an event at a place: a click on the map beside it, a room, or two numbers. */
 import { html, useState } from '../../vendor/preact.js';
-import { mayDispatch, maySteer, scene, selection } from '../store.js';
+import { maySteer, scene } from '../store.js';
 import { act } from '../net/actions.js';
-import { MapBox } from '../map/map_box.js';
 import { placeOf } from '../map/shown.js';
 import { Choice, Field, wrongNumber } from '../ui/fields.js';
 import { plain } from '../ui/words.js';
-import { place } from './shared.js';
+import { place, raising, select } from './shared.js';
 
 const pairs = (/** @type {string[]} */ names) =>
   /** @type {[string, string][]} */ (names.map((name) => [name, plain(name)]));
@@ -15,19 +14,10 @@ const SEVERITIES = pairs(['low', 'medium', 'high', 'critical']);
 
 /** The panel. */
 export function Raise() {
-  if (!mayDispatch.value) return null;
   return html`<section class="panel raise" aria-label="Raise an event">
-    <h2>Raise an event</h2>
-    <div class="map-region"><${MapBox} cones=${() => []} legend=${false} goals=${goals}
-      onPlace=${(/** @type {number} */ x, /** @type {number} */ y) => (place.value = [x, y])} /></div>
+    <h2>Raise an event</h2><p class="soft">Click on the map where it is, or choose a room.</p>
     <${Form} /></section>`;
 }
-
-/** Chosen place, as a goal on the map. */
-const goals = () => {
-  const at = place.peek();
-  return at ? [{ x: at[0], y: at[1], radius: 0.6, name: 'here' }] : [];
-};
 
 /** Place of the new event [m]: the chosen one, else where robots get in the first room, else the middle. */
 function where() {
@@ -54,7 +44,7 @@ function Form() {
     const done = await act('event_raise', { kind, severity, x_m: x, y_m: y });
     if (!done.ok) return;
     setResult(done.text);
-    if (done.event) selection.value = { kind: 'event', key: done.event };
+    if (done.event) select(done.event);
   };
   return html`<div class="report">
     <${Choice} name="Kind" value=${kind} options=${KINDS} onInput=${setKind} />
@@ -64,6 +54,7 @@ function Form() {
     <${Field} name="y, m" mode="decimal" value=${shown(y)} wrong=${wrong[1]} onInput=${set(1)} />
     <button type="button" class="wide" disabled=${!maySteer.value || Boolean(wrong[0] || wrong[1])}
       onClick=${raise}>Raise event</button>
+    <button type="button" onClick=${() => (raising.value = false)}>Cancel</button>
     <p class="soft">${wrong[0] || wrong[1] ? '' : `Location: ${placeOf({ x_m: x, y_m: y })}.`}</p>
     <p role="status" aria-label="Raised">${result}</p></div>`;
 }

@@ -1,12 +1,16 @@
-/** State of the Events page: the current event, the person's name, and the reason being typed. */
+/** State of the Events page: the list, the event in hand, the person's name, and the reason being typed. */
 import { computed, signal } from '../../vendor/preact.js';
-import { control, events, selection } from '../store.js';
+import { alarmList, control, events, selection, you } from '../store.js';
 import { eventsInOrder, isOpen } from '../map/shown.js';
+
+/** @typedef {import('../lines.js').SiteEvent} SiteEvent */
 
 const NAME_KEY = 'dva-sim-name';
 
 /** Text of the field for a reason or a note. */
 export const reason = signal('');
+/** True while a place for a new event is chosen. */
+export const raising = signal(false);
 /** Place chosen for a new event [m]. */
 export const place = signal(/** @type {[number, number] | null} */ (null));
 /** Person's name in the log; kept in this browser. */
@@ -18,14 +22,52 @@ export function rename(name) {
   localStorage.setItem(NAME_KEY, name);
 }
 
-/** Current event: the selected one, else the most severe unacknowledged one. */
+/** Label of this page's control room, as the log shows it; empty until it has joined. */
+export const ownRoom = computed(
+  () => control.value?.rooms?.find((room) => room.client === you.value?.client)?.label ?? '',
+);
+
+export const FILTERS = ['mine', 'open', 'all'];
+/** Filter of the list: the events that this person answers for, the open ones, or all. */
+export const filter = signal('open');
+
+/** @param {SiteEvent} event */
+const isMine = (event) => [event.acknowledged?.label, event.decided?.label].includes(ownRoom.value);
+
+const shelvedEvents = computed(() => new Set(alarmList.value.shelved.map((alarm) => alarm.event)));
+
+/** Open events of the list, the most severe first; shelved ones only if all are listed. */
+export const openEvents = computed(() => {
+  const open = eventsInOrder().filter(isOpen);
+  if (filter.value === 'all') return open;
+  const listed = open.filter((event) => !shelvedEvents.value.has(event.number));
+  return filter.value === 'mine' ? listed.filter(isMine) : listed;
+});
+
+/** Closed events by how they ended, the newest first. @type {import('../../vendor/preact.js').Signal<[string, SiteEvent[]][]>} */
+export const closedEvents = computed(() => {
+  const endings = /** @type {Record<string, SiteEvent[]>} */ ({});
+  for (const event of [...events.value].reverse()) {
+    if (isOpen(event) || (filter.value === 'mine' && !isMine(event))) continue;
+    (endings[event.state] ??= []).push(event);
+  }
+  return Object.entries(endings);
+});
+
+/** Event in hand: the selected one, else the most severe unacknowledged one. */
 export const inHand = computed(() => {
   const chosen = selection.value;
-  const found = chosen?.kind === 'event' && events.value.find((e) => e.number === chosen.key);
+  const found = chosen?.kind === 'event' && events.value.find((event) => event.number === chosen.key);
   if (found) return found;
   const open = eventsInOrder().filter(isOpen);
   return open.find((event) => !event.acknowledged) ?? open[0] ?? eventsInOrder()[0] ?? null;
 });
+
+/** @param {number} number of the event to take in hand */
+export function select(number) {
+  selection.value = { kind: 'event', key: number };
+  raising.value = false;
+}
 
 /** Dispatch mode, `automatic` or `ask_first`; empty until the DVA reports it. */
 export const mode = computed(() => control.value?.dispatch?.mode ?? '');

@@ -21,6 +21,14 @@ export const TEXTS = [
     ],
   },
   {
+    title: 'Events',
+    lines: [
+      'Left: what is open, the worst first; a red edge means that nobody has acknowledged it. Middle: its place, and the picture of the robot that is sent or could go. Right: what you can do.',
+      'The blue button sends whom it names: by an order of the DVA, on a mission without a driver, or driven by you.',
+      'Alarms sound once you click the loudspeaker in the bar. The title of the page counts what nobody has acknowledged.',
+    ],
+  },
+  {
     title: 'Network',
     lines: [
       'The link between the console and the robots is simulated, as in a study: delay, jitter, loss and bandwidth affect every message and picture. A striped edge marks a simulated link.',
@@ -37,5 +45,11 @@ export const KEYS = [
   ['← → or A D', 'turn, while held'],
   ['Shift', 'slowly, while held'],
   ['Arrows, + −', 'pan and zoom the map, when it has focus'],
+  ['J K', 'next and previous event of the list, on the page Events'],
+  ['1 … 9', 'choose whom to send'],
+  ['A', 'acknowledge the event in hand'],
+  ['Shift + S', 'send whom the panel names'],
+  ['Shift + T', 'take over the robot that is sent'],
+  ['R', 'write a reason or note'],
   ['?', 'this page'],
 ];

@@ -20,6 +20,7 @@ import { Icon } from '../ui/icon.js';
 import { Notices } from '../ui/notices.js';
 import { resumeStops } from '../net/emergency.js';
 import { Bar } from './bar.js';
+import { callThePerson, Strip } from './calling.js';
 import { PhoneButton, PhoneCode } from './phones.js';
 import { addressOf, page } from './route.js';
 
@@ -62,6 +63,7 @@ const BODIES = /** @type {Record<string, any>} */ ({
 export function showApp(where) {
   where.replaceChildren();
   render(html`<${App} />`, where);
+  callThePerson();
   resumeStops();
 }
 
@@ -69,7 +71,7 @@ function App() {
   const Page = BODIES[shown()];
   return html`<a class="skip" href="#main" onClick=${skip}>Skip to content</a>
     <${Bar} /><${Rail} />
-    <div class="body"><${Warnings} /><${Tour} /><${ReplayBar} />${scene.value ? html`<${Page} />` : html`<${Waiting} />`}</div>
+    <div class="body"><${Strip} /><${Warnings} /><${Tour} /><${ReplayBar} />${scene.value ? html`<${Page} />` : html`<${Waiting} />`}</div>
     <${Help} /><${PhoneCode} />`;
 }
 

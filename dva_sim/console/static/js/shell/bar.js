@@ -10,6 +10,7 @@ import { isStale, pageAge, shownTime } from '../net/world_time.js';
 import { alarms } from '../map/shown.js';
 import { Icon, SeverityMark } from '../ui/icon.js';
 import { clockText, secondsText } from '../ui/words.js';
+import { SoundButton } from './calling.js';
 import { dark, switchTheme } from './theme.js';
 import { openHelp } from '../help/help.js';
 
@@ -17,6 +18,7 @@ import { openHelp } from '../help/help.js';
 export function Bar() {
   return html`<header class="bar">
     <${Time} /><${Link} /><${Age} /><${Alarms} /><span class="gap"></span><${Who} />
+    ${!isPast.value && html`<${SoundButton} />`}
     <button type="button" class="plain" onClick=${openHelp} aria-label="Help" title="Help (?)">
       <${Icon} name="circle-question-mark" /></button>
     <button type="button" class="plain" onClick=${switchTheme}
