@@ -16,7 +16,6 @@ from rich.text import Text
 
 from dva_sim.cli.link_counts import in_words
 from dva_sim.cli.verbosity import detail, is_verbose
-from dva_sim.core.registry import DETECTOR
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live import process
 from dva_sim.live.options import check, scenario_of
@@ -24,6 +23,7 @@ from dva_sim.live.process import Report, run_part
 from dva_sim.live.supervisor import Summary, Supervisor
 from dva_sim.network.sockets import DEFAULT_PORT
 from dva_sim.options.runs import LOCALHOST, PARTS, LiveOptions
+from dva_sim.protocol.devices import DETECTOR
 from dva_sim.serving.open_port import OpenPort, open_port
 from dva_sim.simulation.full.verdicts import Verdict, refuse_unheld
 from dva_sim.simulation.scenario import contradictions

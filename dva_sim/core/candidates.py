@@ -7,13 +7,14 @@ from collections.abc import Iterator
 
 from dva_sim.core.dispatcher import Advised, Dispatcher
 from dva_sim.core.events import Event, State
-from dva_sim.core.registry import GUARD, ROBOT, DeviceEntry
+from dva_sim.core.registry import DeviceEntry
 from dva_sim.core.situation_builder import KINDS
 from dva_sim.core.travel_times import Start
 from dva_sim.core.wire_size import LIST_BYTES, xml_size
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.control_room import FREE
+from dva_sim.protocol.devices import GUARD, ROBOT
 
-FREE = "free"
 MOST_NAMED = 32
 CANDIDATE_BYTES = 200  # of one, without what is written for people [B]
 

@@ -19,12 +19,13 @@ from dva_sim.core.event_status import by_whom, event_list, status_of
 from dva_sim.core.events import LOOKING, Cause, Choice, Event, State
 from dva_sim.core.handovers import Handovers
 from dva_sim.core.permissions import Access
-from dva_sim.core.registry import CONTROL_ROOM, DRIVERS, GUARD, ROBOT, DeviceEntry
-from dva_sim.core.roles import ControlRoomRole, Roles
+from dva_sim.core.registry import DRIVERS, DeviceEntry
+from dva_sim.core.roles import Roles
 from dva_sim.core.sessions import DvaAnswer, Send
 from dva_sim.core.travel_times import Start
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.control_room import ControlRoomBody
+from dva_sim.protocol.devices import CONTROL_ROOM, GUARD, ROBOT, ControlRoomRole
 
 R = ControlRoomRole
 NEEDS: Final[dict[type, tuple[ControlRoomRole, str]]] = {

@@ -27,13 +27,14 @@ from dva_sim.core.dispatch.situation import (
 from dva_sim.core.events import Event, State
 from dva_sim.core.orders import Orders
 from dva_sim.core.questions import Questions
-from dva_sim.core.registry import ROBOT, DeviceEntry, Registry
-from dva_sim.core.roles import ControlRoomRole, Roles
+from dva_sim.core.registry import DeviceEntry, Registry
+from dva_sim.core.roles import Roles
 from dva_sim.core.sessions import DvaAnswer, Send, Sessions
 from dva_sim.core.situation_builder import PolicyView, SituationBuilder, same_place
 from dva_sim.core.travel_times import SiteKnowledge, Travel
 from dva_sim.kernel.plugins import FAILURES
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import ROBOT, ControlRoomRole
 
 DECISIONS = 4  # in a row, where one makes the next necessary
 

@@ -18,7 +18,7 @@ from dva_sim.core.events import EventTable
 from dva_sim.core.handovers import Handovers
 from dva_sim.core.orders import Orders
 from dva_sim.core.permissions import Access
-from dva_sim.core.registry import ROBOT, Registry
+from dva_sim.core.registry import Registry
 from dva_sim.core.reports import Reports
 from dva_sim.core.robot_access import RobotAccess
 from dva_sim.core.roles import Roles
@@ -27,6 +27,7 @@ from dva_sim.core.sessions import DvaAnswer, Send, Sessions
 from dva_sim.core.travel_times import SiteKnowledge, Travel
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.control_room import ControlRoomBody
+from dva_sim.protocol.devices import ROBOT
 
 Reaction = tuple[m.Reply, list[Send]]
 

@@ -11,21 +11,23 @@ from typing import Final, NamedTuple
 
 from dva_sim.core.wire_size import LIST_BYTES, xml_size
 from dva_sim.kernel.labels import distinct, look_of, with_id
+from dva_sim.protocol.devices import (
+    CONTROL_ROOM,
+    DETECTOR,
+    FORGET_AFTER,
+    GUARD,
+    OPERATOR,
+    REMOTE,
+    ROBOT,
+)
 from dva_sim.protocol.messages import Device, DeviceList, Position, Registration
 
-ROBOT = "Robot"
-GUARD = "Guard"
-OPERATOR = "TeleOp"
-DETECTOR = "Sensor"
-REMOTE = "Remote Control"  # may drive robots, and is sent no orders
-CONTROL_ROOM = "ControlRoom"  # sees and decides; may drive as its role allows
 SAME_AS = {"Teleoperation": OPERATOR}  # other names of a type
 DRIVERS = frozenset({OPERATOR, REMOTE, CONTROL_ROOM, *SAME_AS})
 LISTED = (ROBOT, OPERATOR, REMOTE, GUARD, CONTROL_ROOM)  # for devices, in this order
 DEVICE_BYTES = 175  # of one listed device without its label, at most [B]
 MOST_LISTED = 64
 MAX_DEVICES = 20_000
-FORGET_AFTER = 60.0  # without a word of it [s]
 
 
 @dataclass(slots=True)

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from dva_sim.core.control_rooms import ControlRooms
 from dva_sim.core.dispatcher import Dispatcher
 from dva_sim.core.events import Cause, Event, EventTable, State, apart
-from dva_sim.core.registry import CONTROL_ROOM, DRIVERS, ROBOT, DeviceEntry
-from dva_sim.core.roles import ControlRoomRole
+from dva_sim.core.registry import DRIVERS, DeviceEntry
 from dva_sim.core.sensing import Sensing
 from dva_sim.core.sessions import DvaAnswer, Send
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import CONTROL_ROOM, ROBOT, ControlRoomRole
 
 FOUND_WITHIN = 20.0  # farthest that a finding may be from its event [m]
 REACH = 20.0  # farthest source of what a robot's sensor measures [m]; assumed

@@ -6,10 +6,11 @@ from dva_sim.core.control_rooms import ControlRooms
 from dva_sim.core.dispatcher import Dispatcher
 from dva_sim.core.handovers import Handovers
 from dva_sim.core.permissions import Access
-from dva_sim.core.registry import CONTROL_ROOM, ROBOT, DeviceEntry
-from dva_sim.core.roles import ControlRoomRole, Roles
+from dva_sim.core.registry import DeviceEntry
+from dva_sim.core.roles import Roles
 from dva_sim.core.sessions import DvaAnswer
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import CONTROL_ROOM, ROBOT, ControlRoomRole
 
 
 class RobotAccess:

@@ -7,21 +7,8 @@ to be anybody, as everywhere.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import StrEnum
 
-
-class ControlRoomRole(StrEnum):
-    """Role of a control room, or of another device; each includes those before it."""
-
-    LOOK = "look"
-    DRIVE = "drive"
-    DISPATCH = "dispatch"
-    SUPERVISE = "supervise"
-
-    def includes(self, other: ControlRoomRole) -> bool:
-        """Return True if this role allows what the other one allows."""
-        ranks = list(ControlRoomRole)
-        return ranks.index(self) >= ranks.index(other)
+from dva_sim.protocol.devices import ControlRoomRole
 
 
 @dataclass

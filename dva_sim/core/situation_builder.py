@@ -14,9 +14,10 @@ from dva_sim.core.auctions import Auctions
 from dva_sim.core.dispatch.situation import Cover, Policy, Responder, Situation, Task
 from dva_sim.core.events import Event, State
 from dva_sim.core.orders import Orders
-from dva_sim.core.registry import GUARD, OPERATOR, ROBOT, DeviceEntry
+from dva_sim.core.registry import DeviceEntry
 from dva_sim.core.travel_times import Floats, SiteKnowledge, Start, Travel
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import GUARD, OPERATOR, ROBOT
 
 CONSIDERED = 1000  # tasks that one decision looks at, those detected longest ago
 SAME_PLACE = 3e-5  # a few metres [deg]

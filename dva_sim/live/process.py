@@ -14,7 +14,6 @@ from typing import Any, Protocol
 from dva_sim.agents.observation import OVER_ZMQ, Cameras, topic_in
 from dva_sim.cameras.screens import topic_of
 from dva_sim.cameras.service import CameraService
-from dva_sim.core.roles import ControlRoomRole
 from dva_sim.kernel.errors import DvaSimError, RunsFailed
 from dva_sim.live.options import CAMERA_PORT, scenario_of
 from dva_sim.live.parts import DvaPart, LivePart, WorldPart, make_part
@@ -24,6 +23,7 @@ from dva_sim.network.real_network import RealNetwork
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork, split_address
 from dva_sim.options.runs import LiveOptions
+from dva_sim.protocol.devices import ControlRoomRole
 from dva_sim.serving.open_port import OpenPort
 from dva_sim.serving.pipes import PipeEnd
 from dva_sim.serving.signals import caught_signals

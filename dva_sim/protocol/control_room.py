@@ -7,8 +7,11 @@ all of them are found, too.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from dva_sim.protocol.places import Position
+
+FREE: Final = "free"  # reason of a candidate that nothing holds back
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,7 +280,7 @@ class Candidate:
     Attributes:
         device: Id of a guard or robot.
         label: Label of the device.
-        reason: Reason why it can or cannot go, in words.
+        reason: `FREE`, or why it cannot go now, in words.
         arrival_in: Expected arrival [s from now]; None if unknown.
     """
 

@@ -18,10 +18,10 @@ from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.operator.steps import ask_emergency, give_back, start
 from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.agents.tilt.velocity import GivenVelocity
-from dva_sim.core.registry import ROBOT
 from dva_sim.network.messaging import Subscription
 from dva_sim.network.realtime import LiveClock
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import ROBOT
 from dva_sim.ros.mjpeg import MjpegReader
 from dva_sim.ros.published import namespace_of
 from dva_sim.simulation.full.control_room import console_of

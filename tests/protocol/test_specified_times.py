@@ -8,7 +8,8 @@ from helpers.paths import ROOT
 from dva_sim.agents import device, dva_watch
 from dva_sim.agents.operator import refusals
 from dva_sim.agents.robot import controller, robot, sensors
-from dva_sim.core import handovers, registry
+from dva_sim.core import handovers
+from dva_sim.protocol import devices
 from dva_sim.simulation.scenario import Scenario
 
 PAGE = (ROOT / "protocol/README.md").read_text(encoding="utf-8")
@@ -30,7 +31,7 @@ def passage(opening):
         ("registration |", device.RENEW_PERIOD),
         ("heartbeat |", device.HEARTBEAT_PERIOD),
         ("heartbeat |", dva_watch.SILENT_AFTER),
-        ("forgetting |", registry.FORGET_AFTER),
+        ("forgetting |", devices.FORGET_AFTER),
         ("watchdog of a robot |", FULL.robot.watchdog_s),
         ("age limit of a command |", FULL.robot.max_age_s),
         ("drive without a valid command |", controller.LEASE_S),

@@ -13,13 +13,13 @@ from dva_sim.agents.device import do_nothing
 from dva_sim.cameras.children import PipedChild
 from dva_sim.console.attached.options import own_id
 from dva_sim.console.attached.piped_bench import PLAIN
-from dva_sim.core.roles import ControlRoomRole
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.live.dva_port import DvaPort
 from dva_sim.live.process import ServedDva
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.real_network import NetworkError
 from dva_sim.options.runs import LiveOptions
+from dva_sim.protocol.devices import ControlRoomRole
 from dva_sim.serving.listening import listen
 from dva_sim.serving.processes import end_all
 

@@ -17,9 +17,9 @@ from dva_sim.console.driving.driven_system import DrivenSystem
 from dva_sim.console.driving.seating import Seating
 from dva_sim.console.views.event_rows import UNKNOWN_ROOM
 from dva_sim.console.views.things import UNKNOWN_ROBOT
-from dva_sim.core.registry import OPERATOR
 from dva_sim.network.patterns import Pattern, load_pattern
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import OPERATOR
 from dva_sim.simulation.full.control_room import setup_by
 from dva_sim.simulation.scenario import Scenario, phone_profile
 

@@ -19,8 +19,8 @@ from dva_sim.console.views.system_state import DeviceState
 from dva_sim.console.views.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
 from dva_sim.console.wire.rows import DeviceRow
 from dva_sim.console.wire.scenes import LinkShown, SceneLine, SiteShown, ThingBody, ThingShown
-from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import GUARD, ROBOT
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.site import Site
 

@@ -30,8 +30,8 @@ from dva_sim.console.wire.arguments import LogsLooked
 from dva_sim.console.wire.events import SiteEventShown
 from dva_sim.console.wire.lines import Tell
 from dva_sim.console.wire.rows import DoingShown, Hearing, RobotRow, ServerShown
-from dva_sim.core.registry import ROBOT
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import ROBOT
 
 # From one line to the next, real time [s].
 POSITIONS = 0.2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dva_sim.console.audit.audited import name_of_page
 from dva_sim.console.wire.events import RoomEntry
-from dva_sim.core.roles import ControlRoomRole
+from dva_sim.protocol.devices import ControlRoomRole
 
 Named = tuple[str, ControlRoomRole]
 

@@ -17,9 +17,9 @@ from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.run.real_links import start_of_day
 from dva_sim.console.views.system_state import SystemState
 from dva_sim.console.wire.rows import Hearing
-from dva_sim.core.registry import CONTROL_ROOM, ROBOT
 from dva_sim.options.runs import ConsoleOptions
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import CONTROL_ROOM, ROBOT
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.simulation.scenario import Scenario, site_of
 from dva_sim.worlds.geo import GeoFrame

@@ -12,9 +12,10 @@ from dva_sim.agents.device import HEARTBEAT_PERIOD
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.robots.shown_mode import EMERGENCY, shown_mode
 from dva_sim.console.wire.rows import DeviceRow
-from dva_sim.core.registry import DETECTOR, DeviceEntry
+from dva_sim.core.registry import DeviceEntry
 from dva_sim.core.sessions import Grant
 from dva_sim.live.parts import Rate
+from dva_sim.protocol.devices import DETECTOR
 from dva_sim.simulation.full.run import Run
 
 MOST_ROWS: Final = 200

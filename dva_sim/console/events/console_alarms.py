@@ -15,8 +15,8 @@ from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.events.alarms import AlarmCondition, Alarms
 from dva_sim.console.wire.events import AlarmsLine, SiteEventShown
 from dva_sim.console.wire.rows import RobotRow
-from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.kernel.recorder import Breach
+from dva_sim.protocol.devices import GUARD, ROBOT
 from dva_sim.simulation.full.run import Run
 
 ESCALATED_FOR: Final = 60.0  # so long an escalation counts as lasting, time of the run [s]

@@ -12,8 +12,8 @@ from dva_sim.console.wire.arguments import PlaceAsked, ReportAsked
 from dva_sim.console.wire.events import DecidedShown, DispatchShown, EventDecisions
 from dva_sim.console.wire.scenes import LabelledMoment
 from dva_sim.console.wire.seats import Answered, CandidateShown
-from dva_sim.core.candidates import FREE
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.control_room import FREE
 from dva_sim.worlds.site import Site
 
 CERTAIN: Final = 0.9  # of what somebody in a control room reports

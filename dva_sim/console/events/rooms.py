@@ -18,10 +18,10 @@ from dva_sim.console.events.decisions import dispatch_shown
 from dva_sim.console.wire.events import ControlLine, RoomEntry
 from dva_sim.console.wire.limits import LONG
 from dva_sim.console.wire.seats import Answered
-from dva_sim.core.registry import FORGET_AFTER
-from dva_sim.core.roles import ControlRoomRole, Roles
+from dva_sim.core.roles import Roles
 from dva_sim.kernel.labels import with_id
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import FORGET_AFTER, ControlRoomRole
 from dva_sim.simulation.full.run import Run
 
 LISTENER: Final = 1000  # number of the device that listens for the pages; a scenario's are below

@@ -20,9 +20,9 @@ from dva_sim.console.phones.phone_input import PIPELINES, PhoneSettings
 from dva_sim.console.phones.phone_seat import PhoneSeat
 from dva_sim.console.wire.arguments import DELAYS, STEPS
 from dva_sim.console.wire.scenes import PhoneOffer
-from dva_sim.core.registry import FORGET_AFTER, OPERATOR, REMOTE, ROBOT
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.realtime import PacedClock
+from dva_sim.protocol.devices import FORGET_AFTER, OPERATOR, REMOTE, ROBOT
 from dva_sim.recordings.motion import MotionWriter
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA, address_of

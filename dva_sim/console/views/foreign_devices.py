@@ -19,9 +19,9 @@ from dva_sim.console.views.published_rows import (
 from dva_sim.console.views.system_state import DeviceState, SystemState
 from dva_sim.console.views.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
 from dva_sim.console.wire.rows import RobotRow
-from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.kernel.labels import distinct
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import GUARD, ROBOT
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import kind_of
 

@@ -7,13 +7,12 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from dva_sim.agents.device import EMERGENCY, HEARTBEAT, HOLDER, STATUS, AgentDevice
-from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.kernel.labels import distinct
 from dva_sim.live.parts import Rate
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import FORGET_AFTER, GUARD, ROBOT
 
-FORGET_AFTER: Final = 60.0  # without being on the list [s]
 TOPICS: Final = {ROBOT: (HEARTBEAT, STATUS, HOLDER, EMERGENCY), GUARD: (HEARTBEAT, STATUS)}
 
 

@@ -20,21 +20,14 @@ from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.core.audit import MOST_KEPT, Fact
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import Event, State
-from dva_sim.core.registry import (
-    BURST,
-    CONTROL_ROOM,
-    DETECTOR,
-    GUARD,
-    RATE,
-    ROBOT,
-    RegistrationLimit,
-)
+from dva_sim.core.registry import BURST, RATE, RegistrationLimit
 from dva_sim.core.request_log import SHOWN_BYTES, KeptRequest, KeptRequests
 from dva_sim.core.sessions import Send
 from dva_sim.core.store import Store
 from dva_sim.network.messaging import Request, Subscription
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
+from dva_sim.protocol.devices import CONTROL_ROOM, DETECTOR, GUARD, ROBOT
 from dva_sim.protocol.errors import ProtocolError
 
 MOST_REPORTED = 20_000  # events whose last word is remembered, so that none is said twice

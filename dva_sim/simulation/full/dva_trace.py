@@ -17,13 +17,13 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple, TypeVar, cast
 
 from dva_sim.core.dva import Dva, Reaction
-from dva_sim.core.roles import ControlRoomRole
 from dva_sim.core.sessions import Permissions, Send
 from dva_sim.core.store import Store
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
+from dva_sim.protocol.devices import ControlRoomRole
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.simulation.full.control_room import make_core
 from dva_sim.simulation.full.stage import DVA, Stage

@@ -16,14 +16,21 @@ from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import OVER_ZMQ, Cameras
 from dva_sim.agents.operator.strategies import Reach
 from dva_sim.agents.robot.emergency_latch import DRIVE
-from dva_sim.core.registry import CONTROL_ROOM, DETECTOR, GUARD, OPERATOR, REMOTE, ROBOT
-from dva_sim.core.roles import ControlRoomRole
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.labels import with_id
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.messaging import Transport
 from dva_sim.network.patterns import Pattern, load_pattern
+from dva_sim.protocol.devices import (
+    CONTROL_ROOM,
+    DETECTOR,
+    GUARD,
+    OPERATOR,
+    REMOTE,
+    ROBOT,
+    ControlRoomRole,
+)
 from dva_sim.protocol.exchange import NOON
 from dva_sim.protocol.messages import ReleasedBy
 from dva_sim.simulation.scenario import Scenario, request_timeout_s, robot_profiles, site_of

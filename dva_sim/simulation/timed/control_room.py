@@ -17,11 +17,11 @@ import numpy as np
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import Policy
 from dva_sim.core.dva import Dva
-from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
 from dva_sim.core.sessions import Permissions, Sessions
 from dva_sim.core.travel_times import SiteKnowledge, Start, WaitingPlace
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import DETECTOR, GUARD, OPERATOR, ROBOT
 from dva_sim.simulation.timed.demand import CALLERS, Demand
 from dva_sim.simulation.timed.mail import Mail
 from dva_sim.simulation.timed.recording import Floats

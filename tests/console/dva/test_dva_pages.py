@@ -11,8 +11,8 @@ from helpers.wording import unnamed
 from dva_sim.console.dva.device_rows import link_of
 from dva_sim.console.dva.fake_devices import RENEW
 from dva_sim.console.run.real_links import ConsoleSockets
-from dva_sim.core.registry import FORGET_AFTER
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import FORGET_AFTER
 from dva_sim.protocol.mistakes import check_message
 from dva_sim.simulation.full.stage import DVA
 

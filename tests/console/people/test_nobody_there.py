@@ -5,7 +5,7 @@ from helpers.console.simulated_phone import PhonePage
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.asking.seats import RELOADED
-from dva_sim.core.roles import ControlRoomRole
+from dva_sim.protocol.devices import ControlRoomRole
 from dva_sim.ros.gateway import RosGateway
 from dva_sim.simulation.full.stage import kind_of
 

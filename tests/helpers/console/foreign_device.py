@@ -1,7 +1,7 @@
 """A robot of another make that registers at the DVA of a run."""
 
 from dva_sim.agents.device import AgentDevice
-from dva_sim.core.registry import ROBOT
+from dva_sim.protocol.devices import ROBOT
 from dva_sim.simulation.full.run import Run
 
 FOREIGN = "AA:BB:CC:00:00:01"

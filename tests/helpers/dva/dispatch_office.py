@@ -11,11 +11,12 @@ from dva_sim.core.dispatch import MinEta, Policy
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import Event, State
 from dva_sim.core.permissions import Access
-from dva_sim.core.roles import ControlRoomRole, Roles
+from dva_sim.core.roles import Roles
 from dva_sim.core.sensing import Sensing
 from dva_sim.core.sessions import Permissions, Send, Sessions
 from dva_sim.core.travel_times import SiteKnowledge, Start
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import ControlRoomRole
 
 Floats = NDArray[np.float64]
 DVA = "02:00:00:00:00:01"

@@ -22,11 +22,12 @@ from dva_sim.core.dispatch import (
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import ACT_STEPS, STEPS, Event, Handling, State
 from dva_sim.core.permissions import Access, AccessRule
-from dva_sim.core.roles import ControlRoomRole, Roles
+from dva_sim.core.roles import Roles
 from dva_sim.core.sessions import Permissions, Send, Sessions
 from dva_sim.core.store import Store
 from dva_sim.core.travel_times import SiteKnowledge, WaitingPlace
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import ControlRoomRole
 
 KINDS = {"Guard": 3, "Robot": 2, "TeleOp": 2, "Sensor": 2, "ControlRoom": 2}
 DEVICES = {

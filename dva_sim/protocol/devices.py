@@ -1,0 +1,29 @@
+"""Devices as the DVA knows them: their types, the roles of control rooms, and when it forgets."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Final
+
+ROBOT: Final = "Robot"
+GUARD: Final = "Guard"
+OPERATOR: Final = "TeleOp"
+DETECTOR: Final = "Sensor"
+REMOTE: Final = "Remote Control"  # may drive robots, and is sent no orders
+CONTROL_ROOM: Final = "ControlRoom"  # sees and decides; may drive as its role allows
+
+FORGET_AFTER: Final = 60.0  # without a word of it [s]
+
+
+class ControlRoomRole(StrEnum):
+    """Role of a control room, or of another device; each includes those before it."""
+
+    LOOK = "look"
+    DRIVE = "drive"
+    DISPATCH = "dispatch"
+    SUPERVISE = "supervise"
+
+    def includes(self, other: ControlRoomRole) -> bool:
+        """Return True if this role allows what the other one allows."""
+        ranks = list(ControlRoomRole)
+        return ranks.index(self) >= ranks.index(other)
