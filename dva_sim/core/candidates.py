@@ -10,10 +10,10 @@ from dva_sim.core.events import Event, State
 from dva_sim.core.registry import DeviceEntry
 from dva_sim.core.situation_builder import KINDS
 from dva_sim.core.travel_times import Start
-from dva_sim.core.wire_size import LIST_BYTES, xml_size
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.control_room import FREE
 from dva_sim.protocol.devices import GUARD, ROBOT
+from dva_sim.protocol.wire_size import LIST_BYTES, xml_size
 
 MOST_NAMED = 32
 CANDIDATE_BYTES = 200  # of one, without what is written for people [B]

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Final
 
-from dva_sim.core.audit import Fact
 from dva_sim.core.candidates import proposal
 from dva_sim.core.dispatcher import Advised, Dispatcher
 from dva_sim.core.event_status import by_whom, event_list, status_of
@@ -26,6 +25,7 @@ from dva_sim.core.travel_times import Start
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.control_room import ControlRoomBody
 from dva_sim.protocol.devices import CONTROL_ROOM, GUARD, ROBOT, ControlRoomRole
+from dva_sim.protocol.facts import Fact
 
 R = ControlRoomRole
 NEEDS: Final[dict[type, tuple[ControlRoomRole, str]]] = {

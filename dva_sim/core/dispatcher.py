@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dva_sim.core.auctions import Auctions
-from dva_sim.core.audit import Fact
 from dva_sim.core.dispatch import MinEta
 from dva_sim.core.dispatch.situation import (
     Advice,
@@ -35,6 +34,7 @@ from dva_sim.core.travel_times import SiteKnowledge, Travel
 from dva_sim.kernel.plugins import FAILURES
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import ROBOT, ControlRoomRole
+from dva_sim.protocol.facts import Fact
 
 DECISIONS = 4  # in a row, where one makes the next necessary
 

@@ -9,7 +9,6 @@ from itertools import chain
 import numpy as np
 
 from dva_sim.core.assignments import Rules
-from dva_sim.core.audit import Fact
 from dva_sim.core.control_rooms import ControlRooms
 from dva_sim.core.dispatch import Policy
 from dva_sim.core.dispatcher import Dispatcher, Patrols
@@ -28,6 +27,7 @@ from dva_sim.core.travel_times import SiteKnowledge, Travel
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.control_room import ControlRoomBody
 from dva_sim.protocol.devices import ROBOT
+from dva_sim.protocol.facts import Fact
 
 Reaction = tuple[m.Reply, list[Send]]
 

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 
 from dva_sim.core.events import LOOKING, Choice, Event, State
 from dva_sim.core.questions import Question, Questions
-from dva_sim.core.wire_size import LIST_BYTES, sent_time, xml_size
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.wire_size import LIST_BYTES, sent_time, xml_size
 
 MOST_LISTED = 16
 EVENT_BYTES = 950  # of one event without what people have written, at most [B]

@@ -49,7 +49,7 @@ class Choice(NamedTuple):
     Attributes:
         author: Id of the device; the DVA's for its policy and its rules.
         label: Label of the author.
-        action: Kind of decision, as in `audit.Fact`.
+        action: Kind of decision, as in `Fact`.
         time: Time [s].
         reason: Reason in words; may be empty.
         device: About whom; empty: about nobody.

@@ -13,8 +13,8 @@ from enum import StrEnum
 
 from dva_sim.core.orders import Orders
 from dva_sim.core.sessions import Send, Sessions
-from dva_sim.core.wire_size import sent_time
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.wire_size import sent_time
 
 ANSWER_WITHIN = 30.0  # a holder that has not answered so long after it was asked declines [s]
 STOP_WITHIN = 30.0  # a robot that is not seen to stand by then is not handed over [s]

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from dva_sim.core.assignments import MOVE, SET_OUT, Assignments, Promise, Promises, Rules
-from dva_sim.core.audit import AuditTrail, Fact
+from dva_sim.core.audit import AuditTrail
 from dva_sim.core.emergencies import Emergencies
 from dva_sim.core.events import (
     LOOKING,
@@ -26,6 +26,7 @@ from dva_sim.core.events import (
 from dva_sim.core.registry import Registry
 from dva_sim.core.sessions import Send, Sessions
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.facts import Fact
 
 OVER = "done"  # said by the DVA to who has an order: it is over, stop
 

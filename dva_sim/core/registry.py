@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from itertools import chain, islice, takewhile
 from typing import Final, NamedTuple
 
-from dva_sim.core.wire_size import LIST_BYTES, xml_size
 from dva_sim.kernel.labels import distinct, look_of, with_id
 from dva_sim.protocol.devices import (
     CONTROL_ROOM,
@@ -21,6 +20,7 @@ from dva_sim.protocol.devices import (
     ROBOT,
 )
 from dva_sim.protocol.messages import Device, DeviceList, Position, Registration
+from dva_sim.protocol.wire_size import LIST_BYTES, xml_size
 
 SAME_AS = {"Teleoperation": OPERATOR}  # other names of a type
 DRIVERS = frozenset({OPERATOR, REMOTE, CONTROL_ROOM, *SAME_AS})

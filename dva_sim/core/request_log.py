@@ -13,10 +13,10 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Final
 
-from dva_sim.core.wire_size import LIST_BYTES, sent_time, xml_size
 from dva_sim.protocol import limits
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.exchange import LOW_BITS
+from dva_sim.protocol.wire_size import LIST_BYTES, sent_time, xml_size
 
 MOST_LOGGED: Final = 256  # requests that are kept
 MOST_LISTED: Final = 32  # of one answer

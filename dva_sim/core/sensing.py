@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 
 from dva_sim.core.registry import Registry
 from dva_sim.core.sessions import DvaAnswer, Send, Sessions
-from dva_sim.core.wire_size import LIST_BYTES, xml_size
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import ROBOT
+from dva_sim.protocol.wire_size import LIST_BYTES, xml_size
 
 RENEW = 20.0  # a subscription ends at the robot after 60 s unless it is renewed [s]
 IN_A_ROW = 3  # values above a threshold: one alone may be noise; assumed

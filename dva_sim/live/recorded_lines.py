@@ -15,12 +15,12 @@ from tempfile import TemporaryDirectory
 from typing import IO, Any
 
 from dva_sim.agents.observation import CameraFrame
-from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
 from dva_sim.kernel.streams import Streams
 from dva_sim.live.judging import Facts, observation_of
+from dva_sim.protocol.facts import Fact
 from dva_sim.protocol.messages import Position
 from dva_sim.recordings.writing import (
     HELD_TO,

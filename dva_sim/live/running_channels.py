@@ -8,11 +8,11 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from dva_sim.agents.observation import CameraFrame
-from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.recorder import Moment, Sent, TrackPoint
 from dva_sim.kernel.streams import Streams
 from dva_sim.live.judging import SENT_LINE, observation_of
+from dva_sim.protocol.facts import Fact
 from dva_sim.protocol.messages import Position
 from dva_sim.recordings import channels
 from dva_sim.recordings.messages import ChannelMessage

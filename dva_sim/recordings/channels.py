@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.agents.observation import CameraFrame
-from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event
 from dva_sim.kernel.recorder import Moment, Sent, TrackPoint
+from dva_sim.protocol.facts import Fact
 from dva_sim.recordings import messages
 from dva_sim.recordings.messages import FRAME, HERE, XML, ChannelMessage, stamped
 from dva_sim.simulation.full import Playback

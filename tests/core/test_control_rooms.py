@@ -16,13 +16,13 @@ from helpers.dva.dispatch_office import (
 from helpers.wording import unnamed
 
 from dva_sim.core.assignments import Rules
-from dva_sim.core.audit import Fact
 from dva_sim.core.event_status import status_of
 from dva_sim.core.events import Choice, Event, Handling, State
 from dva_sim.core.questions import Questions
 from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
+from dva_sim.protocol.facts import Fact
 
 LEVELS = ("look", "drive", "dispatch", "supervise")
 RULES = Rules(escalate_after=120.0, decide_within=60.0)

@@ -20,8 +20,8 @@ from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited
 from dva_sim.console.wire.actions import ACTIONS, Action, Asked, Audit
 from dva_sim.console.wire.seats import Answered
-from dva_sim.core.audit import Fact
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.facts import Fact
 
 RECORD_WITHIN: Final = 0.5  # the DVA's record of a decision comes so long after its answer [s]
 

@@ -12,8 +12,8 @@ from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.wire.actions import ACTIONS, Action, Asked, Audit
 from dva_sim.console.wire.seats import REFUSAL, Answered
-from dva_sim.core.audit import Fact
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.facts import Fact
 from dva_sim.recordings.audit_log import AuditEntry
 
 DONE: Final = "done"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Final
 
 from dva_sim.agents.people.person_guard import SEVERITIES
@@ -117,31 +117,20 @@ def _candidate(who: m.Candidate, is_robot: Callable[[str], bool]) -> CandidateSh
     }
 
 
-def about_event(
-    events: Mapping[int, m.EventStatus], at: Mapping[int, float], number: int
-) -> EventDecisions:
-    """Return what a page gets of an event besides what everybody sees.
-
-    Args:
-        events: Events as published by the DVA.
-        at: Time of each publication [s].
-        number: Number of the event.
-    """
-    status = events.get(number)
-    if status is None:
-        return {"decisions": None, "acknowledged": None, "decided": None, "note": None}
+def about_event(status: m.EventStatus, received_at: float) -> EventDecisions:
+    """Return what a page gets of an event besides what everybody sees, as stated at a time [s]."""
     last = status.last_decision
     decided = None
     if last is not None:
         decided = DecidedShown(
             label=last.label,
             action=last.action,
-            at_ms=moment_ms(at[number] - last.ago),
+            at_ms=moment_ms(received_at - last.ago),
             reason=last.reason or "",
         )
     return {
         "decisions": status.decisions,
-        "acknowledged": by_whom(status.acknowledged, at[number]),
+        "acknowledged": by_whom(status.acknowledged, received_at),
         "decided": decided,
         "note": status.note,
     }

@@ -1,26 +1,14 @@
-"""A moment of a recording: where everybody was, how an event stood, what a drive had come to."""
+"""A moment of a recording: where everybody was, and what a drive had come to."""
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 
-from dva_sim.console.wire.events import EventDecisions
-from dva_sim.core.audit import Fact
-from dva_sim.core.events import Event, State
 from dva_sim.kernel.recorder import DriveLog, TrackPoint
-from dva_sim.protocol import messages as m
 
 GONE = 1.0  # whoever was not seen for so long has left the site [s]
-ROUNDED = 0.0005  # pages know moments to the millisecond [s]
-_STEPS = (
-    ("detected", State.PENDING),
-    ("assigned", State.ASSIGNED),
-    ("arrived", State.ON_SCENE),
-    ("confirmed", State.CONFIRMED),
-)
 
 
 class RecordedTracks:
@@ -50,50 +38,6 @@ class RecordedTracks:
                     yield label, before, 0.0
                 continue
             yield label, *_between(before, after, now)
-
-
-def event_at(event: Event, now: float) -> Event | None:
-    """An event as it stood at a moment; None if it was not known yet."""
-    times = {step: time for step, time in event.times.items() if time <= now + ROUNDED}
-    if "detected" not in times:
-        return None
-    if "closed" in times:
-        state = event.state
-    else:
-        state = [state for step, state in _STEPS if step in times][-1]
-    sent = state is not State.PENDING
-    return replace(
-        event,
-        state=state,
-        needs_containment="contained" in event.times or "act_assigned" in event.times,
-        responder=event.responder if sent else None,
-        operator=event.operator if sent else None,
-        actor=event.actor if "act_assigned" in times else None,
-        times=times,
-    )
-
-
-def decided_on(facts: Sequence[Fact], number: int, now: float) -> EventDecisions:
-    """Return the decisions on an event by then, where they were recorded."""
-    past = [f for f in facts if f.event == number and f.time <= now + ROUNDED and f.code == m.OK]
-    seen = next((f for f in past if f.action == "acknowledge"), None)
-    last = past[-1] if past else None
-    note = next((f.text for f in reversed(past) if f.action == "note"), None)
-    return {
-        "decisions": None,
-        "acknowledged": None
-        if seen is None
-        else {"label": seen.label, "at_ms": round(1000 * seen.time)},
-        "decided": None
-        if last is None
-        else {
-            "label": last.label,
-            "action": last.action,
-            "at_ms": round(1000 * last.time),
-            "reason": last.cause,
-        },
-        "note": note,
-    }
 
 
 def _between(before: TrackPoint, after: TrackPoint, now: float) -> tuple[TrackPoint, float]:

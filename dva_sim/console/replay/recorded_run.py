@@ -13,22 +13,19 @@ from typing import Any
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.cameras.lines import FrameLine
 from dva_sim.console.replay.moments import (
-    ROUNDED,
     RecordedTracks,
     captured_at,
     commands_hz,
-    decided_on,
-    event_at,
     set_point,
 )
 from dva_sim.console.replay.robot_lines import RobotLines, about
 from dva_sim.console.robots.shown_mode import EMERGENCY
-from dva_sim.console.views.event_rows import event_facts
+from dva_sim.console.views.event_rows import event_row
 from dva_sim.console.views.feed import moment_shown
 from dva_sim.console.views.fields import HazardFeed
 from dva_sim.console.views.scene import scene_of
 from dva_sim.console.views.things import UNKNOWN_PERSON, Things, camera_shown
-from dva_sim.console.wire.events import EventsLine, HazardsLine, SiteEventShown, StorySoFarLine
+from dva_sim.console.wire.events import EventsLine, HazardsLine, StorySoFarLine
 from dva_sim.console.wire.rows import (
     DeviceRow,
     DevicesLine,
@@ -38,12 +35,12 @@ from dva_sim.console.wire.rows import (
     RobotWindowLine,
 )
 from dva_sim.console.wire.scenes import Happened, LinkShown, SceneLine, ThingBody
-from dva_sim.core.event_status import status_of
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.recorder import DriveLog, Sent
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
+from dva_sim.recordings.event_moments import ROUNDED, statuses_at
 from dva_sim.recordings.reading import Opened, RecordedHazard
 from dva_sim.simulation.full.stage import DVA
 from dva_sim.simulation.scenario import robot_profiles
@@ -361,21 +358,9 @@ class RecordedRun:
         """Return the states of the events."""
         playback = self.playback
         site = playback.site
-        labels = playback.labels
-        known = (event_at(event, now) for event in self.playback.events)
-        lines: list[SiteEventShown] = [
-            {
-                **event_facts(
-                    status_of(event, None, now),
-                    received_at=now,
-                    labels=labels,
-                    site=site,
-                    frame=site.frame,
-                ),
-                **decided_on(playback.facts, event.number, now),
-            }
-            for event in known
-            if event is not None
+        lines = [
+            event_row(status, received_at=now, labels=playback.labels, site=site, frame=site.frame)
+            for status in statuses_at(playback.events, playback.facts, now)
         ]
         return {"k": "events", "t": _ms(now), "events": lines}
 

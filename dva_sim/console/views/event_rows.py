@@ -7,7 +7,7 @@ from typing import Final
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.console.events.decisions import about_event
-from dva_sim.console.wire.events import EventFacts, SiteEventShown
+from dva_sim.console.wire.events import SiteEventShown
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.site import Site
@@ -32,28 +32,25 @@ def event_rows(
     over = sorted(number for number, status in events.items() if status.closed_for is not None)
     numbers = (*over[-MOST_OVER:], *sorted(events.keys() - set(over)))
     return [
-        {
-            **event_facts(
-                events[number],
-                received_at=agent.received_at[number],
-                labels=labels,
-                site=site,
-                frame=frame,
-            ),
-            **about_event(events, agent.received_at, number),
-        }
+        event_row(
+            events[number],
+            received_at=agent.received_at[number],
+            labels=labels,
+            site=site,
+            frame=frame,
+        )
         for number in numbers
     ]
 
 
-def event_facts(
+def event_row(
     status: m.EventStatus,
     *,
     received_at: float,
     labels: Mapping[str, str],
     site: Site | None,
     frame: GeoFrame,
-) -> EventFacts:
+) -> SiteEventShown:
     """Return an event as the DVA states it at a time [s]."""
     x, y = frame.to_xy(status.position.latitude, status.position.longitude)
     sent = dict.fromkeys((status.responder, status.operator, status.actor))
@@ -73,4 +70,5 @@ def event_facts(
         "since_ms": round(1000 * (received_at - status.state_for)),
         "reported_ms": round(1000 * (received_at - status.age)),
         "assigned": [] if is_over else [labels.get(i, i) for i in sent if i is not None],
+        **about_event(status, received_at),
     }

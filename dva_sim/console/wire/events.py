@@ -52,14 +52,14 @@ class DecidedShown(LabelledMoment):
 class EventDecisions(TypedDict):
     """Decisions of people and the policy on an event."""
 
-    decisions: int | None
+    decisions: int
     acknowledged: LabelledMoment | None
     decided: DecidedShown | None
     note: str | None
 
 
-class EventFacts(TypedDict):
-    """State of an event."""
+class SiteEventShown(EventDecisions):
+    """State of an event, and what was decided on it."""
 
     number: int
     kind: str
@@ -75,10 +75,6 @@ class EventFacts(TypedDict):
     since_ms: int
     reported_ms: int
     assigned: list[str]
-
-
-class SiteEventShown(EventFacts, EventDecisions):
-    """An event, and what was decided on it."""
 
 
 class EventsLine(TypedDict):

@@ -17,7 +17,7 @@ from dva_sim.agents.device import (
     AgentDevice,
 )
 from dva_sim.agents.robot.sensors import sensor_topic
-from dva_sim.core.audit import MOST_KEPT, Fact
+from dva_sim.core.audit import MOST_KEPT
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import Event, State
 from dva_sim.core.registry import BURST, RATE, RegistrationLimit
@@ -29,6 +29,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.devices import CONTROL_ROOM, DETECTOR, GUARD, ROBOT
 from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.facts import Fact
 
 MOST_REPORTED = 20_000  # events whose last word is remembered, so that none is said twice
 FIRST_BEAT = 1.27  # after the start, when hardly anything else happens at the same moment [s]

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from dva_sim.agents.robot.robot import RobotAgent
-from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event, State
 from dva_sim.core.reports import REACH
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.link import Link
+from dva_sim.protocol.facts import Fact
 from dva_sim.simulation.full.hazards import RunHazard
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.worlds.hazards import Surroundings

@@ -17,7 +17,6 @@ from typing import Any, Final
 import numpy as np
 from pydantic import TypeAdapter
 
-from dva_sim.core.audit import Fact
 from dva_sim.core.events import Choice, Event
 from dva_sim.kernel.recorder import (
     Applied,
@@ -29,6 +28,7 @@ from dva_sim.kernel.recorder import (
     TrackPoint,
 )
 from dva_sim.kernel.streams import Streams
+from dva_sim.protocol.facts import Fact
 from dva_sim.simulation.full.hazards import draw_incidents
 from dva_sim.simulation.full.recording import (
     PersonLog,

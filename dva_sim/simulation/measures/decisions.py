@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event
 from dva_sim.kernel.measure import Measure, text
+from dva_sim.protocol.facts import Fact
 from dva_sim.protocol.messages import BUSY, OK, OUT_OF_ORDER
 from dva_sim.simulation.full.recording import Recording
 from dva_sim.simulation.measures.commands import NAN, Row, mean, restricted_mean

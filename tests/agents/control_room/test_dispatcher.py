@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 from helpers.wording import unnamed
 
-from dva_sim.core.audit import Fact
 from dva_sim.core.events import State
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
+from dva_sim.protocol.facts import Fact
 from dva_sim.simulation.full.recording import Recording
 from dva_sim.simulation.full.run import simulate
 from dva_sim.simulation.full.stage import id_of

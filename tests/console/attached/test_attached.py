@@ -15,7 +15,7 @@ from helpers.wording import unnamed
 
 from dva_sim.console.attached import lines
 from dva_sim.console.attached.options import check, own_id
-from dva_sim.console.views.event_rows import event_facts
+from dva_sim.console.views.event_rows import event_row
 from dva_sim.console.views.published_rows import positions, robot_row
 from dva_sim.console.views.system_state import DeviceState
 from dva_sim.kernel.errors import ConfigError
@@ -81,7 +81,7 @@ def test_an_event_is_shown_as_the_dva_tells_it():
     status = m.EventStatus(
         4, "fire", place, 0.8, 0.9, "on_scene", **times, decisions=1, responder=ROBOT
     )
-    row = event_facts(status, received_at=100.0, labels={ROBOT: "robot-1"}, site=None, frame=HERE)
+    row = event_row(status, received_at=100.0, labels={ROBOT: "robot-1"}, site=None, frame=HERE)
     assert (row["state"], row["severity"], row["over"]) == ("on scene", "critical", False)
     assert (row["x_m"], row["y_m"], row["room"]) == (1.0, 2.0, "unknown room")
     assert (row["reported_ms"], row["since_ms"]) == (80_000, 95_000)

@@ -10,16 +10,12 @@ from helpers.console.declared_lines import at_page, checked
 from recordings.runs import drill, evacuation
 
 from dva_sim.cameras.lines import PaintersLine
-from dva_sim.console.replay.moments import decided_on, event_at
 from dva_sim.console.replay.player import NOBODY, ExchangeLog, Player
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
 from dva_sim.console.web.audit import rows_of
-from dva_sim.core.audit import Fact
-from dva_sim.core.events import Event, State
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol.codec import decode
-from dva_sim.protocol.messages import Position
 from dva_sim.recordings.audit_log import AuditEntry, AuditLog, plain_row
 from dva_sim.recordings.reading import read_recording
 from dva_sim.recordings.writing import write_recording
@@ -91,27 +87,6 @@ def test_events_come_back_as_the_dva_knew_them(files):
     assert [(e.responder, e.operator, e.actor) for e in kept] == [
         (e.responder, e.operator, e.actor) for e in known
     ]
-
-
-@pytest.mark.parametrize(
-    ("now", "state"),
-    [
-        (9.9, None),
-        (10.0, State.PENDING),
-        (12.0, State.ASSIGNED),
-        (20.0, State.ON_SCENE),
-        (25.0, State.CONFIRMED),
-        (40.0, State.CONTAINED),
-    ],
-)
-def test_an_event_stood_as_its_times_say(now, state):
-    times = {"detected": 10.0, "assigned": 12.0, "departed": 13.0, "arrived": 20.0}
-    times |= {"confirmed": 25.0, "act_assigned": 25.0, "contained": 40.0, "closed": 40.0}
-    event = Event(1, "fire", Position(0.0, 0.0), 0.5, state=State.CONTAINED, times=times)
-    then = event_at(event, now)
-    assert (then.state if then else None) == state
-    if then is not None:
-        assert then.open == (state is not State.CONTAINED)
 
 
 def test_everybody_is_where_the_run_had_them(recorded):
@@ -317,21 +292,6 @@ def test_the_table_has_who_had_registered_by_then(recorded):
     assert rows["guard-1"]["beats_hz"] == pytest.approx(0.5, abs=0.11)
     assert 0.0 <= rows["guard-1"]["heard_s"] < 5.0
     assert rows["robot-1"]["refused"] is None
-
-
-def test_what_was_decided_is_shown_from_when_it_was():
-    facts = [
-        Fact(time=5.0, author="a", label="min_eta", action="assign", event=1),
-        Fact(time=9.0, author="b", label="Ana", role="dispatch", action="acknowledge", event=1),
-        Fact(time=12.0, author="b", label="Ana", role="dispatch", action="note", event=1, text="x"),
-        Fact(time=13.0, author="c", label="Bo", action="escalate", event=1, code=3),
-    ]
-    assert decided_on(facts, 1, 4.0)["decided"] is None
-    assert decided_on(facts, 1, 6.0)["decided"]["label"] == "min_eta"
-    assert decided_on(facts, 1, 9.0)["acknowledged"] == {"label": "Ana", "at_ms": 9000}
-    assert decided_on(facts, 1, 20.0)["note"] == "x"
-    assert decided_on(facts, 1, 20.0)["decided"]["action"] == "note", "a refusal decides nothing"
-    assert decided_on(facts, 2, 20.0)["decided"] is None
 
 
 # --- its audit log --------------------------------------------------------------------------

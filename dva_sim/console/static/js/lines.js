@@ -148,12 +148,12 @@
  * @typedef {{label: string, at_ms: number, action: string, reason: string}} Decided
  */
 /**
- * An event, and what was decided on it.
- * @typedef {{number: number, kind: string, x_m: number, y_m: number, latitude_deg: number,
- *   longitude_deg: number, room: string | null, severity: string, severity_value: number,
- *   state: string, over: boolean, since_ms: number, reported_ms: number, assigned: string[],
- *   decisions: number | null, acknowledged: LabelledMoment | null, decided: Decided | null,
- *   note: string | null}} SiteEvent
+ * State of an event, and what was decided on it.
+ * @typedef {{decisions: number, acknowledged: LabelledMoment | null, decided: Decided | null,
+ *   note: string | null, number: number, kind: string, x_m: number, y_m: number,
+ *   latitude_deg: number, longitude_deg: number, room: string | null, severity: string,
+ *   severity_value: number, state: string, over: boolean, since_ms: number, reported_ms: number,
+ *   assigned: string[]}} SiteEvent
  */
 /**
  * All events that are open, and the last that are over.
