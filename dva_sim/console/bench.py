@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Final, Protocol
 
+from dva_sim.agents.device import do_nothing
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import OnResult, Refused
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import PortAsked
 from dva_sim.console.wire.rows import ServerShown
+from dva_sim.protocol.devices import ControlRoomRole
 
 
 class Bench(Protocol):
@@ -36,14 +38,18 @@ class Bench(Protocol):
             Refused: it takes none already.
         """
 
-    def let_decide(self, then: Callable[[], object]) -> None:
-        """Appoint the console to decide, as somebody at a page is about to, and call `then`."""
+    def appoint(
+        self, room: str, role: ControlRoomRole, then: Callable[[], object] = do_nothing
+    ) -> None:
+        """Give a control room of the console a role, and call `then` once the DVA knows.
 
-    def let_nobody_decide(self) -> None:
-        """Let the DVA rely on no person here: nobody is at a page any more."""
+        No device states its own role. The DVA relies on nobody here while no control room may
+        decide.
+        """
 
 
-NOT_HERE = "this console is attached to a DVA that runs elsewhere: that cannot be done here"
+UNATTENDED: Final = ControlRoomRole.DRIVE  # of a control room at which nobody decides
+NOT_HERE: Final = "this console is attached to a DVA that runs elsewhere: that cannot be done here"
 
 
 class ServerActions:

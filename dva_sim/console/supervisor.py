@@ -13,10 +13,10 @@ from dva_sim.console.driving.seating import leave_seats
 from dva_sim.console.options import kept_results, motion_folder, scenario_of, sockets
 from dva_sim.console.pages.processes import ConsoleProcesses
 from dva_sim.console.people.actions import Actions
-from dva_sim.console.run.recorder import keep_run
 from dva_sim.console.world.kept_results import KeptResults
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.kernel.errors import DvaSimError
+from dva_sim.live.kept_facts import keep_run
 from dva_sim.live.pipes import Inlets
 from dva_sim.live.process import ending_when_asked
 from dva_sim.live.recording import Keeper, LiveRecorder
@@ -136,9 +136,9 @@ class ConsoleSupervisor:
             inlets = Inlets(also=also)
         if inlets is not None:
             outlet = PipeEnd(inlets.inlet())
-            world.recorder.kept = LiveRecorder(world.clock, outlet)
-            world.recorder.kept.is_own = world.is_ours
-            keep_run(world.run, world.recorder)
+            world.recorder.kept = kept = LiveRecorder(world.clock, outlet)
+            kept.is_own = world.is_ours
+            keep_run(world.run, kept)
         try:
             with auditing(options.audit, world.clock, self._about(world), self._say) as audit:
                 world.keep_audit(audit)

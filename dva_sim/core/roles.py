@@ -32,7 +32,3 @@ class Roles:
             ValueError: there is no such role.
         """
         self.known[device] = ControlRoomRole(role)
-
-    def dismiss(self, device: str) -> None:
-        """From now on a device may look, as anybody."""
-        self.known.pop(device, None)

@@ -6,11 +6,9 @@ import math
 import secrets
 import statistics
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from itertools import islice
 from typing import Any, Protocol
 
 from dva_sim.agents.operator.operator import OperatorAgent
@@ -19,15 +17,16 @@ from dva_sim.agents.robot.decision_log import DecisionLog
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.cameras.service import CameraService
 from dva_sim.core.events import Event
-from dva_sim.core.registry import DeviceEntry
 from dva_sim.core.sessions import Permissions
 from dva_sim.core.store import Store
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.rates import Rate
 from dva_sim.kernel.suggestions import either
+from dva_sim.live.kept_facts import keep_events, keep_places, keep_team
 from dva_sim.live.open_files import devices_that_fit
 from dva_sim.live.options import ROSBRIDGE, trace_of
-from dva_sim.live.recording import LiveRecorder, TraceFile, TraceLines, event_facts
+from dva_sim.live.recording import LiveRecorder, TraceFile, TraceLines
 from dva_sim.network.messaging import Transport
 from dva_sim.network.realtime import LiveClock
 from dva_sim.options.runs import PARTS, LiveOptions
@@ -36,6 +35,7 @@ from dva_sim.ros.gateway import RosGateway
 from dva_sim.ros.server import RosbridgeServer
 from dva_sim.serving.open_port import OpenPort
 from dva_sim.simulation.full.control_room import add_dispatcher, add_dva, add_operator
+from dva_sim.simulation.full.device_table import BookedDevice, DeviceTable
 from dva_sim.simulation.full.dva_trace import traced
 from dva_sim.simulation.full.observations import STATIONARY, FactLog, motion_of, page_of
 from dva_sim.simulation.full.physical_world import Field
@@ -45,8 +45,6 @@ from dva_sim.simulation.scenario import Scenario
 
 SESSION_EPOCH = 1_735_689_600  # 2025-01-01, UTC [s]
 SESSIONS_PER_SECOND = 4  # enough room in 32 bits for 34 years
-MOST_ROWS = 200  # of the table; more are read by nobody
-RATE_OVER = 5.0  # rates are of so many last seconds [s]
 
 Row = dict[str, Any]
 
@@ -79,19 +77,6 @@ def _trace_of(label: str, stage: Stage, options: LiveOptions) -> Callable[[str],
         return None
     path = options.record / trace_of(label)
     return TraceFile(path, lambda text: recorder.tell(stage.clock.now, label, text, "link"))
-
-
-class Rate:
-    """Growth rate of a count."""
-
-    def __init__(self) -> None:
-        self._samples: deque[tuple[float, int]] = deque([(0.0, 0)], maxlen=int(RATE_OVER) + 1)
-
-    def of(self, count: int, now: float) -> float:
-        """Growth per second over the last samples [1/s], asked for once a second."""
-        self._samples.append((now, count))
-        then, before = self._samples[0]
-        return (count - before) / (now - then) if now > then else 0.0
 
 
 class DvaPart:
@@ -128,7 +113,7 @@ class DvaPart:
         events = self.agent.core.events
         self._scripted = options.operators == "scripted"  # who follows a script settles no event
         self._settled_before = 0 if events.open else events.total
-        self._beats: dict[str, Rate] = {}
+        self._table = DeviceTable(lambda: self.agent)
         self.aside: set[str] = set()
 
     def _observe(self, recorder: LiveRecorder, stage: Stage) -> None:
@@ -143,28 +128,11 @@ class DvaPart:
 
     def keep(self, recorder: LiveRecorder) -> None:
         """See `LivePart`: how the events stand."""
-        for e in self._events():
-            recorder.put_new("event", *event_facts(e), key=f"event {e.number}")
+        keep_events(recorder, self.agent.core.events)
 
     def rows(self) -> list[Row]:
         """See `LivePart`: what the first so many told the DVA, who is there before who is not."""
-        known = self.agent.core.registry.entries
-        first = islice(sorted(known, key=lambda i: known[i].silent), MOST_ROWS)
-        self._beats = {i: self._beats.get(i) or Rate() for i in first}
-        return [self._row(i, known[i], rate) for i, rate in self._beats.items()]
-
-    def _row(self, id_tag: str, entry: DeviceEntry, beats: Rate) -> Row:
-        now = self._stage.clock.now
-        engaged = self.agent.core.orders.engaged
-        return {
-            "label": entry.device.label,
-            "type": entry.device.device_type,
-            "address": entry.device.address,
-            "heard_s": now - entry.last_heard,
-            "beats_hz": beats.of(self.agent.beats[id_tag], now),
-            "silent": entry.silent,
-            "order": next((event.number for event in engaged.all(id_tag)), None),
-        }
+        return [_device_row(booked) for booked in self._table.rows()]
 
     def events(self) -> list[Row]:
         """The events, as the DVA knows them."""
@@ -187,6 +155,18 @@ class DvaPart:
     def finish(self) -> None:
         """See `LivePart`: nobody drives any longer by our permission."""
         self.agent.close()
+
+
+def _device_row(booked: BookedDevice) -> Row:
+    return {
+        "label": booked.device.label,
+        "type": booked.device.device_type,
+        "address": booked.device.address,
+        "heard_s": booked.heard_s,
+        "beats_hz": booked.beats_hz,
+        "silent": booked.silent,
+        "order": booked.order,
+    }
 
 
 @dataclass(frozen=True)
@@ -238,18 +218,13 @@ class WorldPart:
 
     def _sample(self, recorder: LiveRecorder, log: FactLog) -> None:
         now = self._stage.clock.now
-        field = self._field
-        places = [(name, *point[1:]) for name, point in field.whereabouts(now)]
-        recorder.put("at", now, places)
-        log.moves(now, {name: motion_of(robot) for name, robot in field.robots.items()})
+        robots = self._field.robots.items()
+        keep_places(recorder, self._field, now)
+        log.moves(now, {name: motion_of(robot) for name, robot in robots})
 
     def keep(self, recorder: LiveRecorder) -> None:
         """See `LivePart`: who there is, and which hazards are dealt with."""
-        robots = self._field.robots.items()
-        radii = {name: robot.body.spec.radius for name, robot in robots}
-        recorder.put_new("team", dict(self._stage.labels), radii, key="team")
-        for number, when in self._field.contained.items():
-            recorder.put_new("contains", number, when, key=f"contained {number}")
+        keep_team(recorder, self._stage.labels, self._field)
 
     def rows(self) -> list[Row]:
         """See `LivePart`: how robots and guards are."""

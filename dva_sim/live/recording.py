@@ -23,7 +23,6 @@ from typing import IO, Any
 from typing_extensions import override
 
 from dva_sim.agents.observation import CameraFrame
-from dva_sim.core.events import Event
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.recorder import Moment, Recorder
@@ -36,7 +35,6 @@ from dva_sim.protocol.errors import ProtocolError
 from dva_sim.recordings.writing import (
     HELD_TO,
     PART,
-    SENT,
 )
 from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation.full.observation_json import as_plain
@@ -273,16 +271,6 @@ class LiveRecorder(Recorder):
     def trace(self, who: str, line: str) -> bool:
         """Keep a line of somebody's decisions."""
         return self.put("trace", self._clock.now, who, line)
-
-
-def event_facts(event: Event) -> Line:
-    """Return what is kept of an event of the DVA, after the word `event`."""
-    at = [event.position.latitude, event.position.longitude]
-    sent = {who: getattr(event, who) for who in SENT}
-    return [
-        *(event.number, event.kind, at, event.state.value, dict(event.times)),
-        *(event.severity, sent),
-    ]
 
 
 class TraceLines:

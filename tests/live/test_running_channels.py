@@ -11,11 +11,12 @@ from helpers.network.port_visitors import DeafClient, is_closed
 from helpers.processes.patience import becomes
 from helpers.wording import unnamed
 
-from dva_sim.console.run.recorder import ConsoleRecorder, keep_run
+from dva_sim.console.run.recorder import ConsoleRecorder
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.live.foxglove_server import LAYOUT, FoxgloveServer
 from dva_sim.live.foxglove_viewer import FoxgloveViewer, ViewedChannel
+from dva_sim.live.kept_facts import keep_run
 from dva_sim.live.recorded_lines import lines_of_part
 from dva_sim.live.recording import Keeper, LiveRecorder
 from dva_sim.live.running_channels import RunningChannels
@@ -49,7 +50,7 @@ def run():
     played = Run(scenario, SEED, watched=Watched(Clock(), recorder))
     recorder.kept = LiveRecorder(played.clock, lines)
     recorder.kept.is_own = lambda _: True
-    keep_run(played, recorder)
+    keep_run(played, recorder.kept)
     for second in range(int(LASTS)):
         played.clock.run(float(second))
         recorder.kept._second = -1  # the room for lines is one of real time

@@ -13,6 +13,7 @@ from dva_sim.agents.device import do_nothing
 from dva_sim.cameras.children import PipedChild
 from dva_sim.console.attached.options import own_id
 from dva_sim.console.attached.piped_bench import PLAIN
+from dva_sim.console.bench import UNATTENDED
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.live.dva_port import DvaPort
 from dva_sim.live.process import ServedDva
@@ -26,7 +27,6 @@ from dva_sim.serving.processes import end_all
 MODULE: Final = "dva_sim.console.attached"
 USUAL_PORT: Final = 8765  # of the page; if it is taken, any that is free
 END_WITHIN: Final = 3.0  # for the page's processes to end by themselves [s]
-CHANGES = {True: ControlRoomRole.SUPERVISE, False: ControlRoomRole.DRIVE}  # somebody decides there
 
 Say = Callable[[str], object]
 
@@ -59,13 +59,13 @@ class PageBeside:
             self._say(f"no page: {error}")
             return
         self._dva = dva
-        dva.appoint(own, CHANGES[False])
+        dva.appoint(own, UNATTENDED)
         port = DvaPort(lambda: dva.agent, dva.network, dva.address)
         child = self._child = PipedChild("the page", MODULE, [self._argument(own)], [], PLAIN)
 
         def hear() -> None:
             for line in child.pipe.lines():
-                self._hear(line, port, own)
+                self._hear(line, port)
             if not child.pipe.is_open:
                 self._close()
                 dva.tell(f"{child.why()}; the DVA goes on without it")
@@ -96,16 +96,16 @@ class PageBeside:
         keys = None if options.keys is None else str(options.keys)
         return json.dumps({"options": page, "keys": keys, "own": own})
 
-    def _hear(self, line: dict[str, Any], port: DvaPort, own: str) -> None:
+    def _hear(self, line: dict[str, Any], port: DvaPort) -> None:
         if line["k"] == "say":
             self._say(line["text"])
             return
-        ok, text = self._do(line, port, own)
+        ok, text = self._do(line, port)
         assert self._child is not None
         answer = {"k": "done", "n": line["n"], "ok": ok, "text": text}
         self._child.pipe.put({**answer, "listens": port.listens, "address": port.address})
 
-    def _do(self, line: dict[str, Any], port: DvaPort, own: str) -> tuple[bool, str]:
+    def _do(self, line: dict[str, Any], port: DvaPort) -> tuple[bool, str]:
         """Do what the page asks for; whether it is done, and what there is to say of it."""
         assert self._dva is not None
         try:
@@ -117,7 +117,7 @@ class PageBeside:
                 return True, f"the server listens on {port.address}"
         except NetworkError as error:
             return False, str(error)
-        self._dva.appoint(own, CHANGES[line["on"]])
+        self._dva.appoint(line["room"], ControlRoomRole(line["role"]))
         return True, ""
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from dva_sim.console.dva.device_rows import link_of
+from dva_sim.console.dva.device_rows import device_row
 from dva_sim.console.robots.shown_mode import EMERGENCY
 from dva_sim.console.run.lag import LIMIT
 from dva_sim.console.views.published_rows import (
@@ -85,7 +85,7 @@ def nowhere(frame: GeoFrame) -> SiteShown:
     }
 
 
-def device_row(
+def listed_device_row(
     device_state: DeviceState,
     now: float,
     labels: Mapping[str, str],
@@ -97,33 +97,21 @@ def device_row(
     is_stopped = emergency_of(device_state, now, {}) is not None
     device = device_state.device
     status = device_state.status
-    holding = device_state.holder
-    silent = now - device_state.listed > SILENT_AFTER
-    heard = None if device_state.heard is None else now - device_state.heard
     doing = status.mode if isinstance(status, m.RobotStatus) else None
     doing = EMERGENCY if is_stopped else doing
-    holder = holding[0] if holding is not None else None
-    return {
-        "id": device.id_tag,
-        "label": device.label,
-        "type": device.device_type,
-        "address": device.address,
-        "doing": status.activity if isinstance(status, m.PersonStatus) else doing,
-        "heard_s": None if heard is None else round(heard, 1),
-        "silent": silent,
-        "beats_hz": round(device_state.rate.of(device_state.beats, now), 2),
-        "link": None if is_fake or heard is None else link_of(heard, silent),
-        "fake": is_fake,
-        "round_trip_s": None,
-        "commands_hz": None,
-        "refused": None,
-        "picture_age_s": None,
-        "level": None,
-        "ends_s": None,
-        "holder": holder.holder if holder is not None else None,
-        "holder_label": holder_named(holder, labels) or "",
-        "holder_known": holder is not None or device.device_type != ROBOT,
-        "revocable": may_revoke,
-        "camera": device_state.camera,
-        "sensors": sensors_of(device_state),
-    }
+    holder = device_state.holder[0] if device_state.holder is not None else None
+    row = device_row(
+        device,
+        doing=status.activity if isinstance(status, m.PersonStatus) else doing,
+        heard_s=None if device_state.heard is None else now - device_state.heard,
+        silent=now - device_state.listed > SILENT_AFTER,
+        beats_hz=device_state.rate.of(device_state.beats, now),
+        holder=None if holder is None else holder.holder,
+        holder_label=holder_named(holder, labels) or "",
+        is_fake=is_fake,
+    )
+    row["holder_known"] = holder is not None or device.device_type != ROBOT
+    row["revocable"] = may_revoke
+    row["camera"] = device_state.camera
+    row["sensors"] = sensors_of(device_state)
+    return row

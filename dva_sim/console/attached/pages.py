@@ -18,6 +18,7 @@ from dva_sim.console.attached.requests import LOG, RequestReader
 from dva_sim.console.attached.sensing import WatchedSensors
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import AuditKeeper
+from dva_sim.console.bench import UNATTENDED
 from dva_sim.console.driving.seat_lines import SeatLines
 from dva_sim.console.events.console_alarms import ConsoleAlarms
 from dva_sim.console.events.decisions import dispatch_shown
@@ -118,8 +119,9 @@ class AttachedPages:
 
     def let_go(self) -> None:
         """Let the DVA rely on nobody here if no person has stayed."""
-        if self.system.bench is not None and not self.people.by_client:
-            self.system.bench.let_nobody_decide()
+        bench = self.system.bench
+        if bench is not None and not self.people.by_client:
+            bench.appoint(self.system.device.id_tag, UNATTENDED)
 
     # --- what is told ----------------------------------------------------------------------
 
@@ -250,7 +252,7 @@ class AttachedPages:
             now = self.clock.now
             may = self.system.role == "supervise"
             rows = [
-                lines.device_row(
+                lines.listed_device_row(
                     entry,
                     now,
                     self.system.labels,

@@ -11,6 +11,7 @@ from dva_sim.console.asking.refusal import OnResult
 from dva_sim.console.wire.rows import ServerShown
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import split_address
+from dva_sim.protocol.devices import ControlRoomRole
 from dva_sim.serving.pipes import LineKinds, LinePipe
 
 PLAIN: Final = LineKinds(newest=frozenset(), kept=frozenset({"ask", "say", "done"}))
@@ -28,7 +29,7 @@ class PipedBench:
         self._pipe = pipe
         self._address = address
         self._listens = True
-        self._decides = False
+        self._roles: dict[str, ControlRoomRole] = {}
         self._numbers = count(1)
         self._asked: dict[int, Callable[[bool, str], object]] = {}
         self._moved: Callable[[str], object] = do_nothing
@@ -72,19 +73,15 @@ class PipedBench:
         """Implement `Bench`."""
         self._ask("stop", on_result)
 
-    def let_decide(self, then: Callable[[], object]) -> None:
+    def appoint(
+        self, room: str, role: ControlRoomRole, then: Callable[[], object] = do_nothing
+    ) -> None:
         """Implement `Bench`."""
-        if self._decides:
+        if self._roles.get(room) == role:
             then()
             return
-        self._decides = True
-        self._ask("decide", lambda *_: then(), on=True)
-
-    def let_nobody_decide(self) -> None:
-        """Implement `Bench`."""
-        if self._decides:
-            self._decides = False
-            self._ask("decide", do_nothing, on=False)
+        self._roles[room] = role
+        self._ask("appoint", lambda *_: then(), room=room, role=role)
 
     def _ask(self, what: str, then: Callable[[bool, str], object], **more: Any) -> None:
         number = next(self._numbers)

@@ -19,7 +19,7 @@ from dva_sim.console.views.system_state import SystemState
 from dva_sim.console.wire.rows import Hearing
 from dva_sim.options.runs import ConsoleOptions
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.devices import CONTROL_ROOM, ROBOT
+from dva_sim.protocol.devices import CONTROL_ROOM, ROBOT, ControlRoomRole
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.simulation.scenario import Scenario, site_of
 from dva_sim.worlds.geo import GeoFrame
@@ -143,7 +143,7 @@ class AttachedSystem:
         if self.bench is None:
             then()
         else:
-            self.bench.let_decide(then)
+            self.bench.appoint(self.device.id_tag, ControlRoomRole.SUPERVISE, then)
 
     def move(self, address: str) -> None:
         """The DVA listens elsewhere."""

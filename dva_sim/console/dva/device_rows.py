@@ -1,24 +1,22 @@
-"""The table of devices: all that the DVA knows, and what the console knows of them beside it."""
+"""The table of devices: what a console hears of each, and of its own run what the bench knows."""
 
 from __future__ import annotations
 
 import math
 import statistics
 from collections.abc import Collection
-from itertools import islice
-from typing import Final
 
 from dva_sim.agents.device import HEARTBEAT_PERIOD
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.console.dva.run_bench import RunBench
 from dva_sim.console.robots.shown_mode import EMERGENCY, shown_mode
 from dva_sim.console.wire.rows import DeviceRow
-from dva_sim.core.registry import DeviceEntry
-from dva_sim.core.sessions import Grant
-from dva_sim.live.parts import Rate
+from dva_sim.kernel.rates import Rate
+from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import DETECTOR
+from dva_sim.simulation.full.device_table import BookedDevice
 from dva_sim.simulation.full.run import Run
 
-MOST_ROWS: Final = 200
 FAIR, POOR = 2.5 * HEARTBEAT_PERIOD, 4 * HEARTBEAT_PERIOD  # without a word [s]
 
 
@@ -31,12 +29,52 @@ def link_of(heard_s: float, silent: bool) -> str:
     return "fair" if heard_s > FAIR else "good"
 
 
-class DeviceRows:
-    """Rows about all devices of a run."""
+def device_row(
+    device: m.Device,
+    *,
+    doing: str | None,
+    heard_s: float | None,
+    silent: bool,
+    beats_hz: float,
+    holder: str | None,
+    holder_label: str | None,
+    is_fake: bool = False,
+) -> DeviceRow:
+    """Return what any console can show of a device; all else is unknown."""
+    speaks = heard_s is not None and not is_fake and device.device_type != DETECTOR
+    return {
+        "id": device.id_tag,
+        "label": device.label,
+        "type": device.device_type,
+        "address": device.address,
+        "doing": doing,
+        "heard_s": _rounded(heard_s, 1),
+        "silent": silent,
+        "beats_hz": round(beats_hz, 2),
+        "link": link_of(heard_s or 0.0, silent) if speaks else None,
+        "fake": is_fake,
+        "round_trip_s": None,
+        "commands_hz": None,
+        "refused": None,
+        "picture_age_s": None,
+        "holder": holder,
+        "holder_label": holder_label,
+        "level": None,
+        "ends_s": None,
+    }
 
-    def __init__(self, run: Run) -> None:
+
+class DeviceRows:
+    """Rows about all devices of a run.
+
+    Args:
+        run: The run.
+        bench: Its bench.
+    """
+
+    def __init__(self, run: Run, bench: RunBench) -> None:
         self._run = run
-        self._beats: dict[str, Rate] = {}
+        self._bench = bench
         self._commands: dict[str, Rate] = {}
 
     def rows(self, fakes: Collection[str]) -> list[DeviceRow]:
@@ -45,51 +83,42 @@ class DeviceRows:
         Args:
             fakes: Ids of those that were added by hand.
         """
-        entries = self._run.dva.core.registry.entries
-        first = islice(sorted(entries, key=lambda i: entries[i].silent), MOST_ROWS)
-        self._beats = {i: self._beats.get(i) or Rate() for i in first}
-        return [self._row(i, entries[i], i in fakes) for i in self._beats]
+        return [self._row(booked, fakes) for booked in self._bench.devices.rows()]
 
-    def _row(self, id_tag: str, entry: DeviceEntry, is_fake: bool) -> DeviceRow:
-        run = self._run
-        now = self._run.clock.now
-        device = entry.device
-        heard = now - entry.last_heard
-        robot = run.field.robots.get(id_tag)
-        grant = run.dva.core.sessions.permissions.grants.get(id_tag)
-        rate = self._rate_of(robot, now)
-        speaks = not is_fake and device.device_type != DETECTOR
-        return {
-            "id": id_tag,
-            "label": device.label,
-            "type": device.device_type,
-            "address": device.address,
-            "doing": self._doing(id_tag, entry),
-            "heard_s": round(heard, 1),
-            "silent": entry.silent,
-            "beats_hz": round(self._beats[id_tag].of(run.dva.beats[id_tag], now), 2),
-            "link": link_of(heard, entry.silent) if speaks else None,
-            "fake": is_fake,
-            "round_trip_s": self._round_trip(id_tag),
-            "commands_hz": rate if rate is None else round(rate, 1),
-            "refused": None if robot is None else robot.refused,
-            "picture_age_s": _finite(robot.picture_age, 2) if robot and rate else None,
-            "holder": None if grant is None else grant.holder,
-            "holder_label": None if grant is None else self._label_of(grant.holder),
-            "level": None if grant is None else grant.level,
-            "ends_s": None if grant is None else _finite(self._end_of(grant, now) - now, 1),
-        }
+    def _row(self, booked: BookedDevice, fakes: Collection[str]) -> DeviceRow:
+        id_tag = booked.device.id_tag
+        robot = self._run.field.robots.get(id_tag)
+        holding = booked.holding
+        rate = self._rate_of(robot, self._run.clock.now)
+        row = device_row(
+            booked.device,
+            doing=self._doing(booked),
+            heard_s=booked.heard_s,
+            silent=booked.silent,
+            beats_hz=booked.beats_hz,
+            holder=None if holding is None else holding.holder,
+            holder_label=None if holding is None else holding.label,
+            is_fake=id_tag in fakes,
+        )
+        row["round_trip_s"] = self._round_trip(id_tag)
+        row["commands_hz"] = _rounded(rate, 1)
+        if robot is not None:
+            row["refused"] = robot.refused
+            row["picture_age_s"] = _rounded(robot.picture_age, 2) if rate else None
+        if holding is not None:
+            row["level"] = holding.level
+            row["ends_s"] = _rounded(holding.ends_in, 1)
+        return row
 
-    def _doing(self, id_tag: str, entry: DeviceEntry) -> str | None:
+    def _doing(self, booked: BookedDevice) -> str | None:
         field = self._run.field
+        id_tag = booked.device.id_tag
         if id_tag in field.robots:
             return shown_mode(field.robots[id_tag].controller)
         guard = next((g for g in field.guards if g.device.id_tag == id_tag), None)
         if guard is not None:
             return guard.activity
-        if self._run.dva.core.emergencies.holds(id_tag):
-            return EMERGENCY
-        return entry.mode if entry.position is not None and entry.kind == "Robot" else None
+        return EMERGENCY if booked.is_stopped else booked.mode
 
     def _rate_of(self, robot: RobotAgent | None, now: float) -> float | None:
         """Commands in a second; of a robot outside it is unknown."""
@@ -102,18 +131,6 @@ class DeviceRows:
         trips = device.round_trips if device is not None else []
         return round(statistics.median(trips), 4) if trips else None
 
-    def _label_of(self, holder: str) -> str:
-        entry = self._run.dva.core.registry.entries.get(holder)
-        return self._run.stage.labels.get(holder, "") if entry is None else entry.device.label
 
-    def _end_of(self, grant: Grant, now: float) -> float:
-        """Return when a permission ends [s]; infinity: never."""
-        core = self._run.dva.core
-        holder, robot = (core.registry.entries.get(one) for one in (grant.holder, grant.robot))
-        if holder is None or robot is None:
-            return math.inf
-        return core.access.ends(holder.device, robot.device, grant.level, now)
-
-
-def _finite(seconds: float | None, digits: int) -> float | None:
-    return None if seconds is None or math.isinf(seconds) else round(seconds, digits)
+def _rounded(number: float | None, digits: int) -> float | None:
+    return None if number is None or math.isinf(number) else round(number, digits)

@@ -3,81 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from typing import cast
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.asking.dispatcher import does
-from dva_sim.console.asking.refusal import OnResult, Refused
+from dva_sim.console.asking.refusal import OnResult
 from dva_sim.console.bench import ServerActions
 from dva_sim.console.dva.device_rows import DeviceRows
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
+from dva_sim.console.dva.run_bench import RunBench
 from dva_sim.console.run.real_links import ConsoleSockets
 from dva_sim.console.wire.arguments import FakeAsked, OfDevice
-from dva_sim.console.wire.rows import DevicesLine, ServerShown
-from dva_sim.live.dva_port import DvaPort
-from dva_sim.network.real_network import NetworkError
-from dva_sim.network.virtual_network import VirtualNetwork
+from dva_sim.console.wire.rows import DevicesLine
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA, address_of, id_of
-
-
-class RunBench:
-    """Bench of a run in this process; see `Bench`.
-
-    Args:
-        run: The run.
-        address: Address of its DVA, real or displayed.
-        sockets: Sockets of the messages, if the links are real.
-        moved: Called when the DVA listens elsewhere.
-
-    Attributes:
-        port: Port of the DVA.
-    """
-
-    def __init__(
-        self,
-        run: Run,
-        address: str,
-        sockets: ConsoleSockets | None,
-        moved: Callable[[str], object],
-    ) -> None:
-        network = cast(VirtualNetwork, run.network) if sockets is None else sockets.network
-        self.port = DvaPort(lambda: run.dva, network, address)
-        self._is_modelled = sockets is None
-        self._moved = moved
-
-    def server(self) -> ServerShown:
-        """Implement `Bench`."""
-        return {
-            "listens": self.port.listens,
-            "address": self.port.address,
-            "port": self.port.number,
-            "modelled": self._is_modelled,
-        }
-
-    def open_server(self, port: int, on_result: OnResult) -> None:
-        """Implement `Bench`."""
-        try:
-            self.port.open(port)
-        except NetworkError as error:
-            raise Refused(str(error)) from None
-        self._moved(self.port.address)
-        on_result(True, f"the server listens on {self.port.address}")
-
-    def close_server(self, on_result: OnResult) -> None:
-        """Implement `Bench`."""
-        try:
-            self.port.close()
-        except NetworkError as error:
-            raise Refused(str(error)) from None
-        on_result(True, "the server is stopped")
-
-    def let_decide(self, then: Callable[[], object]) -> None:
-        """Call `then` at once: each person has a control room with its own role."""
-        then()
-
-    def let_nobody_decide(self) -> None:
-        """Do nothing: the control room of a person who leaves is gone as well."""
+from dva_sim.simulation.scenario import request_timeout_s
 
 
 class DvaPages(ServerActions):
@@ -105,10 +44,9 @@ class DvaPages(ServerActions):
         self._run = run
         self._is_real = sockets is not None
         self.looked = False
-        self._rows = DeviceRows(run)
-        entries = run.dva.core.registry.entries
+        self._rows = DeviceRows(run, self.bench)
         self._fakes = FakeDevices(
-            self._make, lambda i: i == DVA or i in entries, self._identity, self._dismiss
+            self._make, self.bench.is_registered, self._identity, self._dismiss
         )
 
     @property
@@ -135,7 +73,6 @@ class DvaPages(ServerActions):
 
     def _make(self, id_tag: str, label: str, kind: str, address: str) -> AgentDevice:
         stage = self._run.stage
-        dva = self._run.dva.device
         device = AgentDevice(
             id_tag=id_tag,
             label=label,
@@ -145,8 +82,8 @@ class DvaPages(ServerActions):
             network=stage.network,
             recorder=stage.recorder,
             frame=stage.site.frame,
-            timeout=dva.timeout,
-            attempts=dva.attempts,
+            timeout=request_timeout_s(stage.scenario),
+            attempts=stage.scenario.request.attempts,
             labels=stage.labels,
             time_of_day=stage.time_of_day,
         )
@@ -161,4 +98,4 @@ class DvaPages(ServerActions):
         stage = self._run.stage
         stage.devices[:] = [d for d in stage.devices if d.id_tag != id_tag]
         stage.labels.pop(id_tag, None)
-        self._run.dva.dismiss(id_tag)
+        self.bench.forget(id_tag)

@@ -18,7 +18,6 @@ from dva_sim.console.events.decisions import dispatch_shown
 from dva_sim.console.wire.events import ControlLine, RoomEntry
 from dva_sim.console.wire.limits import LONG
 from dva_sim.console.wire.seats import Answered
-from dva_sim.core.roles import Roles
 from dva_sim.kernel.labels import with_id
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import FORGET_AFTER, ControlRoomRole
@@ -101,16 +100,17 @@ class ConsoleRooms:
     """All control rooms of a console.
 
     Args:
-        roles: Roles as the DVA knows them: no device states its own.
+        run: The run.
+        appoint: Gives a control room a role; see `Bench`.
 
     Attributes:
         listener: Control room that receives the DVA's news of events for the pages.
         by_client: The rooms by their pages.
     """
 
-    def __init__(self, run: Run, roles: Roles) -> None:
+    def __init__(self, run: Run, appoint: Callable[[str, ControlRoomRole], object]) -> None:
         self._run = run
-        self._roles = roles
+        self._appoint = appoint
         self.by_client: dict[str, ConsoleRoom] = {}
         self._used: set[int] = set()
         self._switched = 0.0
@@ -163,7 +163,7 @@ class ConsoleRooms:
             return None
         self._used.add(number)
         agent = self._agent(LISTENER + number, name or f"{role}-{number}")
-        self._roles.appoint(agent.device.id_tag, role)
+        self._appoint(agent.device.id_tag, ControlRoomRole(role))
         return ConsoleRoom(number, agent, role)
 
     def attend(self, pages: Mapping[str, str]) -> None:
@@ -175,7 +175,7 @@ class ConsoleRooms:
         """
         roles = {ControlRoomRole(role) for role in pages.values() if role}
         highest = max(roles, key=list(ControlRoomRole).index, default=ControlRoomRole.LOOK)
-        self._roles.appoint(self.listener.device.id_tag, highest)
+        self._appoint(self.listener.device.id_tag, highest)
         for client, room in self.by_client.items():
             if client not in pages:
                 room.device.withdrawn = True
@@ -201,7 +201,7 @@ class ConsoleRooms:
         for peer in (room.device.dva, *self._run.field.robots):
             room.device.forget(peer)
         self._run.stage.dismiss(room.device)
-        self._roles.dismiss(room.device.id_tag)
+        self._appoint(room.device.id_tag, ControlRoomRole.LOOK)
         self._used.discard(room.number)
 
     # --- what pages are told ----------------------------------------------------------------

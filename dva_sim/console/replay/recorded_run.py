@@ -12,6 +12,7 @@ from typing import Any
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.cameras.lines import FrameLine
+from dva_sim.console.dva.device_rows import device_row
 from dva_sim.console.replay.moments import (
     RecordedTracks,
     captured_at,
@@ -106,27 +107,19 @@ class RecordedDevices:
         beats = self._beats.get(who, [])
         last = heard[bisect_right(heard, now) - 1]
         recent = bisect_right(beats, now) - bisect_right(beats, now - BEATING)
-        return {
-            "id": who,
-            "label": about.label,
-            "type": about.device_type,
-            "address": about.address,
-            "doing": doing.get(about.label),
-            "heard_s": round(now - last, 1),
-            "silent": False,
-            "beats_hz": round(recent / BEATING, 2),
-            "fake": False,
-            "revocable": False,
-            "link": None,
-            "holder": None if robot is None else robot["holder"],
-            "holder_label": None if robot is None else robot["holder_label"],
-            "commands_hz": None if robot is None else robot["commands_hz"],
-            "round_trip_s": None,
-            "refused": None,
-            "picture_age_s": None,
-            "level": None,
-            "ends_s": None,
-        }
+        row = device_row(
+            m.Device(who, about.label, about.device_type, about.address),
+            doing=doing.get(about.label),
+            heard_s=now - last,
+            silent=False,
+            beats_hz=recent / BEATING,
+            holder=None if robot is None else robot["holder"],
+            holder_label=None if robot is None else robot["holder_label"],
+        )
+        row["link"] = None
+        row["revocable"] = False
+        row["commands_hz"] = None if robot is None else robot["commands_hz"]
+        return row
 
 
 TURNING = 0.25  # over which a turn rate is measured [s]

@@ -9,9 +9,7 @@ from typing import Any
 from typing_extensions import override
 
 from dva_sim.kernel.recorder import DriveLog, Recorder
-from dva_sim.live.recording import LiveRecorder, event_facts
-from dva_sim.simulation.full.observations import FactLog, motion_of, page_of
-from dva_sim.simulation.full.run import FILM_PERIOD, WATCH_PERIOD, Run
+from dva_sim.live.recording import LiveRecorder
 
 KEPT = 200  # of each list of a drive, and of ended drives nothing but the last
 KEPT_DRIVES = 20
@@ -121,37 +119,3 @@ class ConsoleRecorder(Recorder):
         if (seen or made) and kept.put("drove", drive.operator, number, seen, made):
             done[0] = seen[-1][1] if seen else done[0]
             done[1] = made[-1][0] if made else done[1]
-
-
-def keep_run(run: Run, recorder: ConsoleRecorder) -> None:
-    """Say for the recording where everybody is, from now on."""
-    kept = recorder.kept
-    assert kept is not None
-    field = run.field
-    clock = run.clock
-
-    def sample() -> None:
-        now = clock.now
-        kept.put("at", now, [(name, *point[1:]) for name, point in field.whereabouts(now)])
-
-    def facts() -> None:
-        radii = {name: robot.body.spec.radius for name, robot in field.robots.items()}
-        kept.put_new("team", dict(run.stage.labels), radii, key="team")
-        for number, when in field.contained.items():
-            kept.put_new("contains", number, when, key=f"contained {number}")
-        events = run.dva.core.events
-        for e in (*events.closed.values(), *events.open.values()):
-            kept.put_new("event", *event_facts(e), key=f"event {e.number}")
-
-    log = FactLog(
-        kept.observe,
-        robots=field.robots,
-        look=lambda robot: motion_of(field.robots[robot]),
-        page=lambda: page_of(run.dva),
-        keeps_sent=False,
-    )
-    facts()
-    run.observe(log)
-    clock.every(FILM_PERIOD, sample)
-    clock.every(WATCH_PERIOD, lambda: log.places(clock.now, field.places()))
-    clock.every(1.0, facts)

@@ -16,8 +16,8 @@ from dva_sim.console.views.things import Things, camera_shown
 from dva_sim.console.wire.events import StoryLine
 from dva_sim.console.wire.rows import DoingShown, PlacesLine, RobotRow
 from dva_sim.console.wire.scenes import Happened, ThingBody
+from dva_sim.kernel.rates import Rate
 from dva_sim.kernel.recorder import Moment, Recorder
-from dva_sim.live.parts import Rate
 
 
 class Feed:

@@ -8,7 +8,7 @@ from typing import Final
 
 from dva_sim.agents.device import EMERGENCY, HEARTBEAT, HOLDER, STATUS, AgentDevice
 from dva_sim.kernel.labels import distinct
-from dva_sim.live.parts import Rate
+from dva_sim.kernel.rates import Rate
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import FORGET_AFTER, GUARD, ROBOT

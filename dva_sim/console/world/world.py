@@ -114,7 +114,8 @@ class ConsoleWorld(PublishingWorld):
         self.screens = Screens(
             self.run, id_of("console", SCREEN), self.feed.numbers, self._show_frame
         )
-        self.rooms = ConsoleRooms(self.run, self.run.dva.core.roles)
+        self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)
+        self.rooms = ConsoleRooms(self.run, self.dva.bench.appoint)
         self.foreign = ForeignDevices(self.run, self.feed, self.rooms.listener.device)
         self.driven = DrivenRun(
             self.run,
@@ -133,7 +134,6 @@ class ConsoleWorld(PublishingWorld):
         self.guards = PlayedGuards(self.run, self.feed)
         self.alarms = ConsoleAlarms(RunFacts(self.run), self.rooms.listener)
         self.audited: Audited | None = None
-        self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)
         self.recorder.on_applied = self.seat_lines.applied
         field = self.run.field
         self.hazards = HazardFeed(
@@ -202,7 +202,7 @@ class ConsoleWorld(PublishingWorld):
     def keep_audit(self, keeper: AuditKeeper) -> None:
         """Keep what people do, and what the DVA decides, from now on."""
         self.audited = Audited(keeper, self.author, self._named)
-        self.run.dva.on_fact = self.audited.decided
+        self.dva.bench.note_decisions(self.audited.decided)
         keeper.on_rows = self._audit_written
 
     def _audit_written(self, rows: Sequence[AuditRow]) -> None:

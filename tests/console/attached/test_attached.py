@@ -43,10 +43,13 @@ def test_of_a_robot_that_has_said_nothing_everything_is_unknown():
     row = robot_row(device_state(), 0, 5.0, {})
     assert (row["mode"], row["holder"], row["camera"]) == ("unknown", None, None)
     assert (
-        lines.device_row(device_state(), 5.0, {}, is_fake=False, may_revoke=False)["link"] is None
+        lines.listed_device_row(device_state(), 5.0, {}, is_fake=False, may_revoke=False)["link"]
+        is None
     )
     assert (
-        lines.device_row(device_state(), 5.0, {}, is_fake=False, may_revoke=False)["holder_known"]
+        lines.listed_device_row(device_state(), 5.0, {}, is_fake=False, may_revoke=False)[
+            "holder_known"
+        ]
         is False
     )
     assert positions({ROBOT: device_state()}, {ROBOT: 0}, HERE) == []
@@ -61,14 +64,14 @@ def test_a_robot_is_shown_as_it_says_itself():
     shown = (row["mode"], row["holder_label"], row["session_age_s"])
     assert shown == ("Teleoperation", "ana", 13.0)
     assert positions({ROBOT: robot}, {ROBOT: 3}, HERE) == [[3, 300, -400, 1000, 250]]
-    shown = lines.device_row(robot, 5.0, {}, is_fake=False, may_revoke=True)
+    shown = lines.listed_device_row(robot, 5.0, {}, is_fake=False, may_revoke=True)
     assert (shown["doing"], shown["heard_s"], shown["link"]) == ("Teleoperation", 1.0, "good")
     assert (shown["commands_hz"], shown["level"], shown["ends_s"]) == (None, None, None)
 
 
 def test_a_device_that_left_the_list_is_shown_as_lost_for_a_while():
     assert (
-        lines.device_row(device_state(heard=1.0), 30.0, {}, is_fake=False, may_revoke=False)[
+        lines.listed_device_row(device_state(heard=1.0), 30.0, {}, is_fake=False, may_revoke=False)[
             "silent"
         ]
         is True

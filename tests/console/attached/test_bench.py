@@ -5,14 +5,18 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from helpers.console.attached_console import AttachedPage, attached
+from helpers.console.attached_console import OWN, AttachedPage, attached
 
+from dva_sim.agents.device import do_nothing
 from dva_sim.console.asking.answers import BYE
 from dva_sim.console.attached.actions import AttachedActions
 from dva_sim.console.attached.piped_bench import PLAIN, PipedBench
+from dva_sim.console.bench import UNATTENDED
 from dva_sim.network.realtime import LiveClock
+from dva_sim.protocol.devices import ControlRoomRole
 from dva_sim.serving.pipes import LinePipe
 
+SUPERVISE = ControlRoomRole.SUPERVISE
 HERE = "127.0.0.1:5600"
 
 
@@ -78,16 +82,16 @@ def test_a_refusal_of_the_other_end_is_one_here(other):
 
 def test_it_is_appointed_once_for_all_decisions_until_nobody_is_there(other):
     done = list[int]()
-    other.bench.let_decide(lambda: done.append(1))
+    other.bench.appoint(OWN, SUPERVISE, lambda: done.append(1))
     assert done == []  # a decision waits until the DVA knows
     other.answer(1, True, "")
-    other.bench.let_decide(lambda: done.append(2))
+    other.bench.appoint(OWN, SUPERVISE, lambda: done.append(2))
     assert done == [1, 2]
-    other.bench.let_nobody_decide()
-    other.bench.let_nobody_decide()
-    assert [(one["what"], one["on"]) for one in other.asked()] == [
-        ("decide", True),
-        ("decide", False),
+    other.bench.appoint(OWN, UNATTENDED)
+    other.bench.appoint(OWN, UNATTENDED)
+    assert [(one["what"], one["room"], one["role"]) for one in other.asked()] == [
+        ("appoint", OWN, "supervise"),
+        ("appoint", OWN, "drive"),
     ]
 
 
@@ -119,13 +123,11 @@ class NotedBench:
         self.asked.append("stop")
         on_result(True, "stopped")
 
-    def let_decide(self, then: Any) -> None:
-        self.asked.append("decide")
-        self._roles.appoint(self._own, "supervise")
+    def appoint(self, room: str, role: Any, then: Any = do_nothing) -> None:
+        assert room == self._own
+        self.asked.append(str(role))
+        self._roles.appoint(room, role)
         then()
-
-    def let_nobody_decide(self) -> None:
-        self.asked.append("nobody")
 
 
 @pytest.fixture
@@ -160,10 +162,10 @@ def test_the_dva_learns_that_somebody_decides_before_the_first_decision(page, ac
     if action == "take_over":
         about = about | {"robot": page.system.numbers[page.system.robots()[0]]}
     assert page.ask(action, **about)["ok"]
-    assert "decide" in page.system.bench.asked
+    assert "supervise" in page.system.bench.asked
 
 
 def test_the_dva_relies_on_nobody_once_the_last_page_is_gone(page):
     page.ask("room_join", name="ana")
     page.actions.take({"do": "release", "id": f"{BYE}c1", "client": "c1", "role": "supervise"})
-    assert page.system.bench.asked == ["decide", "nobody"]
+    assert page.system.bench.asked == ["supervise", "drive"]

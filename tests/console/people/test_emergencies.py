@@ -31,7 +31,7 @@ def stopped(page):
 def test_everybody_sees_who_stopped_which_robots(page):
     assert page.do("emergency", robots="all")[0]
     assert stopped(page) == {"robot-1": "page c1", "robot-2": "page c1"}
-    rows = DeviceRows(page.world.run).rows(())
+    rows = DeviceRows(page.world.run, page.world.dva.bench).rows(())
     assert [row["doing"] for row in rows if row["type"] == "Robot"] == ["Emergency"] * 2
 
 

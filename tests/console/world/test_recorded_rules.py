@@ -8,7 +8,7 @@ import pytest
 from helpers.console.simulated_phone import PhonePage
 
 from dva_sim.agents.robot.controller import Decision, RobotController
-from dva_sim.console.run.recorder import keep_run
+from dva_sim.live.kept_facts import keep_run
 from dva_sim.live.recording import Keeper, LiveRecorder
 from dva_sim.protocol import messages as m
 from dva_sim.recordings.reading import read_recording
@@ -33,7 +33,7 @@ class Recorded:
         os.close(inlet)
         self.world.recorder.kept = LiveRecorder(self.world.clock, self._outlet)
         self.world.recorder.kept.is_own = self.world.is_ours
-        keep_run(self.world.run, self.world.recorder)
+        keep_run(self.world.run, self.world.recorder.kept)
 
     def ask(self, after: float, body: m.Body, session: int = 5) -> None:
         """Let the DVA ask the first robot for something."""

@@ -1,0 +1,107 @@
+"""Devices as the DVA of a run has them in its book: no message tells all of that."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import islice
+from typing import Final
+
+from dva_sim.core.dva import Dva
+from dva_sim.core.registry import DeviceEntry
+from dva_sim.kernel.rates import Rate
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import ROBOT
+from dva_sim.simulation.full.dva_server import DvaAgent
+
+MOST_ROWS: Final = 200  # of the table; more are read by nobody
+
+
+@dataclass(frozen=True, slots=True)
+class Holding:
+    """Permission for a robot.
+
+    Attributes:
+        holder: Id of the device that holds it.
+        label: Label of that device; empty if the DVA has forgotten it.
+        level: Level of the permission.
+        ends_in: Time until it ends [s]; None: it does not end by itself.
+    """
+
+    holder: str
+    label: str
+    level: str
+    ends_in: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class BookedDevice:
+    """One device in the book.
+
+    Attributes:
+        device: Device as in the list of devices.
+        heard_s: Time since its last message [s].
+        beats_hz: Heartbeats per second [1/s].
+        silent: True if it has been silent for longer than the time-out.
+        order: Number of the event that it has an order for.
+        mode: Last mode of a robot that has told its status.
+        is_stopped: True if an emergency holds it.
+        holding: Permission for it, if somebody has one.
+    """
+
+    device: m.Device
+    heard_s: float
+    beats_hz: float
+    silent: bool
+    order: int | None
+    mode: str | None
+    is_stopped: bool
+    holding: Holding | None
+
+
+class DeviceTable:
+    """The devices of a DVA, those that are there first.
+
+    Args:
+        dva: Function that returns the DVA: another one takes its place after a crash.
+    """
+
+    def __init__(self, dva: Callable[[], DvaAgent]) -> None:
+        self._dva = dva
+        self._beats: dict[str, Rate] = {}
+
+    def rows(self) -> list[BookedDevice]:
+        """Return the first so many devices; to be asked for once a second."""
+        entries = self._dva().core.registry.entries
+        first = islice(sorted(entries, key=lambda i: entries[i].silent), MOST_ROWS)
+        self._beats = {i: self._beats.get(i) or Rate() for i in first}
+        return [self._row(i, entries[i]) for i in self._beats]
+
+    def _row(self, id_tag: str, entry: DeviceEntry) -> BookedDevice:
+        dva = self._dva()
+        core = dva.core
+        now = dva.device.clock.now
+        is_seen = entry.kind == ROBOT and entry.position is not None
+        return BookedDevice(
+            device=entry.device,
+            heard_s=now - entry.last_heard,
+            beats_hz=self._beats[id_tag].of(dva.beats[id_tag], now),
+            silent=entry.silent,
+            order=next((event.number for event in core.orders.engaged.all(id_tag)), None),
+            mode=entry.mode if is_seen else None,
+            is_stopped=core.emergencies.holds(id_tag),
+            holding=_holding(core, entry, now),
+        )
+
+
+def _holding(core: Dva, robot: DeviceEntry, now: float) -> Holding | None:
+    grant = core.sessions.permissions.grants.get(robot.device.id_tag)
+    if grant is None:
+        return None
+    entry = core.registry.entries.get(grant.holder)
+    if entry is None:
+        return Holding(grant.holder, "", grant.level, None)
+    left = core.access.ends(entry.device, robot.device, grant.level, now) - now
+    ends_in = left if math.isfinite(left) else None
+    return Holding(grant.holder, entry.device.label, grant.level, ends_in)
