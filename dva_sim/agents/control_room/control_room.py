@@ -26,6 +26,7 @@ class ControlRoomAgent:
         received_at: Time of that publication [s].
         devices: Registered devices by id, from the latest list.
         dispatch: Dispatch mode and own role; None until the first publication.
+        raised: Number of the event that it has raised last, by the DVA's record of that.
         orders: Orders for robots that it drives at its own wish, by event.
         on_event: Callback for each change of an event.
         on_list: Callback once the DVA has sent all current events.
@@ -42,6 +43,7 @@ class ControlRoomAgent:
         self.received_at: dict[int, float] = {}
         self.devices: dict[str, m.Device] = {}
         self.dispatch: m.DispatchStatus | None = None
+        self.raised: int | None = None
         self.orders: dict[int, m.Order] = {}
         self.on_event: Callable[[m.EventStatus], object] = do_nothing
         self.on_list: Callable[[], object] = do_nothing
@@ -116,6 +118,8 @@ class ControlRoomAgent:
             case m.DeviceList(devices=devices):
                 self.devices = {device.id_tag: device for device in devices}
             case m.AuditRecord():
+                if body.author == self.device.id_tag and body.action == "raise":
+                    self.raised = body.event_id
                 self.on_record(body)
 
     def _note(self, status: m.EventStatus) -> None:

@@ -15,13 +15,15 @@ from dva_sim.console.asking.refusal import OnResult
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.driving.driven_system import DrivenSystem
 from dva_sim.console.driving.seating import Seating
-from dva_sim.console.views.event_rows import UNKNOWN_ROOM
+from dva_sim.console.views.published_rows import emergency_of
 from dva_sim.console.views.things import UNKNOWN_ROBOT
 from dva_sim.network.patterns import Pattern, load_pattern
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import OPERATOR
 from dva_sim.simulation.full.control_room import setup_by
 from dva_sim.simulation.scenario import Scenario, phone_profile
+from dva_sim.worlds.geo import GeoFrame
+from dva_sim.worlds.site import Site
 
 REACH: Final = Reach(UNKNOWN_ROBOT["max_speed_mps"], UNKNOWN_ROBOT["max_turn_rate_radps"])
 
@@ -106,11 +108,21 @@ class DrivenAttached(DrivenSystem):
     def reach(self, robot: str) -> Reach:
         return REACH
 
+    @property
     @override
-    def place_of(self, position: m.Position) -> tuple[float, float, str | None]:
-        x, y = self._system.frame.to_xy(position.latitude, position.longitude)
-        site = self._system.site
-        return x, y, UNKNOWN_ROOM if site is None else site.room_at(x, y)
+    def site(self) -> Site | None:
+        return self._system.site
+
+    @property
+    @override
+    def frame(self) -> GeoFrame:
+        return self._system.frame
+
+    @override
+    def stopped(self) -> list[str]:
+        now = self.clock.now
+        devices = self._system.state.devices.items()
+        return [id_tag for id_tag, entry in devices if emergency_of(entry, now, {}) is not None]
 
     @override
     def hears(self, robot: str) -> bool:

@@ -72,7 +72,7 @@ class AttachedPages:
         self.show: Show = lambda *_: None
         self.dropped: Callable[[], int] = lambda: 0
         self.looked = False
-        self.people = AttachedPeople()
+        self.people = AttachedPeople(system)
         self.sensors = WatchedSensors(system.device, system.state, system.id_of)
         self.requests = RequestReader(system.agent, lambda line: self.tell(line))
         self.alarms = ConsoleAlarms(RemoteAlarmFacts(system), system.agent)

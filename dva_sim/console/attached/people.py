@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
+from dva_sim.agents.control_room.control_room import ControlRoomAgent
+from dva_sim.agents.device import do_nothing
+from dva_sim.console.asking.refusal import NO_ANSWER, OnResult, Refused
+from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audited import name_of_page
 from dva_sim.console.wire.events import RoomEntry
 from dva_sim.protocol.devices import ControlRoomRole
@@ -10,26 +17,48 @@ Named = tuple[str, ControlRoomRole]
 
 
 class AttachedPeople:
-    """The people at the pages, by what they call themselves.
+    """The people at the pages, by what they call themselves; see `DecidingRooms`.
+
+    Args:
+        system: System to which the console is attached.
 
     Attributes:
+        listener: The console's own control room.
         by_client: The name of each who has joined, and what the address of its page allows.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, system: AttachedSystem) -> None:
+        self._system = system
+        self.listener = system.agent
         self.by_client: dict[str, Named] = {}
         self._come = 0
 
-    def join(self, client: str, role: str, name: str) -> str:
-        """Somebody decides from now on, or is called otherwise; the name."""
-        known = self.by_client.get(client)
-        if not name and known is not None:
-            return known[0]
-        if not name:
-            self._come += 1
-            name = f"{role}-{self._come}"
-        self.by_client[client] = name, ControlRoomRole(role)
-        return name
+    def join(self, client: str, role: str, name: str, on_result: OnResult) -> None:
+        """Let a page's person decide from now on, or be called otherwise.
+
+        Raises:
+            Refused: the DVA does not answer.
+        """
+        if not self._system.answers:
+            raise Refused(NO_ANSWER)
+        self._system.let_decide(do_nothing)
+        if name or client not in self.by_client:
+            self.by_client[client] = name or self._new_name(role), ControlRoomRole(role)
+        on_result(True, f"you are {self.author(client)}, and may {self._system.role}")
+
+    def _new_name(self, role: str) -> str:
+        self._come += 1
+        return f"{role}-{self._come}"
+
+    def decide(
+        self,
+        client: str,
+        role: str,
+        on_result: OnResult,
+        then: Callable[[ControlRoomAgent, OnResult], object],
+    ) -> None:
+        """Call `then` with the console's control room once the DVA lets it decide."""
+        self._system.let_decide(partial(then, self.listener, on_result))
 
     def leave(self, client: str) -> None:
         """A page is gone for good."""

@@ -210,10 +210,6 @@ class AttachedSystem:
         """Time since the start [ms]."""
         return round(1000 * self.clock.now)
 
-    def place_of(self, x: float, y: float) -> m.Position:
-        """Return the geographic position of a place on the map [m]."""
-        return m.Position(*self.frame.to_latlon(x, y))
-
     @property
     def is_placed(self) -> bool:
         """True if the geographic position of the map is known."""

@@ -9,8 +9,11 @@ from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.operator.strategies import Reach
 from dva_sim.console.asking.refusal import OnResult
 from dva_sim.console.driving.seating import Seating
+from dva_sim.console.events.decisions import UNKNOWN_ROOM
 from dva_sim.network.realtime import PacedClock
 from dva_sim.protocol import messages as m
+from dva_sim.worlds.geo import GeoFrame
+from dva_sim.worlds.site import Site
 
 
 class DrivenSystem(ABC):
@@ -72,9 +75,24 @@ class DrivenSystem(ABC):
     def reach(self, robot: str) -> Reach:
         """Return the limits of a robot."""
 
+    @property
     @abstractmethod
+    def site(self) -> Site | None:
+        """Return the site, if one is known."""
+
+    @property
+    @abstractmethod
+    def frame(self) -> GeoFrame:
+        """Return the origin of the map."""
+
     def place_of(self, position: m.Position) -> tuple[float, float, str | None]:
         """Return a position on the map [m], and its room."""
+        x, y = self.frame.to_xy(position.latitude, position.longitude)
+        return x, y, UNKNOWN_ROOM if self.site is None else self.site.room_at(x, y)
+
+    @abstractmethod
+    def stopped(self) -> Sequence[str]:
+        """Return the ids of the robots that an emergency holds."""
 
     @abstractmethod
     def hears(self, robot: str) -> bool:

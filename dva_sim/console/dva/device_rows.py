@@ -88,7 +88,7 @@ class DeviceRows:
     def _row(self, booked: BookedDevice, fakes: Collection[str]) -> DeviceRow:
         id_tag = booked.device.id_tag
         robot = self._run.field.robots.get(id_tag)
-        holding = booked.holding
+        grant = booked.grant
         rate = self._rate_of(robot, self._run.clock.now)
         row = device_row(
             booked.device,
@@ -96,8 +96,8 @@ class DeviceRows:
             heard_s=booked.heard_s,
             silent=booked.silent,
             beats_hz=booked.beats_hz,
-            holder=None if holding is None else holding.holder,
-            holder_label=None if holding is None else holding.label,
+            holder=None if grant is None else grant.holder,
+            holder_label=None if grant is None else booked.holder_label,
             is_fake=id_tag in fakes,
         )
         row["round_trip_s"] = self._round_trip(id_tag)
@@ -105,9 +105,8 @@ class DeviceRows:
         if robot is not None:
             row["refused"] = robot.refused
             row["picture_age_s"] = _rounded(robot.picture_age, 2) if rate else None
-        if holding is not None:
-            row["level"] = holding.level
-            row["ends_s"] = _rounded(holding.ends_in, 1)
+        row["level"] = None if grant is None else grant.level
+        row["ends_s"] = _rounded(booked.ends_in, 1)
         return row
 
     def _doing(self, booked: BookedDevice) -> str | None:

@@ -16,6 +16,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.control_room import FREE
 from dva_sim.worlds.site import Site
 
+UNKNOWN_ROOM: Final = "unknown room"  # where no site is known
 CERTAIN: Final = 0.9  # of what somebody in a control room reports
 DECISIONS: Final = (
     *("event_acknowledge", "event_assign", "event_take_off", "event_false_alarm"),
@@ -64,15 +65,15 @@ def decision_of(
     return m.SetDispatch(mode, reason), asks
 
 
-def place_of(line: PlaceAsked, site: Site) -> tuple[float, float]:
-    """A place on the site [m].
+def place_of(line: PlaceAsked, site: Site | None) -> tuple[float, float]:
+    """A place on the site [m]; where no site is known, any place.
 
     Raises:
-        Refused: it lies beyond it.
+        Refused: it lies beyond the site.
     """
     x = line["x_m"]
     y = line["y_m"]
-    left, low, right, high = site.extent
+    left, low, right, high = (x, y, x, y) if site is None else site.extent
     if not (left <= x <= right and low <= y <= high):
         raise Refused("x_m and y_m should be a place on the site")
     return x, y
@@ -84,6 +85,11 @@ def report_of(line: ReportAsked, place: m.Position) -> tuple[m.EventReport, str]
     severity = SEVERITIES[line["severity"]]
     report = m.EventReport(None, kind, place, severity, CERTAIN, "detected")
     return report, f"{kind.replace('_', ' ')} is raised"
+
+
+def why(reply: m.Reply) -> str:
+    """Return why a reply refuses, in words."""
+    return reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
 
 
 def answer_of(reply: m.Reply, is_robot: Callable[[str], bool]) -> Answered:

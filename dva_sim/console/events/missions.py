@@ -8,7 +8,7 @@ from typing import Final
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.operator.steps import give_back, start
 from dva_sim.console.asking.refusal import OnResult, unanswered
-from dva_sim.console.events.rooms import why
+from dva_sim.console.events.decisions import why
 from dva_sim.protocol import messages as m
 
 ASK_PERIOD: Final = 3.0  # from one question how a mission stands to the next [s]

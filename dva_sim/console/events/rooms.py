@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Final, Unpack
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
@@ -67,34 +66,6 @@ class ConsoleRoom:
         """Its identity, and ways to talk."""
         return self.agent.device
 
-    def ask(
-        self,
-        body: m.Body,
-        on_result: OnResult,
-        done: str,
-        then: Callable[[m.Reply], Answered] | None = None,
-    ) -> None:
-        """Ask the DVA, and tell how that went.
-
-        Args:
-            body: Content of the request.
-            on_result: Callback for the result.
-            done: Description in words, if it is done.
-            then: Function that extends a positive reply.
-        """
-
-        def answered(reply: m.Reply) -> None:
-            ok = reply.code == m.OK
-            more = then(reply) if ok and then is not None else {}
-            on_result(ok, done if ok else why(reply), **more)
-
-        self.agent.ask(body, answered, partial(unanswered, on_result))
-
-
-def why(reply: m.Reply) -> str:
-    """Return why a reply refuses, in words."""
-    return reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
-
 
 class ConsoleRooms:
     """All control rooms of a console.
@@ -127,6 +98,24 @@ class ConsoleRooms:
         self._switched = self.listener.device.clock.now
 
     # --- who decides ------------------------------------------------------------------------
+
+    def decide(
+        self,
+        client: str,
+        role: str,
+        on_result: OnResult,
+        then: Callable[[ControlRoomAgent, OnResult], object],
+    ) -> None:
+        """Call `then` with the control room of a page; it gets one with its first decision."""
+
+        def joined(ok: bool, text: str, /, **_: Unpack[Answered]) -> None:
+            room = self.by_client.get(client)
+            if ok and room is not None:
+                then(room.agent, room.until_answered(on_result))
+            else:
+                on_result(False, text)
+
+        self.join(client, role, "", joined)
 
     def join(self, client: str, role: str, name: str, on_result: OnResult) -> None:
         """A page's person gets a device of its role, or its device gets another name."""
@@ -210,16 +199,6 @@ class ConsoleRooms:
         """Return the name of a page's person; empty without a control room."""
         room = self.by_client.get(client)
         return "" if room is None else room.device.label
-
-    def decisions(self, number: int) -> int | None:
-        """Return how many decisions on an event there have been, as far as is known here."""
-        status = self.listener.events.get(number)
-        return None if status is None else status.decisions
-
-    def event_of(self, robot: str) -> m.EventStatus | None:
-        """Return the open event that a robot was sent to."""
-        every = self.listener.events.values()
-        return next((e for e in every if e.closed_for is None and e.responder == robot), None)
 
     def line(self, now_ms: int) -> ControlLine:
         """Return the dispatch mode, and who decides."""

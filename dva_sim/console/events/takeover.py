@@ -13,7 +13,7 @@ from typing import Final, Unpack
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.console.asking.refusal import OnResult, unanswered
-from dva_sim.console.events.rooms import why
+from dva_sim.console.events.decisions import why
 from dva_sim.console.wire.seats import Answered
 from dva_sim.protocol import messages as m
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import OnResult, Refused
+from dva_sim.console.driving.decision_actions import DecisionActions
 from dva_sim.console.driving.drive_actions import LOOK, Driving, is_gone_for_good
 from dva_sim.console.events.alarm_actions import AlarmActions
 from dva_sim.console.guards.guard_actions import GuardActions
 from dva_sim.console.people.phone_actions import PhoneActions
-from dva_sim.console.people.room_actions import RoomActions
 from dva_sim.console.people.tour import tour_of
 from dva_sim.console.robots.robot_actions import RobotActions
 from dva_sim.console.wire.actions import ActionPlace, Asked
@@ -39,7 +39,7 @@ class Actions:
         self._world = world
         self._driving = driving = Driving(world.driven)
         self._phones = driving.phones = PhoneActions(world, driving)
-        self._rooms = RoomActions(world, driving)
+        decisions = DecisionActions(world.driven, world.rooms, driving)
         self._at_robots = RobotActions(
             world.windows,
             driving.robot,
@@ -51,7 +51,7 @@ class Actions:
         world.driven.hands = self._at_robots
         guards = GuardActions(world.guards, world.run.stage.site)
         alarms = AlarmActions(world.alarms, world.author, lambda *given: dispatcher.do(*given))
-        holders = self, driving, self._phones, self._at_robots, guards, self._rooms, alarms
+        holders = self, driving, self._phones, self._at_robots, guards, decisions, alarms
         dispatcher = ActionDispatcher(
             ActionPlace.WORLD,
             holders=(*holders, world.dva),
@@ -73,13 +73,13 @@ class Actions:
     def _release(self, client: str, line: Asked, on_result: OnResult) -> None:
         if is_gone_for_good(line):
             self._phones.forget(client)
-            self._rooms.forget(client)
+            self._world.rooms.leave(client)
         self._driving.release(client, on_result)
 
     @does("here")
     def _here(self, _: str, line: PagesHere) -> None:
         self._driving.attend(line)
-        self._rooms.attend(line["pages"])
+        self._world.rooms.attend(line["pages"])
 
     @does("samples")
     def _samples(self, client: str, line: SampleBatch) -> None:

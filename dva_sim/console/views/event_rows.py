@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from typing import Final
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
-from dva_sim.console.events.decisions import about_event
+from dva_sim.console.events.decisions import UNKNOWN_ROOM, about_event
 from dva_sim.console.wire.events import SiteEventShown
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.site import Site
 
 SEVERITIES: Final = ((0.75, "critical"), (0.5, "high"), (0.25, "medium"), (0.0, "low"))
-UNKNOWN_ROOM: Final = "unknown room"  # where no site is known
 MOST_OVER: Final = 50  # events that are over
 
 

@@ -20,9 +20,10 @@ from dva_sim.console.run.lag import LagRule
 from dva_sim.console.views.feed import Feed
 from dva_sim.console.views.foreign_devices import ForeignDevices
 from dva_sim.network.realtime import PacedClock
-from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.control_room import console_of
 from dva_sim.simulation.full.run import Run
+from dva_sim.worlds.geo import GeoFrame
+from dva_sim.worlds.site import Site
 
 PEOPLE: Final = 1  # operators of the scenario whose places people take
 
@@ -130,11 +131,21 @@ class DrivenRun(DrivenSystem):
     def reach(self, robot: str) -> Reach:
         return self._run.stage.reach(robot)
 
+    @property
     @override
-    def place_of(self, position: m.Position) -> tuple[float, float, str | None]:
-        site = self._run.stage.site
-        x, y = site.frame.to_xy(position.latitude, position.longitude)
-        return x, y, site.room_at(x, y)
+    def site(self) -> Site:
+        return self._run.stage.site
+
+    @property
+    @override
+    def frame(self) -> GeoFrame:
+        return self.site.frame
+
+    @override
+    def stopped(self) -> list[str]:
+        here = self._run.field.robots.items()
+        latched = (robot for robot, agent in here if agent.controller.latch.holds)
+        return [*latched, *self._foreign.stopped()]
 
     @override
     def hears(self, robot: str) -> bool:

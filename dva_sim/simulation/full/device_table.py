@@ -8,31 +8,14 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Final
 
-from dva_sim.core.dva import Dva
 from dva_sim.core.registry import DeviceEntry
+from dva_sim.core.sessions import Grant
 from dva_sim.kernel.rates import Rate
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import ROBOT
 from dva_sim.simulation.full.dva_server import DvaAgent
 
 MOST_ROWS: Final = 200  # of the table; more are read by nobody
-
-
-@dataclass(frozen=True, slots=True)
-class Holding:
-    """Permission for a robot.
-
-    Attributes:
-        holder: Id of the device that holds it.
-        label: Label of that device; empty if the DVA has forgotten it.
-        level: Level of the permission.
-        ends_in: Time until it ends [s]; None: it does not end by itself.
-    """
-
-    holder: str
-    label: str
-    level: str
-    ends_in: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +30,9 @@ class BookedDevice:
         order: Number of the event that it has an order for.
         mode: Last mode of a robot that has told its status.
         is_stopped: True if an emergency holds it.
-        holding: Permission for it, if somebody has one.
+        grant: Permission for it, if somebody has one.
+        holder_label: Label of the device that holds it; empty if the DVA has forgotten that.
+        ends_in: Time until the permission ends [s]; infinite if it does not end by itself.
     """
 
     device: m.Device
@@ -57,7 +42,9 @@ class BookedDevice:
     order: int | None
     mode: str | None
     is_stopped: bool
-    holding: Holding | None
+    grant: Grant | None
+    holder_label: str
+    ends_in: float
 
 
 class DeviceTable:
@@ -82,6 +69,11 @@ class DeviceTable:
         dva = self._dva()
         core = dva.core
         now = dva.device.clock.now
+        grant = core.sessions.permissions.grants.get(id_tag)
+        holder = None if grant is None else core.registry.entries.get(grant.holder)
+        ends_in = math.inf
+        if grant is not None and holder is not None:
+            ends_in = core.access.ends(holder.device, entry.device, grant.level, now) - now
         is_seen = entry.kind == ROBOT and entry.position is not None
         return BookedDevice(
             device=entry.device,
@@ -91,17 +83,7 @@ class DeviceTable:
             order=next((event.number for event in core.orders.engaged.all(id_tag)), None),
             mode=entry.mode if is_seen else None,
             is_stopped=core.emergencies.holds(id_tag),
-            holding=_holding(core, entry, now),
+            grant=grant,
+            holder_label="" if holder is None else holder.device.label,
+            ends_in=ends_in,
         )
-
-
-def _holding(core: Dva, robot: DeviceEntry, now: float) -> Holding | None:
-    grant = core.sessions.permissions.grants.get(robot.device.id_tag)
-    if grant is None:
-        return None
-    entry = core.registry.entries.get(grant.holder)
-    if entry is None:
-        return Holding(grant.holder, "", grant.level, None)
-    left = core.access.ends(entry.device, robot.device, grant.level, now) - now
-    ends_in = left if math.isfinite(left) else None
-    return Holding(grant.holder, entry.device.label, grant.level, ends_in)

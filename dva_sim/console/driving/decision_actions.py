@@ -1,0 +1,185 @@
+"""Decisions of people at pages: each becomes messages of a control room, and nothing else.
+
+The DVA decides if that is allowed: it alone knows the role of each control room.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Protocol
+
+from dva_sim.agents.control_room.control_room import ControlRoomAgent
+from dva_sim.console.asking.dispatcher import does
+from dva_sim.console.asking.refusal import OnResult, Refused, unanswered
+from dva_sim.console.asking.releases import NOBODY_STOPPED, release_robots, revoke_permission
+from dva_sim.console.driving.drive_actions import Driving
+from dva_sim.console.driving.driven_system import DrivenSystem
+from dva_sim.console.events.decisions import (
+    DECISIONS,
+    answer_of,
+    decision_of,
+    place_of,
+    report_of,
+    why,
+)
+from dva_sim.console.events.missions import inspection_of, send_on_mission
+from dva_sim.console.wire.actions import Asked
+from dva_sim.console.wire.arguments import (
+    MissionAsked,
+    OfDevice,
+    OfSome,
+    ReportAsked,
+    RoomName,
+    TakeoverAsked,
+)
+from dva_sim.protocol import messages as m
+
+Decide = Callable[[ControlRoomAgent, OnResult], object]
+
+
+class DecidingRooms(Protocol):
+    """Control rooms of a console: one for each person who decides, or one for all.
+
+    Attributes:
+        listener: Control room that knows events and devices for the pages.
+    """
+
+    listener: ControlRoomAgent
+
+    def join(self, client: str, role: str, name: str, on_result: OnResult) -> None:
+        """Let a page's person decide, within a role, under a name of their own.
+
+        Raises:
+            Refused: nobody can.
+        """
+
+    def decide(self, client: str, role: str, on_result: OnResult, then: Decide) -> None:
+        """Call `then` with the control room of a page's person, once the DVA knows its role."""
+
+
+class DecisionActions:
+    """Does what people ask for about events, and about robots that the DVA holds or grants.
+
+    Args:
+        system: System whose events and robots those are.
+        rooms: Control rooms of the console.
+        driving: Seats, and drives from pages.
+    """
+
+    def __init__(self, system: DrivenSystem, rooms: DecidingRooms, driving: Driving) -> None:
+        self._system = system
+        self._rooms = rooms
+        self._driving = driving
+
+    @does("room_join")
+    def _join(self, client: str, line: RoomName, on_result: OnResult) -> None:
+        self._rooms.join(client, _role(line), line["name"].strip(), on_result)
+
+    # --- events -----------------------------------------------------------------------------
+
+    @does(*DECISIONS)
+    def decide(self, client: str, line: Asked, on_result: OnResult) -> None:
+        """Decide on an event."""
+        body, done = decision_of(line, self._device, self._seen)
+        self._rooms.decide(client, _role(line), on_result, partial(self._ask, body, done))
+
+    @does("event_raise")
+    def _raise(self, client: str, line: ReportAsked, on_result: OnResult) -> None:
+        x, y = place_of(line, self._system.site)
+        body, done = report_of(line, m.Position(*self._system.frame.to_latlon(x, y)))
+        self._rooms.decide(client, _role(line), on_result, partial(self._ask, body, done))
+
+    def _ask(self, body: m.Body, done: str, agent: ControlRoomAgent, on_result: OnResult) -> None:
+        agent.raised = None
+
+        def answered(reply: m.Reply) -> None:
+            if reply.code != m.OK:
+                on_result(False, why(reply))
+                return
+            more = answer_of(reply, lambda device: device in self._system.robots())
+            if isinstance(body, m.EventReport) and agent.raised is not None:
+                more["event"] = agent.raised
+            on_result(True, done, **more)
+
+        agent.ask(body, answered, partial(unanswered, on_result))
+
+    def _seen(self, event: int) -> int | None:
+        """Return how many decisions on an event are known here."""
+        status = self._rooms.listener.events.get(event)
+        return None if status is None else status.decisions
+
+    def _device(self, label: str) -> str:
+        """The id of a device by its label.
+
+        Raises:
+            Refused: the DVA has listed none of that label.
+        """
+        for id_tag in self._rooms.listener.devices:
+            if self._system.label_of(id_tag) == label:
+                return id_tag
+        raise Refused(f"there is no device {label!r}")
+
+    # --- robots -----------------------------------------------------------------------------
+
+    @does("mission")
+    def _mission(self, client: str, line: MissionAsked, on_result: OnResult) -> None:
+        """Have a robot go to an event by itself, and look at it."""
+        status = self._rooms.listener.events.get(line["event"])
+        if status is None:
+            raise Refused(f"there is no event {line['event']}")
+        robot = self._driving.robot(line["robot"])
+        label = self._system.label_of(robot)
+
+        def send(agent: ControlRoomAgent, on_result: OnResult) -> None:
+            send_on_mission(agent.device, robot, label, inspection_of(status), on_result)
+
+        self._rooms.decide(client, _role(line), on_result, send)
+
+    @does("revoke")
+    def _revoke(self, client: str, line: OfDevice, on_result: OnResult) -> None:
+        robot = self._driving.robot(line["device"])
+        label = self._system.label_of(robot)
+
+        def revoke(agent: ControlRoomAgent, on_result: OnResult) -> None:
+            revoke_permission(robot, label, agent.ask, on_result)
+
+        self._rooms.decide(client, _role(line), on_result, revoke)
+
+    @does("release_emergency")
+    def _release(self, client: str, line: OfSome, on_result: OnResult) -> None:
+        """Release robots that an emergency holds."""
+        stopped = self._system.stopped()
+        robots = [robot for robot in self._driving.robots_in(line) if robot in stopped]
+        if not robots:
+            raise Refused(NOBODY_STOPPED)
+        labels = {robot: self._system.label_of(robot) for robot in robots}
+
+        def release(agent: ControlRoomAgent, on_result: OnResult) -> None:
+            release_robots(robots, labels, agent.ask, on_result)
+
+        self._rooms.decide(client, _role(line), on_result, release)
+
+    @does("take_over")
+    def _take_over(self, client: str, line: TakeoverAsked, on_result: OnResult) -> None:
+        """Take a robot and its task from its driver into the client's own seat."""
+        robot = self._driving.robot(line["robot"])
+        events = self._rooms.listener.events.values()
+        sent = (e for e in events if e.closed_for is None and e.responder == robot)
+        event = next(sent, None)
+
+        def begin(agent: ControlRoomAgent, on_result: OnResult) -> None:
+            self._driving.take_over(
+                client,
+                agent=agent,
+                robot=robot,
+                reason=line["reason"],
+                event=event,
+                on_result=on_result,
+            )
+
+        self._rooms.decide(client, _role(line), on_result, begin)
+
+
+def _role(line: Mapping[str, object]) -> str:
+    return str(line.get("role", "look"))
