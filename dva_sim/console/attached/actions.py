@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
-from dva_sim.console.asking.refusal import OnResult, Refused
+from dva_sim.console.asking.refusal import OnResult
 from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.bench import NOT_HERE, ServerActions
 from dva_sim.console.driving.decision_actions import DecisionActions
@@ -11,9 +11,7 @@ from dva_sim.console.driving.drive_actions import LOOK, Driving, is_gone_for_goo
 from dva_sim.console.events.alarm_actions import AlarmActions
 from dva_sim.console.wire.actions import ActionPlace, Asked
 from dva_sim.console.wire.arguments import (
-    FakeAsked,
     LogsLooked,
-    OfDevice,
     PagesHere,
     RobotsWatched,
 )
@@ -32,14 +30,14 @@ class AttachedActions:
 
     def __init__(self, pages: AttachedPages) -> None:
         self._pages = pages
-        self._system = pages.system
+        system = pages.system
         self._driving = driving = Driving(pages.driven)
         decisions = DecisionActions(pages.driven, pages.people, driving)
         author = pages.people.author
         alarms = AlarmActions(pages.alarms, author, lambda *given: dispatcher.do(*given))
         dispatcher = ActionDispatcher(
             ActionPlace.ATTACHED,
-            holders=(self, driving, decisions, alarms, ServerActions(self._system.bench)),
+            holders=(self, driving, decisions, alarms, system.fakes, ServerActions(system.bench)),
             tell=self._tell,
             elsewhere=NOT_HERE,
             audited=lambda: pages.audited,
@@ -56,7 +54,7 @@ class AttachedActions:
         self._pages.sensors.watch(line["robots"])
 
     def _tell(self, answer: DoneLine) -> None:
-        self._pages.tell({**answer, "t": self._system.now_ms})
+        self._pages.tell({**answer, "t": self._pages.system.now_ms})
 
     @does("release")
     def _release(self, client: str, line: Asked, on_result: OnResult) -> None:
@@ -72,16 +70,3 @@ class AttachedActions:
     @does("gone")
     def _gone(self, client: str, _: Asked) -> None:
         self._driving.end_hidden(client)
-
-    @does("fake_add")
-    def _add_fake(self, _: str, line: FakeAsked, on_result: OnResult) -> None:
-        if self._system.options.keys is not None:
-            raise Refused("with --keys, a fake device would need a key of its own")
-        self._system.fakes.add(line, on_result)
-
-    @does("fake_remove")
-    def _remove_fake(self, _: str, line: OfDevice, on_result: OnResult) -> None:
-        label = self._system.fakes.remove(line["device"])
-        on_result(
-            True, f"{label} speaks no more: the DVA takes it from its list within some seconds"
-        )

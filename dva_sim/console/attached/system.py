@@ -10,6 +10,7 @@ from typing import Final
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice, do_nothing
+from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.attached.links import AttachedLinks
 from dva_sim.console.attached.options import scenario_shown
 from dva_sim.console.bench import Bench
@@ -82,7 +83,13 @@ class AttachedSystem:
         self.on_devices: Callable[[], object] = do_nothing
         self.on_record: Callable[[m.AuditRecord], object] = do_nothing
         self.state = SystemState(self.device, self.labels, lambda: self.on_devices())
-        self.fakes = FakeDevices(self._make, self._is_known, _identity, self._drop)
+        self.fakes = FakeDevices(
+            self._make_fake,
+            is_known=self._is_known,
+            id_of=_identity,
+            dismiss=do_nothing,  # the DVA there finds out by itself that it is silent
+            removed="speaks no more: the DVA takes it from its list within some seconds",
+        )
         self.has_all_events = False
         self._asked = -POLL
         self._is_asking = self._was_silent = False
@@ -280,11 +287,13 @@ class AttachedSystem:
             time_of_day=start_of_day(self.clock),
         )
 
+    def _make_fake(self, id_tag: str, label: str, kind: str, address: str) -> AgentDevice:
+        if self.options.keys is not None:
+            raise Refused("with --keys, a fake device would need a key of its own")
+        return self._make(id_tag, label, kind, address)
+
     def _is_known(self, id_tag: str) -> bool:
         return id_tag in (DVA, self.device.id_tag) or id_tag in self.state.devices
-
-    def _drop(self, id_tag: str) -> None:
-        """The DVA there finds out by itself that it is silent."""
 
 
 def _identity(number: int) -> tuple[str, str]:

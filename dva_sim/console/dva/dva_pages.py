@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 
 from dva_sim.agents.device import AgentDevice
-from dva_sim.console.asking.dispatcher import does
-from dva_sim.console.asking.refusal import OnResult
 from dva_sim.console.bench import ServerActions
 from dva_sim.console.dva.device_rows import DeviceRows
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.dva.run_bench import RunBench
 from dva_sim.console.run.real_links import ConsoleSockets
-from dva_sim.console.wire.arguments import FakeAsked, OfDevice
 from dva_sim.console.wire.rows import DevicesLine
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA, address_of, id_of
@@ -29,6 +26,7 @@ class DvaPages(ServerActions):
 
     Attributes:
         bench: Bench on which the DVA runs.
+        fakes: Devices that were added by hand, which hear nothing.
         looked: True while somebody looks at the table of devices.
     """
 
@@ -45,29 +43,20 @@ class DvaPages(ServerActions):
         self._is_real = sockets is not None
         self.looked = False
         self._rows = DeviceRows(run, self.bench)
-        self._fakes = FakeDevices(
-            self._make, self.bench.is_registered, self._identity, self._dismiss
+        self.fakes = FakeDevices(
+            self._make,
+            is_known=self.bench.is_registered,
+            id_of=self._identity,
+            dismiss=self._dismiss,
+            removed="is removed",
         )
-
-    @property
-    def fakes(self) -> Collection[str]:
-        """Ids of the devices that were added by hand, which hear nothing."""
-        return self._fakes.devices.keys()
 
     def devices(self, now_ms: int) -> DevicesLine | None:
         """The table, once a second; None if nobody looks."""
         if not self.looked:
             return None
-        rows = self._rows.rows(self._fakes.devices)
+        rows = self._rows.rows(self.fakes.devices)
         return {"k": "devices", "t": now_ms, "devices": rows}
-
-    @does("fake_add")
-    def _add(self, _: str, line: FakeAsked, on_result: OnResult) -> None:
-        self._fakes.add(line, on_result)
-
-    @does("fake_remove")
-    def _remove(self, _: str, line: OfDevice, on_result: OnResult) -> None:
-        on_result(True, f"{self._fakes.remove(line['device'])} is removed")
 
     # --- fake devices ----------------------------------------------------------------------
 

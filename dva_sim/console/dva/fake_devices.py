@@ -12,8 +12,9 @@ from collections.abc import Callable
 from typing import Final
 
 from dva_sim.agents.device import AgentDevice
+from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import OnResult, Refused, unanswered
-from dva_sim.console.wire.arguments import FakeAsked
+from dva_sim.console.wire.arguments import FakeAsked, OfDevice
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.limits import pattern
@@ -34,6 +35,7 @@ class FakeDevices:
         id_of: Function that returns the id of the n-th fake device, and an address at which nobody
             is, from 1.
         dismiss: Forgets a device, and makes the DVA forget it where it can be made to.
+        removed: Predicate of a sentence about a device that was removed.
 
     Attributes:
         devices: By id.
@@ -45,14 +47,17 @@ class FakeDevices:
         is_known: Callable[[str], bool],
         id_of: Callable[[int], tuple[str, str]],
         dismiss: Callable[[str], object],
+        removed: str,
     ) -> None:
         self._make = make
+        self._removed_text = removed
         self._is_known = is_known
         self._id_of = id_of
         self._dismiss = dismiss
         self.devices: dict[str, AgentDevice] = {}
 
-    def add(self, line: FakeAsked, on_result: OnResult) -> None:
+    @does("fake_add")
+    def add(self, _: str, line: FakeAsked, on_result: OnResult) -> None:
         """Add one; `on_result` hears whether the DVA has taken it.
 
         Raises:
@@ -82,17 +87,18 @@ class FakeDevices:
             self._drop(device)
             raise Refused(error.reason) from None
 
-    def remove(self, id_tag: str) -> str:
-        """Remove one; its label.
+    @does("fake_remove")
+    def remove(self, _: str, line: OfDevice, on_result: OnResult) -> None:
+        """Remove one.
 
         Raises:
             Refused: there is none of that id.
         """
-        device = self.devices.get(id_tag)
+        device = self.devices.get(line["device"])
         if device is None:
-            raise Refused(f"There is no fake device {id_tag}.")
+            raise Refused(f"There is no fake device {line['device']}.")
         self._drop(device)
-        return device.label
+        on_result(True, f"{device.label} {self._removed_text}")
 
     def _drop(self, device: AgentDevice) -> None:
         self.devices.pop(device.id_tag, None)

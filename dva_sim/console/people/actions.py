@@ -54,7 +54,7 @@ class Actions:
         holders = self, driving, self._phones, self._at_robots, guards, decisions, alarms
         dispatcher = ActionDispatcher(
             ActionPlace.WORLD,
-            holders=(*holders, world.dva),
+            holders=(*holders, world.dva, world.dva.fakes),
             tell=self._tell,
             elsewhere="no action {what!r}",
             audited=lambda: world.audited,
