@@ -5,10 +5,9 @@ While the DVA does not answer, what it last said stays shown, with a word that s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Final
 
-from dva_sim.agents.robot.controller import Mode
 from dva_sim.cameras.lines import Show
 from dva_sim.console.attached import lines
 from dva_sim.console.attached.audit import AttachedAudit
@@ -26,7 +25,7 @@ from dva_sim.console.run.lag import LagRule
 from dva_sim.console.views.event_rows import event_rows
 from dva_sim.console.views.feed import story_of
 from dva_sim.console.views.news import News, clock_shown
-from dva_sim.console.views.published_rows import SILENT_AFTER, positions, robot_row
+from dva_sim.console.views.published_rows import positions, robot_row
 from dva_sim.console.wire.arguments import LogsLooked
 from dva_sim.console.wire.events import SiteEventShown
 from dva_sim.console.wire.lines import Tell
@@ -75,7 +74,7 @@ class AttachedPages:
         self.people = AttachedPeople(system)
         self.sensors = WatchedSensors(system.device, system.state, system.id_of)
         self.requests = RequestReader(system.agent, lambda line: self.tell(line))
-        self.alarms = ConsoleAlarms(RemoteAlarmFacts(system), system.agent)
+        self.alarms = ConsoleAlarms(system.agent, system.named)
         self.audited = AttachedAudit(audit, system, self.people.author)
         system.on_record = self.audited.heard
         self._hearing: Hearing = "never"
@@ -179,7 +178,7 @@ class AttachedPages:
         system = self.system
         now_ms = self.system.now_ms
         is_known = system.has_all_events and system.answers
-        known = self.alarms.look(self._events(), [], now_ms) if is_known else None
+        known = self.alarms.look(self._events(), self._robots(), now_ms) if is_known else None
         self._news.tell(known or self.alarms.hold(now_ms))
 
     def _robots(self) -> list[RobotRow]:
@@ -262,29 +261,3 @@ class AttachedPages:
                 for id_tag, entry in self.system.state.devices.items()
             ]
             self.tell({"k": "devices", "t": self.system.now_ms, "devices": rows})
-
-
-class RemoteAlarmFacts:
-    """Alarm facts from messages alone; a robot's watchdog shows only as silence.
-
-    Args:
-        system: System to which the console is attached.
-    """
-
-    def __init__(self, system: AttachedSystem) -> None:
-        self._system = system
-
-    def lost(self, robots: Sequence[RobotRow]) -> Iterator[tuple[str, str]]:
-        """Robots of which nothing is heard since they were driven."""
-        for entry in self._system.state.devices.values():
-            status = entry.status
-            driven = isinstance(status, m.RobotStatus) and status.mode == Mode.TELEOPERATION.value
-            if driven and entry.heard is not None and self._is_long_ago(entry.heard):
-                yield entry.device.label, "nothing is heard of it"
-
-    def broken(self) -> tuple[()]:
-        """None is known: the rules are judged where robots and DVA are."""
-        return ()
-
-    def _is_long_ago(self, when: float) -> bool:
-        return self._system.clock.now - when > SILENT_AFTER

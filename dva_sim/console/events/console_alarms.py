@@ -1,13 +1,13 @@
 """Alarms: conditions that need somebody to act, and what people at pages do about them.
 
-The console shows a run, or a remote system: both tell the same few facts (`AlarmFacts`).
+They are derived from what pages are shown, of a run or of a remote system.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.robot.controller import Mode
@@ -17,48 +17,19 @@ from dva_sim.console.wire.events import AlarmsLine, SiteEventShown
 from dva_sim.console.wire.rows import RobotRow
 from dva_sim.kernel.recorder import Breach
 from dva_sim.protocol.devices import GUARD, ROBOT
-from dva_sim.simulation.full.run import Run
 
 ESCALATED_FOR: Final = 60.0  # so long an escalation counts as lasting, time of the run [s]
 OUTDOORS: Final = "outdoors"
-
-
-class AlarmFacts(Protocol):
-    """Facts that can become alarms, besides the events that pages know."""
-
-    def lost(self, robots: Sequence[RobotRow]) -> Iterable[tuple[str, str]]:
-        """The labels of robots that are lost in drive, by the rows that pages get, and why."""
-
-    def broken(self) -> Iterable[Breach]:
-        """The safety rules that are broken, as far as anybody can tell."""
-
-
-class RunFacts:
-    """Those of a run."""
-
-    def __init__(self, run: Run) -> None:
-        self._run = run
-
-    def lost(self, robots: Sequence[RobotRow]) -> Iterator[tuple[str, str]]:
-        """Robots that their watchdog has stopped."""
-        labels = self._run.stage.labels
-        by_row = {n: labels[robot] for n, robot in enumerate(self._run.field.robots)}
-        for row in robots:
-            driven = row["mode"] == Mode.TELEOPERATION.value and row["watchdog_left_s"] == 0.0
-            if driven and "first command" not in row["stop_reason"]:
-                yield by_row.get(row["i"], str(row["i"])), "its watchdog stopped it"
-
-    def broken(self) -> Iterable[Breach]:
-        """Return the breaches that the audit of the run has found."""
-        return self._run.recorder.broken.values()
+UNHEARD: Final = "nothing is heard of it"  # why a robot stands whose messages alone are known
 
 
 class ConsoleAlarms:
     """The alarms of a console.
 
     Args:
-        facts: Facts about the displayed system.
         agent: Control room that knows events and devices.
+        named: Function that returns the name of a robot by its number, as in `"0"`.
+        breaches: Function that returns the broken safety rules, as far as they are judged here.
         clock: Real time [s]: what people can bear does not hang on the pace of a run.
 
     Attributes:
@@ -67,12 +38,14 @@ class ConsoleAlarms:
 
     def __init__(
         self,
-        facts: AlarmFacts,
         agent: ControlRoomAgent,
+        named: Callable[[str], str],
+        breaches: Callable[[], Iterable[Breach]] = tuple,
         clock: Callable[[], float] | None = None,
     ) -> None:
-        self._facts = facts
         self._agent = agent
+        self._named = named
+        self._breaches = breaches
         self._clock = clock or (lambda: time.monotonic())
         self.alarms = Alarms()
         self._since: dict[str, int] = {}
@@ -111,14 +84,20 @@ class ConsoleAlarms:
         }
 
     def _lost(self, robots: Sequence[RobotRow]) -> Iterator[AlarmCondition]:
-        """Robots that are driven and hear nothing."""
-        for label, why in self._facts.lost(robots):
+        """Robots that are driven and hear nothing, or of which nothing is heard."""
+        for row in robots:
+            is_stopped = row["watchdog_left_s"] == 0.0 and "first command" not in row["stop_reason"]
+            is_lost = is_stopped or row["stop_reason"] == UNHEARD
+            if row["mode"] != Mode.TELEOPERATION.value or not is_lost:
+                continue
+            label = self._named(str(row["i"]))
+            why = "its watchdog stopped it" if is_stopped else UNHEARD
             text = f"{label} is lost in drive: {why}"
             yield AlarmCondition(f"lost {label}", "robot lost", "high", place="", text=text)
 
     def _broken(self) -> Iterator[AlarmCondition]:
         """Safety rules that are broken: for good, so that somebody has to see it."""
-        for breach in self._facts.broken():
+        for breach in self._breaches():
             text = f"{breach.rule} broken by {breach.who}: {breach.what}"
             key = f"rule {breach.rule} {breach.who}"
             since = max(1, round(1000 * breach.time))

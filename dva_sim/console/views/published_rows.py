@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.console.events.console_alarms import UNHEARD
 from dva_sim.console.robots.shown_mode import EMERGENCY, EMERGENCY_LAPSES, emergency_shown
 from dva_sim.console.views.system_state import DeviceState
 from dva_sim.console.wire.rows import EmergencyShown, RobotRow
@@ -55,12 +57,15 @@ def robot_row(
     known = status if isinstance(status, m.RobotStatus) else None
     holding, since = holder if holder is not None else (None, now)
     held = holding is not None and holding.holder is not None
+    is_driven = known is not None and known.mode == Mode.TELEOPERATION.value
+    is_unheard = device_state.heard is not None and now - device_state.heard > SILENT_AFTER
     return {
         **_unknown_robot(
             number,
             known.mode if known is not None else "unknown",
             emergency_of(device_state, now, labels),
         ),
+        "stop_reason": UNHEARD if is_driven and is_unheard else "",
         "holder": holding.holder if holding is not None else None,
         "holder_label": holder_named(holding, labels),
         "session_age_s": round(holding.held_for + now - since, 1) if holding and held else None,

@@ -19,7 +19,7 @@ from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited, name_of_page
 from dva_sim.console.driving.seat_lines import SeatLines
 from dva_sim.console.dva.dva_pages import DvaPages
-from dva_sim.console.events.console_alarms import ConsoleAlarms, RunFacts
+from dva_sim.console.events.console_alarms import ConsoleAlarms
 from dva_sim.console.events.rooms import ConsoleRooms
 from dva_sim.console.guards.played_guards import PlayedGuards
 from dva_sim.console.phones.phones import Phones
@@ -154,7 +154,7 @@ class ConsoleWorld:
         self.feed.things.add(DVA, "dva", "dva")
         self.seat_lines = SeatLines(self.driven, self.phones.by_client)
         self.guards = PlayedGuards(self.run, self.feed)
-        self.alarms = ConsoleAlarms(RunFacts(self.run), self.rooms.listener)
+        self.alarms = ConsoleAlarms(self.rooms.listener, self._named, self.recorder.broken.values)
         self.audited: Audited | None = None
         self.recorder.on_applied = self.seat_lines.applied
         field = self.run.field

@@ -15,6 +15,7 @@ from helpers.wording import unnamed
 
 from dva_sim.console.attached import lines
 from dva_sim.console.attached.options import check, own_id
+from dva_sim.console.events.console_alarms import UNHEARD
 from dva_sim.console.views.event_rows import event_row
 from dva_sim.console.views.published_rows import positions, robot_row
 from dva_sim.console.views.system_state import DeviceState
@@ -63,6 +64,7 @@ def test_a_robot_is_shown_as_it_says_itself():
     row = robot_row(robot, 3, 5.0, {})
     shown = (row["mode"], row["holder_label"], row["session_age_s"])
     assert shown == ("Teleoperation", "ana", 13.0)
+    assert (row["stop_reason"], robot_row(robot, 3, 15.0, {})["stop_reason"]) == ("", UNHEARD)
     assert positions({ROBOT: robot}, {ROBOT: 3}, HERE) == [[3, 300, -400, 1000, 250]]
     shown = lines.listed_device_row(robot, 5.0, {}, is_fake=False, may_revoke=True)
     assert (shown["doing"], shown["heard_s"], shown["link"]) == ("Teleoperation", 1.0, "good")

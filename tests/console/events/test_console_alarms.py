@@ -7,7 +7,7 @@ from helpers.console.simulated_phone import PhonePage
 from helpers.wording import unnamed
 
 from dva_sim.console.asking.refusal import Refused
-from dva_sim.console.events.console_alarms import ESCALATED_FOR, ConsoleAlarms, RunFacts
+from dva_sim.console.events.console_alarms import ESCALATED_FOR, UNHEARD, ConsoleAlarms
 from dva_sim.worlds.bodies import TickTarget
 
 
@@ -29,7 +29,10 @@ def page(monkeypatch: pytest.MonkeyPatch) -> PhonePage:
 @pytest.fixture
 def alarms(page: PhonePage) -> ConsoleAlarms:
     page.let(5.0)  # everybody has registered
-    return ConsoleAlarms(RunFacts(page.world.run), page.world.rooms.listener)
+    breaches = page.world.recorder.broken.values
+    return ConsoleAlarms(
+        page.world.rooms.listener, lambda number: f"robot-{int(number) + 1}", breaches
+    )
 
 
 def texts(alarms: ConsoleAlarms, *events: Any, robots: Any = (), now_ms: int = 10_000) -> list[str]:
@@ -66,6 +69,14 @@ def test_a_robot_whose_watchdog_has_stopped_it_is_lost(alarms):
     lost = robot(0, watchdog_left_s=0.0)
     (text,) = texts(alarms, robots=[lost])
     assert unnamed(text, "robot-1", "watchdog") == []
+
+
+def test_a_robot_from_outside_that_falls_silent_in_a_drive_is_lost(alarms):
+    silent = robot(1, watchdog_left_s=None, stop_reason=UNHEARD)
+    (text,) = texts(alarms, robots=[silent])
+    assert unnamed(text, "robot-2", UNHEARD) == []
+    (row,) = alarms.look([], [silent | {"mode": "Idle"}], 10_000)["alarms"]
+    assert row["state"] == "returned"
 
 
 @pytest.mark.invariant("S4")
