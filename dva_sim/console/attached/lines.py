@@ -5,21 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from dva_sim.console.dva.device_rows import device_row
-from dva_sim.console.robots.shown_mode import EMERGENCY
 from dva_sim.console.run.lag import LIMIT
-from dva_sim.console.views.published_rows import (
-    SILENT_AFTER,
-    emergency_of,
-    holder_named,
-    sensors_of,
-)
 from dva_sim.console.views.scene import RULES, legend, patterns_of, site_of
 from dva_sim.console.views.system_state import DeviceState
 from dva_sim.console.views.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
-from dva_sim.console.wire.rows import DeviceRow
 from dva_sim.console.wire.scenes import LinkShown, SceneLine, SiteShown, ThingBody, ThingShown
-from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import GUARD, ROBOT
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.site import Site
@@ -83,35 +73,3 @@ def nowhere(frame: GeoFrame) -> SiteShown:
         "doors_m": [],
         "exits_m": [],
     }
-
-
-def listed_device_row(
-    device_state: DeviceState,
-    now: float,
-    labels: Mapping[str, str],
-    *,
-    is_fake: bool,
-    may_revoke: bool,
-) -> DeviceRow:
-    """A device, as the DVA lists it and as it is heard here."""
-    is_stopped = emergency_of(device_state, now, {}) is not None
-    device = device_state.device
-    status = device_state.status
-    doing = status.mode if isinstance(status, m.RobotStatus) else None
-    doing = EMERGENCY if is_stopped else doing
-    holder = device_state.holder[0] if device_state.holder is not None else None
-    row = device_row(
-        device,
-        doing=status.activity if isinstance(status, m.PersonStatus) else doing,
-        heard_s=None if device_state.heard is None else now - device_state.heard,
-        silent=now - device_state.listed > SILENT_AFTER,
-        beats_hz=device_state.rate.of(device_state.beats, now),
-        holder=None if holder is None else holder.holder,
-        holder_label=holder_named(holder, labels) or "",
-        is_fake=is_fake,
-    )
-    row["holder_known"] = holder is not None or device.device_type != ROBOT
-    row["revocable"] = may_revoke
-    row["camera"] = device_state.camera
-    row["sensors"] = sensors_of(device_state)
-    return row

@@ -19,6 +19,7 @@ from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.bench import UNATTENDED
 from dva_sim.console.driving.seat_lines import SeatLines
+from dva_sim.console.dva.device_rows import listed_device_row
 from dva_sim.console.events.console_alarms import ConsoleAlarms
 from dva_sim.console.events.decisions import dispatch_shown
 from dva_sim.console.run.lag import LagRule
@@ -251,7 +252,7 @@ class AttachedPages:
             now = self.clock.now
             may = self.system.role == "supervise"
             rows = [
-                lines.listed_device_row(
+                listed_device_row(
                     entry,
                     now,
                     self.system.labels,

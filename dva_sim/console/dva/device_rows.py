@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from dva_sim.agents.device import HEARTBEAT_PERIOD
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.dva.run_bench import RunBench
 from dva_sim.console.robots.shown_mode import EMERGENCY, shown_mode
+from dva_sim.console.views.published_rows import (
+    SILENT_AFTER,
+    emergency_of,
+    holder_named,
+    sensors_of,
+)
+from dva_sim.console.views.system_state import DeviceState
 from dva_sim.console.wire.rows import DeviceRow
 from dva_sim.kernel.rates import Rate
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.devices import DETECTOR
+from dva_sim.protocol.devices import DETECTOR, ROBOT
 from dva_sim.simulation.full.device_table import BookedDevice
 from dva_sim.simulation.full.run import Run
 
@@ -62,6 +69,38 @@ def device_row(
         "level": None,
         "ends_s": None,
     }
+
+
+def listed_device_row(
+    device_state: DeviceState,
+    now: float,
+    labels: Mapping[str, str],
+    *,
+    is_fake: bool,
+    may_revoke: bool,
+) -> DeviceRow:
+    """A device, as the DVA lists it and as it is heard here."""
+    is_stopped = emergency_of(device_state, now, {}) is not None
+    device = device_state.device
+    status = device_state.status
+    doing = status.mode if isinstance(status, m.RobotStatus) else None
+    doing = EMERGENCY if is_stopped else doing
+    holder = device_state.holder[0] if device_state.holder is not None else None
+    row = device_row(
+        device,
+        doing=status.activity if isinstance(status, m.PersonStatus) else doing,
+        heard_s=None if device_state.heard is None else now - device_state.heard,
+        silent=now - device_state.listed > SILENT_AFTER,
+        beats_hz=device_state.rate.of(device_state.beats, now),
+        holder=None if holder is None else holder.holder,
+        holder_label=holder_named(holder, labels) or "",
+        is_fake=is_fake,
+    )
+    row["holder_known"] = holder is not None or device.device_type != ROBOT
+    row["revocable"] = may_revoke
+    row["camera"] = device_state.camera
+    row["sensors"] = sensors_of(device_state)
+    return row
 
 
 class DeviceRows:

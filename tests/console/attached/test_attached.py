@@ -13,8 +13,8 @@ from helpers.processes.patience import becomes
 from helpers.processes.programs import Program, Programs
 from helpers.wording import unnamed
 
-from dva_sim.console.attached import lines
 from dva_sim.console.attached.options import check, own_id
+from dva_sim.console.dva.device_rows import listed_device_row
 from dva_sim.console.events.console_alarms import UNHEARD
 from dva_sim.console.views.event_rows import event_row
 from dva_sim.console.views.published_rows import positions, robot_row
@@ -44,13 +44,10 @@ def test_of_a_robot_that_has_said_nothing_everything_is_unknown():
     row = robot_row(device_state(), 0, 5.0, {})
     assert (row["mode"], row["holder"], row["camera"]) == ("unknown", None, None)
     assert (
-        lines.listed_device_row(device_state(), 5.0, {}, is_fake=False, may_revoke=False)["link"]
-        is None
+        listed_device_row(device_state(), 5.0, {}, is_fake=False, may_revoke=False)["link"] is None
     )
     assert (
-        lines.listed_device_row(device_state(), 5.0, {}, is_fake=False, may_revoke=False)[
-            "holder_known"
-        ]
+        listed_device_row(device_state(), 5.0, {}, is_fake=False, may_revoke=False)["holder_known"]
         is False
     )
     assert positions({ROBOT: device_state()}, {ROBOT: 0}, HERE) == []
@@ -66,14 +63,14 @@ def test_a_robot_is_shown_as_it_says_itself():
     assert shown == ("Teleoperation", "ana", 13.0)
     assert (row["stop_reason"], robot_row(robot, 3, 15.0, {})["stop_reason"]) == ("", UNHEARD)
     assert positions({ROBOT: robot}, {ROBOT: 3}, HERE) == [[3, 300, -400, 1000, 250]]
-    shown = lines.listed_device_row(robot, 5.0, {}, is_fake=False, may_revoke=True)
+    shown = listed_device_row(robot, 5.0, {}, is_fake=False, may_revoke=True)
     assert (shown["doing"], shown["heard_s"], shown["link"]) == ("Teleoperation", 1.0, "good")
     assert (shown["commands_hz"], shown["level"], shown["ends_s"]) == (None, None, None)
 
 
 def test_a_device_that_left_the_list_is_shown_as_lost_for_a_while():
     assert (
-        lines.listed_device_row(device_state(heard=1.0), 30.0, {}, is_fake=False, may_revoke=False)[
+        listed_device_row(device_state(heard=1.0), 30.0, {}, is_fake=False, may_revoke=False)[
             "silent"
         ]
         is True
