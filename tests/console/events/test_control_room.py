@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from helpers.console.simulated_phone import FIRE, PhonePage
+from helpers.console.waiting_for_disk import take_what_is_safe
 from helpers.wording import unnamed
 
 from dva_sim.agents.robot.controller import Mode
@@ -293,7 +294,7 @@ def logged(room: PhonePage, tmp_path: Path) -> Iterator[PhonePage]:
     """Room with an audit log."""
     keeper = AuditKeeper(tmp_path / "audit.sqlite", lambda: room.world.clock.now, {})
     room.world.keep_audit(keeper)
-    room.world.clock.every(0.05, keeper.take)
+    room.world.clock.every(0.05, lambda: take_what_is_safe(keeper))
     yield room
     keeper.close()
 

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from helpers.console.declared_lines import checked
 from helpers.console.simulated_phone import FIRE, PhonePage
+from helpers.console.waiting_for_disk import take_what_is_safe
 
 from dva_sim.console.attached.actions import AttachedActions
 from dva_sim.console.attached.links import AttachedLinks
@@ -54,7 +55,7 @@ class AttachedPage:
         self.pages.tell = lambda line, _="": self.lines.append(checked(line))
         self.actions = AttachedActions(self.pages)
         self.pages.begin()
-        world.world.clock.every(0.05, self.keeper.take)
+        world.world.clock.every(0.05, lambda: take_what_is_safe(self.keeper))
         self._count = 0
 
     def let(self, seconds: float) -> None:
