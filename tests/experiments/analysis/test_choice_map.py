@@ -17,8 +17,6 @@ from dva_sim.experiments.report.choice_table import (
     regret_text,
 )
 from dva_sim.experiments.report.prose import caption, note
-from dva_sim.experiments.study.loading import load_study
-from dva_sim.kernel.errors import ConfigError
 
 LINKS, MODELS, CHOICES = ("near", "far", "narrow"), ("steer", "wait"), ("ask", "tell", "pace")
 HORIZON_S = 600.0
@@ -208,53 +206,6 @@ def test_a_sentence_names_no_more_choices_than_can_be_read():
 def test_without_a_run_in_each_cell_there_is_no_map_yet():
     some = {key: value for key, value in LOSSES.items() if key != ("far", "pace")}
     assert read(losses=some) is None
-
-
-FILE = """
-question: Which?
-factors:
-  pattern: [req-rep, latest-wins]
-  link.delay_s: [0, 0.5]
-  operator.strategy: [pursuit, move_and_wait]
-parts: {drive: {scenario: drive-to-event}}
-answer:
-  part: drive
-  measure: drive_time_s
-  factor: pattern
-  contrast: [req-rep, latest-wins]
-  over: link.delay_s
-  within: {operator.strategy: pursuit}
-map: {models: operator.strategy}
-"""
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "expected"),
-    [
-        ("models: operator.strategy", "models: operator.strategi", "is not a factor"),
-        ("models: operator.strategy", "models: pattern", "compares or runs over"),
-        ("  over: link.delay_s\n", "  within: {link.delay_s: 0}\n", "runs over a factor"),
-        ("parts:", "  robot.count: [1, 2]\nparts:", "no room for the factor 'robot.count'"),
-        ("strategy}\n", "strategy, notes: {far: guessed}}\n", "'far'"),
-        ("strategy}\n", "strategy, choosing: adaptive}\n", "'adaptive'"),
-    ],
-)
-def test_a_map_that_cannot_be_drawn_is_refused(tmp_path, before, after, expected):
-    file = tmp_path / "which.yaml"
-    file.write_text(FILE)
-    load_study(file)
-    head, _, tail = FILE.rpartition(before)
-    text = head + after + tail
-    if "within: {link.delay_s: 0}" in after:
-        text = text.replace("  within: {operator.strategy: pursuit}\n", "", 1).replace(
-            "{link.delay_s: 0}", "{link.delay_s: 0, operator.strategy: pursuit}"
-        )
-    if "robot.count" in after:
-        text = text.replace("strategy: pursuit}", "strategy: pursuit, robot.count: 1}")
-    file.write_text(text)
-    with pytest.raises(ConfigError, match=r".") as caught:
-        load_study(file)
-    assert expected in str(caught.value)
 
 
 def test_beside_the_regret_stand_the_loss_itself_and_what_drives_are_like():

@@ -139,20 +139,6 @@ def test_as_columns_it_names_its_units(results):
     assert list(frame)[:3] == ["part", "pattern", "link.delay_s"]
 
 
-@pytest.mark.parametrize(
-    ("measure", "by", "problem"),
-    [
-        ("speed_mps", [], "'speed_mps' .*: drive_time_s"),
-        ("tracks.speed_mps", [], "tracks: t_s, x_m"),
-        ("outcome", [], "outcome is in words"),
-        ("drive_time_s", ["phone"], "'phone' .*common: pattern"),
-    ],
-)
-def test_what_cannot_be_compared_is_told_with_what_can(results, measure, by, problem):
-    with pytest.raises(ConfigError, match=problem):
-        Comparison(results, results).differences(measure, by)
-
-
 def test_a_difference_of_one_person_has_no_interval(made):
     one = made("persons=1")
     row = Comparison(one, made("persons=1", episode=later)).differences()[0]

@@ -17,7 +17,6 @@ from dva_sim.experiments.results.tables import design_row
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.parts import multiplied
-from dva_sim.kernel.errors import ConfigError
 
 KNOWN = "covariates: [caution_off]\n"
 MEASURED = "measures: [caution_off, way_off_m]\n"
@@ -83,28 +82,6 @@ def test_a_product_of_columns_is_one_covariate():
         finding_of(view_of(study(name), runs)) for name in ("caution_off", "caution_off*one")
     )
     assert np.array_equal(alone.low, product.low)
-
-
-@pytest.mark.parametrize(
-    ("more", "expected"),
-    [
-        (KNOWN, "'caution_off' is measured where the key 'measures' names it"),
-        (MEASURED + "covariates: [caution_of]\n", "did you mean 'caution_off'"),
-        (
-            MEASURED + "covariates: [caution_off * way]\n",
-            "measure 'way' is unknown; did you mean 'way_off_m'",
-        ),
-    ],
-)
-def test_a_covariate_that_the_runs_do_not_have_is_refused(tmp_path, more, expected):
-    with pytest.raises(ConfigError, match=expected.replace("*", r"\*")):
-        cell_grid.cells(study_in(tmp_path, text=STUDY + more))
-
-
-def test_covariates_without_an_answer_are_refused(tmp_path):
-    bare = STUDY.partition("answer:")[0] + MEASURED + KNOWN
-    with pytest.raises(ConfigError, match="adjusted for covariates"):
-        study_in(tmp_path, text=bare)
 
 
 def test_a_study_without_covariates_is_the_same_study_as_ever(tmp_path):

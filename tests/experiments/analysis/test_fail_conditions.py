@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from helpers.studies.small_study import cheap, run_study, study_in
-from helpers.wording import unnamed
 
 from dva_sim.experiments.analysis.compare import Comparison
 from dva_sim.experiments.analysis.fail_conditions import Bound, judge, parse
@@ -80,36 +79,6 @@ def test_a_condition_is_read_word_by_word():
 @pytest.mark.parametrize("word", ["'gave up'", '"gave up"', "gave_up"])
 def test_a_share_can_be_of_a_word(word):
     assert parse(f"share(outcome != {word}) < 1").test == ("!=", word.strip("'\""))
-
-
-@pytest.mark.parametrize(
-    ("text", "column", "names"),
-    [
-        ("", 1, ["statistic"]),
-        ("p95", 4, ["'('"]),
-        ("p95(response_s)  ", 18, ["'>='"]),
-        ("p95 response_s > 3", 5, ["'('", "'response_s'"]),
-        ("p95(response_s > 1.05x", 16, ["')'", "'>'"]),
-        ("p0(response_s) > 3", 1, ["'p0'", "mean, median, min"]),
-        ("average(response_s) > 3", 1, ["'average'"]),
-        ("p95(response_s) = 3", 17, ["'='"]),
-        ("p95(response_s) == 3", 17, ["'>='", "'<='", "'=='"]),
-        ("p95(response_s) > fast", 19, ["number", "'fast'"]),
-        ("p95(response_s) > 3 m", 21, ["'m'", "s, ms, min, h"]),
-        ("p95(response_s) > +1.05x", 24, ["'x'"]),
-        ("p95(response_s) > 3 s s", 23, ["'s'"]),
-        ("p95(response_s) per > 3", 21, ["factor", "'>'"]),
-        ("__import__('os').system('ls') > 1", 1, ["'__import__'"]),
-        ("  max(jams) ; 1", 13, ["';'"]),
-        ("max(jams) > 1; max(contacts) > 1", 14, ["';'"]),
-        ("mean(contact_impulse_n_s) > +1 N", 32, ["'N'", "N s"]),
-    ],
-)
-def test_a_mistake_is_told_in_a_line_with_its_place_and_what_was_expected(text, column, names):
-    with pytest.raises(ConfigError, match=f", column {column}: ") as error:
-        parse(text)
-    assert unnamed(error.value, f"--fail-if {text!r}", *names) == []
-    assert "\n" not in str(error.value)
 
 
 # --- judging -----------------------------------------------------------------------------------
@@ -214,15 +183,6 @@ def test_pairs_with_a_value_on_both_sides_are_held_against_each_other(beside):
     assert whole.second == pytest.approx(drive.second)
 
 
-@pytest.mark.parametrize(
-    ("condition", "problem"),
-    [
-        ("mean(round_trip_s) > 1.05x", "second folder"),
-        ("mean(speed_mps) > 1", "'speed_mps'"),
-        ("mean(outcome) > 1", "outcome is in words"),
-        ("mean(drive_time_s) per phone > 1", "'phone'"),
-    ],
-)
-def test_what_cannot_be_decided_does_not_pass(comparison, condition, problem):
-    with pytest.raises(ConfigError, match=problem):
-        comparison.judge(condition)
+def test_a_condition_on_values_that_one_folder_lacks_does_not_pass(comparison):
+    with pytest.raises(ConfigError, match="second folder"):
+        comparison.judge("mean(round_trip_s) > 1.05x")

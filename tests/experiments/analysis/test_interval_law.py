@@ -74,8 +74,3 @@ def test_trials_count_with_the_mean_of_their_person():
 def test_persons_who_are_all_alike_and_one_alone_follow_no_law():
     assert law_of([1.0, 1.0], [0, 1]) is None
     assert law_of([1.0, 2.0], [0, 0]) is None
-
-
-def test_a_study_of_one_person_is_refused():
-    with pytest.raises(ValueError, match="2 persons, not 1"):
-        law_of(PILOT, [0, 1, 2]).power(1.0, 1)

@@ -22,7 +22,6 @@ from dva_sim.experiments.study.screening import (
     screening_study,
 )
 from dva_sim.experiments.trials import screen
-from dva_sim.kernel.errors import ConfigError
 
 STUDY = """
 question: Does it matter?
@@ -99,27 +98,6 @@ def test_what_moves_the_answer_is_found_drawn_and_written(tmp_path):
 
 def refuse(job):
     raise AssertionError("was run already")
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "names"),
-    [
-        ("phone.tremor_deg", "phone.trembling", ("phone.trembling", "dva-sim assumed")),
-        ("screening:", "tuning_:", ("tuning_",)),
-        ("trajectories: 2", "trajectories: 1", ("trajectories", "at least 2")),
-    ],
-)
-def test_a_screening_that_cannot_be_is_refused(tmp_path, old, new, names):
-    with pytest.raises(ConfigError) as error:
-        screening_study(study(tmp_path, STUDY.replace(old, new)))
-    assert unnamed(str(error.value), *names) == []
-
-
-def test_a_study_without_a_screening_says_which_key_it_lacks(tmp_path):
-    text = STUDY.partition("screening:")[0]
-    with pytest.raises(ConfigError) as error:
-        screening_study(study(tmp_path, text))
-    assert unnamed(str(error.value), "'screening'", "mine.yaml") == []
 
 
 def test_what_a_screening_found_is_kept_beside_its_study_for_the_reports_of_others(

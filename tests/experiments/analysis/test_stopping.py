@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers.studies.small_study import REPEATED, STUDY, complaint, study_in
-from helpers.wording import unnamed
+from helpers.studies.small_study import REPEATED, STUDY, study_in
 
 from dva_sim.experiments.analysis import stopping
 from dva_sim.experiments.results.results import frame_of
@@ -149,29 +148,6 @@ def test_failed_runs_are_left_out(tmp_path):
     assert np.isfinite(half_widths(study, rows)).all()
 
 
-@pytest.mark.parametrize(
-    ("stop", "place", "names"),
-    [
-        ("half_width: 1", "22:1", ["comparison", "measure", "part"]),
-        ("half_width: 1, comparison: answer, part: drive", "22:1", ["comparison", "part"]),
-        ("half_width: 1, comparison: other", "22:23", ["'other'", "answer"]),
-        ("half_width: 1, part: drove, measure: contacts", "22:23", ["'drove'", "'drive'"]),
-        ("half_width: 1, part: drive, measure: time_s", "22:36", ["'time_s'"]),
-        ("half_width: 0, comparison: answer", "22:8", ["stop."]),
-    ],
-)
-def test_a_rule_that_makes_no_sense_is_refused_where_it_stands(tmp_path, stop, place, names):
-    rest = "batch_persons: 2, most_persons: 9"
-    problem = complaint(tmp_path, STUDY + f"stop: {{{stop}, {rest}}}\n")
-    assert problem.startswith(f"study.yaml:{place}: ")
-    assert unnamed(problem, *names) == []
-
-
-def test_the_most_persons_are_not_fewer_than_the_first_batch(tmp_path):
-    problem = complaint(tmp_path, STUDY + ON_ANSWER.replace("most_persons: 8", "most_persons: 2"))
-    assert unnamed(problem, "study.yaml:22:63: most_persons", "persons: 3") == []
-
-
 def test_a_stop_on_a_schedule_doubles_and_shares_the_chance_to_err(tmp_path):
     scheduled = ON_ANSWER.replace("batch_persons: 2", "batch_persons: double")
     study = study_in(tmp_path, text=STUDY + scheduled)
@@ -186,9 +162,3 @@ def test_a_stop_on_a_schedule_doubles_and_shares_the_chance_to_err(tmp_path):
     rows = rows_of(study, noisy, 8)
     wide, narrow = (half_widths(s, rows) for s in (study, plain))
     assert (wide > 1.05 * narrow).all()
-
-
-def test_a_stop_on_a_schedule_is_for_the_answer(tmp_path):
-    text = STUDY + STOP.replace("batch_persons: 4", "batch_persons: double")
-    line = complaint(tmp_path, text)
-    assert unnamed(line, "double", "'answer'") == []

@@ -15,11 +15,8 @@ from helpers.studies.small_study import run_study
 from helpers.wording import unnamed
 
 from dva_sim.experiments.execution import scheduling
-from dva_sim.experiments.execution.dry_run import dry_run
-from dva_sim.experiments.report.report import write_report
-from dva_sim.experiments.results.results import JOURNAL, Results
 from dva_sim.experiments.results.tables import write_tables
-from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.errors import DvaSimError
 
 pytestmark = pytest.mark.system
 
@@ -58,26 +55,6 @@ def test_tables_that_are_written_are_left_alone_unless_the_program_is_being_chan
     assert len(written) == bool(is_dirty) + 1
     state["commit"] = None
     assert kit.files(run_study(study, out, jobs=1, episode=never)) == whole
-
-
-def test_a_damaged_table_is_told_with_its_file(out):
-    (out / "tables" / "runs.parquet").write_bytes(b"PAR1 no more")
-    with pytest.raises(ConfigError, match=r"runs\.parquet: is damaged"):
-        Results.load(out).table("runs")
-
-
-def test_a_table_of_other_results_is_no_evidence_for_these(tmp_path, out):
-    shutil.copy(out / "tables" / "tracks.parquet", out / "tables" / "runs.parquet")
-    with pytest.raises(ConfigError, match="of other results"):
-        write_report(out)
-
-
-def test_a_damaged_journal_is_told_with_what_to_do(tmp_path, out):
-    content = bytearray((out / JOURNAL).read_bytes())
-    content[100:3000] = b"\xff" * 2900
-    (out / JOURNAL).write_bytes(content)
-    with pytest.raises(ConfigError, match=r"damaged .* move"):
-        run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
@@ -169,11 +146,6 @@ def test_time_in_which_a_process_was_stopped_does_not_count_as_its_runs():
     ticks(1, limit_s=3600.0)
     with pytest.raises(scheduling.RunTooLong, match=" 60 s"):
         ticks(60, limit_s=60.0)
-
-
-def test_a_dry_run_of_another_study_in_the_folder_is_refused(tmp_path, out):
-    with pytest.raises(ConfigError, match="holds another study"):
-        dry_run(kit.study_in(tmp_path, "seed=4"), out)
 
 
 def test_the_tables_lock_ends_with_the_runner_that_holds_it(tmp_path, out):

@@ -9,7 +9,7 @@ from dva_sim.experiments.execution import scheduling
 from dva_sim.experiments.execution.checkpoint import Checkpoint, RunOutcome
 from dva_sim.experiments.results.results import JOURNAL
 from dva_sim.experiments.study import cell_grid
-from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.errors import DvaSimError
 
 
 def outcome(seed: int, tables: str | None = "{}", error: str | None = None) -> RunOutcome:
@@ -43,18 +43,6 @@ def test_a_success_takes_the_place_of_a_failure_but_not_the_reverse(tmp_path):
         journal.add([outcome(1, None, "fell again")])
         assert journal.failures() == {("abc", 2): "sank"}
         assert journal.done() == {("abc", 1)}
-
-
-def test_a_journal_of_another_study_is_refused(tmp_path):
-    Checkpoint(tmp_path, "mine").__exit__(None, None, None)
-    with pytest.raises(ConfigError, match="mine, not yours"):
-        Checkpoint(tmp_path, "yours")
-
-
-def test_a_file_that_is_no_journal_is_refused(tmp_path):
-    (tmp_path / JOURNAL).write_text("a diary, rather" * 100)
-    with pytest.raises(ConfigError, match="not the journal"):
-        Checkpoint(tmp_path, "me")
 
 
 def test_a_full_disk_is_told_in_one_line_and_loses_nothing(tmp_path):

@@ -111,12 +111,6 @@ def test_programs_differ_in_what_a_run_depends_on_not_in_their_commit():
     assert dask_cluster.differences(here, older) == "fingerprint None (here abc)"
 
 
-@pytest.mark.parametrize("address", ["127.0.0.1", "127.0.0.1:8786", "foo://127.0.0.1:1", "tcp://:"])
-def test_an_address_that_is_none_is_refused(tmp_path, address):
-    with pytest.raises(ConfigError, match="should be like tcp://"):
-        run_study(kit.study_in(tmp_path), tmp_path / "out", scheduler=address)
-
-
 def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(dask_cluster, "_CONNECT_S", 0.01)
     with pytest.raises(ConfigError, match=r"tcp://127\.0\.0\.1:9: nothing"):
@@ -150,11 +144,6 @@ def test_what_to_install_is_told(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ConfigError, match=r"pip install -e '\.\[cluster\]'"):
         run_study(kit.study_in(tmp_path), tmp_path / "out", scheduler="tcp://127.0.0.1:9")
-
-
-def test_processes_and_a_scheduler_exclude_each_other(tmp_path):
-    with pytest.raises(ConfigError, match="not both"):
-        run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=2, scheduler="tcp://127.0.0.1:9")
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """`show` and `report` on studies that are running or were interrupted."""
 
 import json
-import sqlite3
 from collections.abc import Callable
 from pathlib import Path
 
@@ -103,20 +102,6 @@ def test_a_failed_run_counts_as_ended_and_is_listed(tmp_path):
     results = load_so_far(out)
     assert {f["error"] for f in results.failures} == {"ValueError: sank"}
     assert set(results.runs["person"]) == {0, 1}
-
-
-def test_an_unfinished_study_of_an_older_version_is_refused_in_one_line(tmp_path):
-    with sqlite3.connect(tmp_path / "journal.sqlite") as db:
-        db.execute("CREATE TABLE study (id INTEGER, identity TEXT, wall_s REAL)")
-        db.execute("INSERT INTO study VALUES (1, 'abc', 0)")
-    with pytest.raises(ConfigError, match="unfinished study"):
-        load_so_far(tmp_path)
-
-
-def test_a_file_is_no_results_folder(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(ConfigError, match="is not a folder"):
-        load_so_far(tmp_path / "file")
 
 
 def test_a_finished_folder_is_read_as_it_is(tmp_path):

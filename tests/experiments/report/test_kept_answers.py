@@ -162,22 +162,6 @@ def test_the_page_dates_each_answer(kept):
     assert unnamed(page, answer.question, *sentences, answer.date, "since 9.9.9", "seed 3") == []
 
 
-def test_a_file_that_is_no_answer_is_named(tmp_path):
-    for text in ("{", "[]", '{"study": "x"}'):
-        file = tmp_path / "x.json"
-        file.write_text(text)
-        with pytest.raises(ConfigError, match=r"x\.json"):
-            kept_answers.read(file)
-
-
-def test_a_manifest_that_is_missing_or_none_is_named(tmp_path):
-    with pytest.raises(ConfigError, match=r"x\.manifest\.json cannot be read"):
-        kept_answers.read_manifest("x", tmp_path)
-    (tmp_path / "x.manifest.json").write_text("[1]")
-    with pytest.raises(ConfigError, match="is not a manifest"):
-        kept_answers.read_manifest("x", tmp_path)
-
-
 def test_results_in_another_size_than_the_file_has_are_not_kept(tmp_path):
     folder = finished(tmp_path / "r")
     manifest = json.loads((folder / "manifest.json").read_text())

@@ -61,20 +61,3 @@ def test_one_file_in_the_way_leaves_all_unwritten(results, tmp_path):
     with pytest.raises(ConfigError, match="would be replaced"):
         export(results, tmp_path, form="parquet")
     assert [path.name for path in tmp_path.iterdir()] == ["tracks.parquet"]
-
-
-@pytest.mark.parametrize(
-    ("name", "tables", "form", "problem"),
-    [
-        ("all", ["flights"], None, "'flights'; tables: runs, tracks"),
-        ("all", [], "xls", "--format 'xls' .*csv or parquet"),
-        ("one.csv", ["runs", "tracks"], None, "give a folder"),
-        ("one.csv", [], "parquet", "one csv file"),
-        ("x.xlsx", [], None, r"x\.xlsx .*\.csv or \.parquet; a folder"),
-        ("x.json", ["runs"], "csv", r"x\.json .*\.csv or \.parquet"),
-    ],
-)
-def test_a_mistake_is_told_with_what_would_be_right(results, tmp_path, name, tables, form, problem):
-    with pytest.raises(ConfigError, match=problem):
-        export(results, tmp_path / name, tables, form)
-    assert list(tmp_path.iterdir()) == []

@@ -89,13 +89,6 @@ def test_a_file_system_without_locks_refuses_nobody(tmp_path, monkeypatch):
         pass
 
 
-def test_a_file_is_no_folder(tmp_path):
-    (tmp_path / "mine.txt").touch()
-    for path in (tmp_path / "mine.txt", tmp_path / "mine.txt" / "below"):
-        with pytest.raises(ConfigError, match="is a file"):
-            FolderLock(path)
-
-
 def test_a_study_is_run_by_one_process_at_a_time(tmp_path, holder):
     study = kit.study_in(tmp_path)
     with pytest.raises(FolderInUse):

@@ -1,12 +1,11 @@
 """A results folder as Python sees it: tables as columns, their dictionary, and what is missing."""
 
-import json
 import math
 
 import numpy as np
 import pytest
 from helpers.studies import synthetic_results as synthetic
-from helpers.studies.small_study import cheap, run_study, study_in
+from helpers.studies.small_study import run_study, study_in
 
 import dva_sim
 from dva_sim.experiments.results.results import Frame, Results
@@ -40,11 +39,6 @@ def test_the_columns_are_explained_with_their_units(results):
     assert values["t_s"] == ("s", "time of the run")
     assert values["pattern"][1].startswith("factor of the study")
     assert values["link.delay_s"][0] == "s"
-
-
-def test_a_table_that_is_not_there_is_told_with_those_that_are(results):
-    with pytest.raises(ConfigError, match="'events'; tables: runs, tracks"):
-        results.table("events")
 
 
 def test_sql_can_be_asked_of_a_table(results):
@@ -92,30 +86,6 @@ def test_a_notebook_shows_the_answer_of_a_study(tmp_path):
     assert results.study["question"] in html
     assert results.answer.lead in html
     assert "444 runs" in html
-
-
-def test_a_study_that_is_not_finished_is_told_as_such(tmp_path):
-    (tmp_path / "journal.sqlite").touch()
-    with pytest.raises(ConfigError, match="not finished"):
-        Results.load(tmp_path)
-
-
-def test_a_folder_of_something_else_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match="holds no finished results"):
-        Results.load(tmp_path)
-    with pytest.raises(ConfigError, match="is not a folder"):
-        Results.load(tmp_path / "nowhere")
-    (tmp_path / "manifest.json").write_text(json.dumps({"name": "a web page"}))
-    with pytest.raises(ConfigError, match="not the manifest"):
-        Results.load(tmp_path)
-
-
-def test_a_table_of_runs_that_has_gone_is_told(tmp_path):
-    study = study_in(tmp_path)
-    out = run_study(study, tmp_path / "out", jobs=1, episode=cheap)
-    (out / "tables" / "runs.parquet").unlink()
-    with pytest.raises(ConfigError, match=r"'runs'; tables: tracks"):
-        _ = Results.load(out).runs
 
 
 def test_minus_zero_is_zero_in_a_table(tmp_path):

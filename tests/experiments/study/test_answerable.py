@@ -8,7 +8,6 @@ from helpers.wording import unnamed
 from dva_sim.experiments.analysis.study_view import view_of
 from dva_sim.experiments.study.answerable import only_contrast, why_unanswered
 from dva_sim.experiments.study.loading import load_study
-from dva_sim.kernel.errors import ConfigError
 
 BARE = """\
 question: Which is quicker?
@@ -92,22 +91,6 @@ def test_settings_that_leave_two_levels_compare_these(tmp_path):
     assert alone.answer is None
     assert unnamed(alone.lost[0], "will not be computed", "'latest-wins'") == []
     assert list(why_unanswered(alone)) == []  # said once
-
-
-def test_a_stop_that_waits_for_a_lost_answer_says_why_it_is_lost():
-    with pytest.raises(ConfigError) as error:
-        load_study("how-late-at-250-ms", ["factors.pattern=req-rep"])
-    assert unnamed(str(error.value), "will not be computed", "'latest-wins'", "stop=null") == []
-    left = load_study("how-late-at-250-ms", ["factors.pattern=req-rep", "stop=null"])
-    assert left.answer is None
-
-
-def test_a_small_version_has_the_contrast_of_the_study_or_is_refused(tmp_path):
-    small = "quick: {factors.pattern: [req-rep, pub-sub]}\n"
-    three = "pattern: [req-rep, pub-sub, latest-wins]"
-    path = study_file(tmp_path, f"{three}, {THREE}", more=ANSWER + small)
-    with pytest.raises(ConfigError, match="'latest-wins'"):
-        load_study(path)
 
 
 def test_the_only_contrast_is_the_answer_of_a_study_without_one(tmp_path):

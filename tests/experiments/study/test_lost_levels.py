@@ -5,21 +5,11 @@ from helpers.processes.command_line import call
 from helpers.wording import unnamed
 
 from dva_sim.experiments.study.loading import load_study, write_study
-from dva_sim.kernel.errors import ConfigError
 
 
 @pytest.fixture
 def mine(tmp_path):
     return write_study(str(tmp_path / "mine"))
-
-
-@pytest.mark.parametrize(
-    "levels", ["[0.2, 0.3, 0.30000000000000004]", "[0, 1e-300, 0.1, 0.1000000000001]"]
-)
-def test_levels_that_differ_by_rounding_alone_are_one_level_twice(mine, levels):
-    with pytest.raises(ConfigError) as error:
-        load_study(mine, [f"factors.link.delay_s={levels}"])
-    assert unnamed(str(error.value), "link.delay_s", levels.split(", ")[-1][:-1]) == []
 
 
 def test_levels_that_are_merely_near_are_two(mine):

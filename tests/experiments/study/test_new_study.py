@@ -10,7 +10,6 @@ from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.loading import load_study, write_study
 from dva_sim.experiments.study.registration import register
-from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.testing.files import check_file
 
 
@@ -70,18 +69,3 @@ def test_it_answers_its_question(fresh, tmp_path):
     assert [tested.verdict for tested in reading.judgement.tested] == ["held"]
     assert [entry.verdict for entry in judge_all(reading.study, reading.view)] == ["held", "held"]
     assert reading.plans == []  # nothing is open, so no more persons are needed
-
-
-def test_nothing_is_overwritten(fresh):
-    with pytest.raises(ConfigError, match=r"mine\.yaml already exists"):
-        write_study("mine.yaml")
-    with pytest.raises(DvaSimError, match="No such file"):
-        write_study("nowhere/mine")
-
-
-@pytest.mark.parametrize("name", ["", ".", "..", ".yaml"])
-def test_a_study_without_a_name_is_not_written(tmp_path, monkeypatch, name):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(ConfigError, match="cannot be the name"):
-        write_study(name)
-    assert list(tmp_path.iterdir()) == []

@@ -8,9 +8,7 @@ from helpers.studies.small_study import STUDY, run_study, study_in
 from helpers.wording import unnamed
 
 from dva_sim.experiments.results.results import Results
-from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.registration import plan_of
-from dva_sim.kernel.errors import ConfigError
 
 MEASURE = """\
 from dva_sim.kernel.measure import Measure
@@ -69,32 +67,6 @@ def test_results_are_read_without_the_file_and_say_what_it_said(tmp_path):
 
 def test_a_study_without_own_measures_is_the_same_study_as_ever(tmp_path):
     assert "measures" not in study_in(tmp_path).asked()
-
-
-@pytest.mark.parametrize(
-    ("measures", "code", "expected"),
-    [
-        ("[none.py:Mine]", MEASURE, "'none.py:Mine': .*'none.py'"),
-        ("[mine.py:Yours]", MEASURE, "no class 'Yours'"),
-        ("[mine.py:Mine, mine.py:Mine]", MEASURE, None),
-        ("[mine.py:Mine]", MEASURE.replace("standing_s", "path_m"), "cannot be called 'path_m'"),
-        ("[mine.py:Mine]", MEASURE.replace("standing_s", "seed"), "cannot be called 'seed'"),
-    ],
-)
-def test_a_measure_that_cannot_be_is_refused_before_any_run(tmp_path, measures, code, expected):
-    study = study_with(tmp_path, measures, code)
-    if expected is None:  # twice the same is once
-        assert cell_grid.cells(study)
-        return
-    with pytest.raises(ConfigError, match=expected) as refused:
-        cell_grid.cells(study)
-    assert refused.value.line == study._document.places[("measures", 0)][0]
-
-
-def test_a_measure_of_another_model_is_not_there_to_be_asked_for(tmp_path):
-    code = MEASURE.replace("    about", '    models = ("timed",)\n    about')
-    with pytest.raises(ConfigError, match="measure 'standing_s' is unknown"):
-        cell_grid.cells(study_with(tmp_path, code=code))
 
 
 def test_a_run_whose_measure_fails_is_a_failure_that_is_told(tmp_path):

@@ -1,15 +1,12 @@
 import itertools
 
 import numpy as np
-import pytest
 from helpers.studies import small_study as kit
 from helpers.studies.small_study import run_study
-from helpers.wording import unnamed
 
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.factor_levels import latin_hypercube, parameter_sets
-from dva_sim.kernel.errors import ConfigError
 
 
 def repeats(study):
@@ -92,30 +89,3 @@ def test_repeats_can_be_left_out(tmp_path):
 
 def test_a_setting_that_takes_the_contrast_away_leaves_no_repeats(tmp_path):
     assert not repeats(kit.study_in(tmp_path, "pattern=req-rep", text=kit.REPEATED))
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "names"),
-    [
-        ("sets: 3", "at: [0.5]", ["0.5", "'link.delay_s'", "0, 0.25"]),
-        ("bands: bands", "bands: no-bands", ["'no-bands.yaml'"]),
-        ("sets: 3", "set: 3", ["'robustness.set'", "'sets'"]),
-        ("persons: 2\n", "persons: 1\n", ["robustness.persons: ", "at least"]),
-    ],
-)
-def test_repeats_that_cannot_be_meant_are_refused(tmp_path, old, new, names):
-    assert unnamed(kit.complaint(tmp_path, kit.REPEATED.replace(old, new)), *names) == []
-
-
-@pytest.mark.parametrize(
-    ("bands", "expected"),
-    [
-        ("{patience: [1, 2]}", "'patience'.* perceptual_delay_s, "),
-        ("{hand_lag_s: [0, 0.2]}", "above zero"),
-    ],
-)
-def test_a_band_of_an_unknown_trait_or_one_that_reaches_zero_is_refused(tmp_path, bands, expected):
-    study = kit.study_in(tmp_path, text=kit.REPEATED)
-    (tmp_path / "bands.yaml").write_text(f"bands: {bands}\n")
-    with pytest.raises(ConfigError, match=expected):
-        parameter_sets(study)

@@ -8,34 +8,7 @@ from dva_sim.experiments.execution import dry_run
 from dva_sim.experiments.execution.dry_run import DryRun
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.factor_levels import runs_of
-from dva_sim.experiments.study.loading import load_study
-from dva_sim.experiments.study.tuning import tuning_study
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.options.studies import RunOptions
-
-
-@pytest.mark.parametrize("setting", ["persons=100000000", "replications=100000000"])
-def test_more_runs_than_anybody_can_wait_for_are_refused_without_being_listed(
-    tmp_path, monkeypatch, setting
-):
-    monkeypatch.setattr(cell_grid, "jobs", pytest.fail)
-    text = rf"--set {setting}: there would be .* runs, more than 1,000,000; have fewer"
-    with pytest.raises(ConfigError, match=text):
-        study_in(tmp_path, setting)
-
-
-def test_a_pilot_and_a_stopping_rule_and_a_tuning_are_no_way_round_it(tmp_path):
-    with pytest.raises(ConfigError, match="pilot of 1000000 persons: "):
-        load_study(write_study(tmp_path), pilot=1_000_000)
-    stop = "stop: {half_width: 1, comparison: answer, batch_persons: 2, most_persons: 999999}\n"
-    with pytest.raises(ConfigError, match=r"study\.yaml:22:\d+: there would be"):
-        study_in(tmp_path, text=STUDY + stop)
-    tuning = (
-        "tuning:\n  {key: command.rate_hz, levels: [1, 2], by: [pattern], part: drive,"
-        " measure: drive_time_s, seed: 9, persons: 99999999}\n"
-    )
-    with pytest.raises(ConfigError, match="tuning: there would be"):
-        tuning_study(study_in(tmp_path, text=STUDY + tuning))
 
 
 @pytest.mark.parametrize("text", [STUDY, REPEATED])

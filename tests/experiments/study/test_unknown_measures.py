@@ -10,7 +10,6 @@ from helpers.studies.small_study import SHIFT, STUDY, cheap, run_study, study_in
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.models import MODELS, model_of
 
@@ -50,16 +49,6 @@ def test_a_run_holds_no_measure_that_its_scenario_cannot_have(changes):
     scenario = MODELS["full"].build({"horizon_s": 40.0}, changes)
     (row,) = MODELS["full"].tables(scenario, 1, with_tracks=False)["runs"]
     assert row.keys() - DESIGN_ONLY <= set(MODELS["full"].measures(scenario))
-
-
-@pytest.mark.parametrize("measure", ["path_m", "confirmed", "commands_sent"])
-def test_a_measure_of_drives_is_refused_where_nobody_can_drive(tmp_path, measure):
-    text = STUDY.replace("measure: drive_time_s", f"measure: {measure}").replace(
-        "    reference: {operator.strategy: oracle}\n",
-        "    changes: {robot.count: 0, guard.count: 1}\n",
-    )
-    with pytest.raises(ConfigError, match=f"part 'drive' .* {measure!r}"):
-        cell_grid.cells(study_in(tmp_path, text=text))
 
 
 def test_a_measure_is_there_if_one_level_of_a_factor_has_it(tmp_path):

@@ -15,11 +15,9 @@ from typing import Any
 
 from dva_sim.experiments import runner
 from dva_sim.experiments.results.results import Results
-from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.study import Study
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.options.studies import RunOptions
 from dva_sim.simulation.models import Tables
 
@@ -62,6 +60,39 @@ robustness:
 )
 BANDS = "bands: {crossover_rad_s: [1.0, 2.0], hand_lag_s: [0.1, 0.2]}\n"
 REPEATED_RUNS = RUNS + 3 * 2 * 4  # with the usual parameters they are runs of the part itself
+TREATED = STUDY.replace("pattern: [req-rep, latest-wins]", "remedy: [none, both]").replace(
+    "factor: pattern\n  contrast: [req-rep, latest-wins]",
+    "factor: remedy\n  contrast: [none, both]",
+)
+TREATED += """\
+treatments:
+  remedy:
+    none: {pattern: req-rep}
+    both: {pattern: latest-wins, robot.processing_s: 0.01}
+"""
+PREDICTED = (
+    STUDY
+    + """\
+predictions:
+  - text: Waiting costs.
+    direction: above
+    expects_s: [3, 9]
+    at: {link.delay_s: 0.25}
+  - text: Nobody will notice.
+"""
+)
+COMPARED = (
+    STUDY
+    + """\
+comparisons:
+  far: {part: drive, measure: contacts, factor: pattern, contrast: [req-rep, latest-wins],
+    within: {link.delay_s: 0.25}, family: aside}
+hypotheses:
+  waiting-costs: {direction: above, margin: 1.5, at: {link.delay_s: 0.25}}
+  contacts-alike: {comparison: far, direction: same, margin: 0.5}
+"""
+)
+FULL = STUDY + "full: {persons: 6, link.delay_s: [0, 0.25, 0.5], robot.processing_s: 0.1}\n"
 SHIFT = {
     "model": "timed",
     "area": {"width_m": 60, "height_m": 40},
@@ -95,16 +126,6 @@ def run_study(
     """Run a study as it was loaded, without a report; its results folder."""
     asked = RunOptions(study.file, out, report=False, **options)
     return runner.run_study(asked, study=study, episode=episode).results.folder
-
-
-def complaint(folder: Path, text: str, *settings: str, version: str | None = None) -> str:
-    """Error of an invalid study, without its folder."""
-    path = write_study(folder, text)
-    try:
-        cell_grid.jobs(load_study(path, settings, version=version))
-    except ConfigError as error:
-        return str(error).replace(f"{folder}/", "")
-    raise AssertionError("it is not refused")
 
 
 def cheap(job: StudyJob) -> Tables:
