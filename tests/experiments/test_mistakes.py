@@ -371,6 +371,10 @@ KEYS = [
         ("persons: 2", "persons: 99999999", "tuning:"),
     ),
     *mistakes(
+        partial(changed, TUNED),
+        ("measure: drive_time_s", "measure: time_s", "study.yaml:18:17: 'time_s'"),
+    ),
+    *mistakes(
         own_measure,
         ("none.py:Mine", "study.yaml:22:12: 'none.py:Mine':"),
         ("mine.py:Yours", "study.yaml:22:12: 'Yours'"),

@@ -4,13 +4,20 @@ import itertools
 import math
 from functools import partial
 from operator import call
+from pathlib import Path
 
 from helpers.mistakes import check_mistake, each_mistake, mistakes, of_file
+from helpers.studies.small_study import STUDY
 
+import dva_sim
+from dva_sim.core.dispatch import load_policy
+from dva_sim.experiments.study.file_kinds import open_study
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel import options, resources
 from dva_sim.kernel.config import Config, validate
+from dva_sim.kernel.retired import RETIRED
 from dva_sim.kernel.yaml_files import load_yaml
+from dva_sim.simulation.models import model_of
 from dva_sim.simulation.scenario import Scenario
 
 
@@ -117,6 +124,17 @@ FILES = [
         ("a: !!set {b, c}\n", "bad.yaml:1:4: !!set"),
         ("a: !!binary aGk=\n", "bad.yaml:1:4: !!binary"),
         ("day: 2001-13-45\n", "bad.yaml read"),
+        ("a: 1\nb: [1, 2\n", "bad.yaml:2: ]"),
+        ("a: {b: 1\nc: 2\n", "bad.yaml:1: }"),
+        ('a: 1\nb: "open\nc: 2\n', "bad.yaml:2: quote"),
+        ("a: 1\n b: 2\n", "bad.yaml:2: colon"),
+        ("a:\n\tb: 1\n", "bad.yaml:2: tab spaces"),
+        ("a: *x\n", "bad.yaml:1: *x"),
+        ("a: @x\n", "bad.yaml:1: @ quotes"),
+        ("a: 1\nb\nc: 2\n", "bad.yaml:2: colon"),
+        ('a: "\\q"\n', "bad.yaml:1: \\q single"),
+        ("a:\n  - 1\n - 2\n", "bad.yaml:3: indented"),
+        ("a: 1\n---\nb: 1\n", "bad.yaml:2: document"),
         ("[" * 1000, "bad.yaml deeply"),
         (ALIASES, "bad.yaml 20000"),
     ),
@@ -127,6 +145,48 @@ FILES = [
 ]
 
 
-@each_mistake([*KEYS, *FILES])
+def plug_in(text):
+    Path("mine.py").write_text(text)
+    load_policy("mine.py:Mine")
+
+
+def study_key(key):
+    outer, _, inner = key.partition(".")
+    value = f"{{{inner}: 8}}" if inner else "[mine.py:Mine]"
+    of_file(open_study, "mine.yaml")(f"{STUDY}{outer}: {value}\n")
+
+
+RETIRED_NAMES = [
+    *mistakes(
+        plug_in,
+        ("from dva_sim.errors import ConfigError\n", "dva_sim.errors dva_sim.kernel.errors"),
+        *(
+            (f"from dva_sim.{room} import {name}\n", f"{name} {instead}")
+            for name, instead in RETIRED["name"].items()
+            for room in ["recordings.reading" if name == "read_lapse" else "statistics"]
+        ),
+    ),
+    *mistakes(study_key, *((key, f"{key} {instead}") for key, instead in RETIRED["key"].items())),
+    *mistakes(
+        lambda function, name: getattr(dva_sim, function)("x", **{name: 3}),
+        *(
+            (function, name, f"{name} {RETIRED['option'][f'--{name}']}")
+            for function, name in (
+                ("episode", "panels"),
+                ("episode", "strip"),
+                ("replay", "panels"),
+                ("replay", "strip"),
+                ("report", "figure"),
+            )
+        ),
+    ),
+    *mistakes(
+        of_file(lambda name: model_of(load_yaml(name)), "mine.yaml"),
+        ("model: mine.py:Mine\n", RETIRED["model"]["FILE:CLASS"]),
+    ),
+]
+
+
+@each_mistake([*KEYS, *FILES, *RETIRED_NAMES])
 def test_a_mistake_ends_in_one_line_with_its_names(tmp_path, act, error, names):
     check_mistake(tmp_path, act, error, names)

@@ -8,6 +8,7 @@ from helpers.mistakes import Refused, check_mistake, command, each_mistake, mist
 from dva_sim.options.runs import PictureOptions
 from dva_sim.recordings.pictures import Wanted
 from dva_sim.recordings.reading import read_recording
+from dva_sim.recordings.sensor_log import read_sensor_log
 from dva_sim.simulation import scenario as scenarios
 
 LEAK = {"kind": "steam_leak.py:SteamLeak", "room": "Chemistry lab", "at_s": 5.0}
@@ -30,6 +31,39 @@ def recording(name):
     read_recording(Path(name))
 
 
+def log(rows, head="t,x,y,z", unit=None):
+    Path("log.csv").write_text(f"{head}\n{rows}")
+    read_sensor_log(Path("log.csv"), unit)
+
+
+def turning(size, hertz):
+    """Rows of a vector that turns about x, each 10 ms."""
+    angles = [2 * math.pi * hertz * n / 100 for n in range(300)]
+    rows = [f"{n / 100},0,{size * math.cos(a)},{size * math.sin(a)}" for n, a in enumerate(angles)]
+    return "\n".join(rows)
+
+
+def still(z=9.8, unit=1.0):
+    return "".join(f"{n / 100 * unit},0,0,{z}\n" for n in range(100))
+
+
+LINEAR = "time," + ",".join(f"Linear Acceleration {axis}" for axis in "xyz")
+LOGS = mistakes(
+    log,
+    (turning(1.0, 1.8), "log.csv without gravity TotalAcceleration"),
+    (turning(9.8, 1.8), "log.csv without gravity"),
+    (turning(1.0, 1.8), "t,x,y,z", "m/s2", "log.csv 1 median, m/s2"),
+    (turning(9.8, 0.1), "log.csv gravity alone TotalAcceleration"),
+    (still(6.85), "log.csv --unit 6.85"),
+    (still(6.85), "t,x,y,z", "g", "log.csv 6.85 g"),
+    ("0,1,2", "t,x,y", "log.csv time x, y z"),
+    ("0,1,2,3", "a,b,c,d", "log.csv a, b, c, d"),
+    (still(), LINEAR, "log.csv gravity"),
+    (still() + "0.99,q,0,0\n", "log.csv:102 'q'"),
+    (still() + "0.2,0,0,9.8\n", "log.csv:102 time"),
+    (still() + "nan,0,0,9.8\n", "log.csv:102"),
+    (still(unit=1e15), "log.csv time (ms)"),
+)
 MISTAKES = [
     *mistakes(
         event,
@@ -81,6 +115,6 @@ MISTAKES = [
 ]
 
 
-@each_mistake(MISTAKES)
+@each_mistake([*LOGS, *MISTAKES])
 def test_a_mistake_ends_in_one_line_with_its_names(tmp_path, act, error, names):
     check_mistake(tmp_path, act, error, names)

@@ -6,7 +6,9 @@ from pathlib import Path
 from helpers.dva.queue_case import load_case
 from helpers.mistakes import check_mistake, each_mistake, mistakes, of_file
 
+from dva_sim.agents.operator.published import SplitFile, TargetFile, lines_of
 from dva_sim.cli.validation import validate
+from dva_sim.kernel.config import validate as checked
 from dva_sim.network.pattern_runs import Condition
 from dva_sim.options.studies import ValidateOptions
 from dva_sim.simulation.timed import build
@@ -53,6 +55,19 @@ def mechanism(name):
     predict(Condition("pub", 50, loss=0.05, delay_ms=50, dur_s=12), 1, without=[name])
 
 
+def targets(tag="V", **line):
+    """A file of one target of one line."""
+    check = {"metric": "m", "tag": tag, "source": "s", "lines": {"one": {"what": "w", **line}}}
+    tags = {"V": "seen", "M": "memory"}
+    return checked(TargetFile, {"tags": tags, "support": {}, "checks": {"T": check}})
+
+
+def split_of(**groups):
+    rest = {"exact": {}, "fit": {}, "held_out": {}, "memory": {}}
+    rule = {"exact": 1.0, "held_out": 0.8}
+    return checked(SplitFile, {"rule": rule, "strategy": "pursuit", **rest, **groups})
+
+
 def evidence(what, **options):
     validate(ValidateOptions(what, **options))
 
@@ -89,6 +104,19 @@ MISTAKES = [
         (lambda: exact.hypercube([3.0], [[1, 2, 3]], 1), "offered"),
         (lambda: exact.hypercube([1.0], [[1, 1, 2]], 1), "units 1 to 3"),
         error=ValueError,
+    ),
+    *mistakes(
+        call,
+        (lambda: split_of(fit={"a": ("T",)}, held_out={"b": ("T",)}).kinds(), "'T'"),
+        (lambda: lines_of(targets(low=1), split_of()), "T"),
+        (lambda: lines_of(targets("V,M", low=1), split_of(held_out={"a": ("T",)})), "T held-out"),
+        (lambda: targets("X", low=1), "'X' T V, M"),
+        (lambda: targets(), "lines.one"),
+        (lambda: targets(above=1), "lines.one"),
+        (lambda: targets(low=2, high=1), "lines.one"),
+        (lambda: targets(beside=True), "lines.one"),
+        (lambda: targets(beside=True, target=1, low=1), "lines.one"),
+        (lambda: targets(beside=True, target=1, above=1), "lines.one"),
     ),
     *mistakes(block, ({"delay": 3}, "'delay' 'delay_ms'")),
     *mistakes(
