@@ -558,7 +558,7 @@ def test_of_many_announcements_the_newest_32_are_remembered():
     duty = GuardProtocol("02:00:00:00:00:01", 10.0)
     for event in range(1, 1001):
         decide(duty, announcement(event))
-    assert len(duty._announced) == MOST_ANNOUNCED == 32
+    assert MOST_ANNOUNCED == 32
     assert decide(duty, m.TaskAward(968)) == m.UNKNOWN_EVENT
     assert decide(duty, m.TaskAward(969)) == m.OK
 

@@ -137,13 +137,13 @@ def test_a_sensor_that_was_stuck_before_anybody_read_it_is_stuck_at_its_first_va
 
 
 def test_faults_by_chance_come_after_their_mean_time_on_average():
-    def lost_at(seed: int) -> float:
-        made = sensor(lambda now: (1.0,), seed, faults=[{"kind": "lost", "mean_time_s": 50.0}])
-        return made._lost_at
+    def is_lost(seed: int, time: float) -> bool:
+        faults = [{"kind": "lost", "mean_time_s": 50.0}]
+        return sensor(lambda now: (1.0,), seed, faults=faults).read(time) == ()
 
-    times = [lost_at(seed) for seed in range(400)]
-    assert np.mean(times) == pytest.approx(50.0, rel=4 / math.sqrt(400))
-    assert lost_at(5) == lost_at(5)
+    for time in (10.0, 50.0, 100.0):
+        share = np.mean([is_lost(seed, time) for seed in range(400)])
+        assert share == pytest.approx(1 - math.exp(-time / 50.0), abs=2 / math.sqrt(400))
 
 
 def test_a_fault_is_either_scheduled_or_drawn():

@@ -219,7 +219,6 @@ def test_who_stands_costs_nothing():
     people.run_until(people.all_settled, 30.0)
     people.run_until(lambda: False, 40.0)
     assert people.clock.env.peek() == math.inf  # nothing is due
-    assert not people.world._awake
 
 
 def test_a_new_goal_replaces_the_old_one_and_standing_still_forgets_it():

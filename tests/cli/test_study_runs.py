@@ -2,7 +2,6 @@
 
 import sys
 import time
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -88,6 +87,18 @@ def test_a_probe_ends_when_its_time_is_up_but_not_after_one_or_two(tmp_path, mon
     assert plan.tried == 3
 
 
+@pytest.fixture
+def told(tmp_path, monkeypatch, capsys):
+    """Function that returns what `run --dry-run` says of a plan."""
+
+    def tell(plan: DryRun) -> str:
+        monkeypatch.setattr(study_runs, "dry_run", lambda *_, **__: plan)
+        study_runs.plan(RunOptions(str(kit.write_study(tmp_path)), tmp_path / "out"))
+        return capsys.readouterr().out
+
+    return tell
+
+
 def test_a_run_that_does_not_end_in_time_costs_as_much_at_least(tmp_path, monkeypatch):
     def never(job: object) -> kit.Tables:
         while True:
@@ -101,13 +112,13 @@ def test_a_run_that_does_not_end_in_time_costs_as_much_at_least(tmp_path, monkey
     assert plan.estimate_s > 0
 
 
-def test_a_run_that_fails_when_tried_is_told(tmp_path):
+def test_a_run_that_fails_when_tried_is_told(tmp_path, told):
     def falls(job: object) -> kit.Tables:
         raise RuntimeError("fell\ndeep")
 
     plan = dry_run(kit.study_in(tmp_path), tmp_path / "out", probe=falls)
     assert (plan.tried, plan.estimate_s) == (0, None)
-    assert study_runs._time(plan).endswith("RuntimeError: fell deep")  # in one line
+    assert "failed: RuntimeError: fell deep\n" in told(plan)
 
 
 @pytest.mark.parametrize(
@@ -121,16 +132,13 @@ def test_a_run_that_fails_when_tried_is_told(tmp_path):
         ((42, 0, 9, 1, 2, 122.0, 7, "", False, "", 114.0), ["about 2 min", "(2 min of CPU time)"]),
     ],
 )
-def test_an_estimate_says_what_it_rests_on(plan, names):
-    assert unnamed(study_runs._time(DryRun(*plan)), *names) == []
+def test_an_estimate_says_what_it_rests_on(told, plan, names):
+    assert unnamed(told(DryRun(*plan)), *names) == []
 
 
-def test_a_plan_says_that_a_study_may_stop_early():
-    plan = DryRun(42, 7, 9, 4, 2, 30.0, 0, "")
-    reported = study_runs._plan(plan, Path("out"))
-    assert (
-        unnamed(reported, "at most 42 runs", " 9 ", "up to 4 rounds", "7 of them", "into out") == []
-    )
+def test_a_plan_says_that_a_study_may_stop_early(told):
+    reported = told(DryRun(42, 7, 9, 4, 2, 30.0, 0, ""))
+    assert unnamed(reported, "at most 42 runs", " 9 ", "up to 4 rounds", "7 of them", "out") == []
 
 
 def test_a_probe_spreads_over_the_design():

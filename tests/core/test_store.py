@@ -6,7 +6,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
@@ -41,6 +41,11 @@ def file(tmp_path: Path) -> Path:
 
 def keep(office: Office, memory: Store, now: float = 0.0) -> str | None:
     return memory.keep(office.core, office.core.events.changes(), now)
+
+
+def by_hand(file: Path, command: str) -> None:
+    with closing(sqlite3.connect(file)) as memory, memory:
+        memory.execute(command)
 
 
 def next_life(office: Office, file: Path, now: float) -> Dva:
@@ -140,9 +145,9 @@ def test_a_file_of_an_older_version_goes_on_where_its_newest_event_stood(file):
     memory.past = 1.7e9
     office.fire(12, now=480.0)
     keep(office, memory, 500.0)
-    memory._file.execute("DELETE FROM about WHERE name = 'time'")
-    memory._file.execute("UPDATE about SET value = 1 WHERE name = 'format'")
     memory.close()
+    by_hand(file, "DELETE FROM about WHERE name = 'time'")
+    by_hand(file, "UPDATE about SET value = 1 WHERE name = 'format'")
     next_life(office, file, 30.0)
     assert office.event().waiting_since == pytest.approx(30.0)
 
@@ -221,11 +226,15 @@ def test_what_has_not_changed_is_not_written_again(file):
     office, memory = Office(), Store(file)
     office.fire(12)
     keep(office, memory)
-    written = memory._file.total_changes
-    office.say(OPERATOR, m.GetDeviceList())
-    office.beat(now=1.0)
-    keep(office, memory)
-    assert memory._file.total_changes == written
+    with closing(sqlite3.connect(file)) as other:
+        before = other.execute("PRAGMA data_version").fetchone()
+        office.say(OPERATOR, m.GetDeviceList())
+        office.beat(now=1.0)
+        keep(office, memory)
+        assert other.execute("PRAGMA data_version").fetchone() == before
+        office.fire(30)
+        keep(office, memory)
+        assert other.execute("PRAGMA data_version").fetchone() != before
     memory.close()
 
 
@@ -422,9 +431,8 @@ def test_the_database_of_something_else_is_no_memory_and_stays_as_it_is(file):
 
 @pytest.mark.parametrize("value", [0, 4])
 def test_a_memory_of_another_format_is_refused(file, value):
-    memory = Store(file)
-    memory._file.execute("UPDATE about SET value = ? WHERE name = 'format'", (value,))
-    memory.close()
+    Store(file).close()
+    by_hand(file, f"UPDATE about SET value = {value} WHERE name = 'format'")
     assert refusal(file).endswith("memory of format 3")
 
 
@@ -452,7 +460,7 @@ def test_a_memory_whose_content_makes_no_sense_is_refused_in_one_line(file, dama
     office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))
     office.fire(12)
     keep(office, memory)
-    memory._file.execute(damage)
+    by_hand(file, damage)
     with pytest.raises(ConfigError, match="DVA's memory") as refused:
         memory.recall(office.new_core(), 0.0)
     assert "\n" not in str(refused.value)

@@ -22,6 +22,7 @@ from dva_sim.core.events import EventTable
 from dva_sim.core.store import Store
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError, ExitCode
+from dva_sim.kernel.recorder import Recorder
 from dva_sim.live import recorded_lines, recording
 from dva_sim.live.recording import Keeper, LiveRecorder, TraceFile
 from dva_sim.protocol import messages as m
@@ -32,7 +33,7 @@ from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import dva_server
 from dva_sim.simulation.full.dva_trace import TracedDva, replay_dva, traced
 from dva_sim.simulation.full.observations import STATIONARY, FactLog, Page
-from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.run import Run, Watched
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.testing.evidence import check_recording, check_trace
 
@@ -93,10 +94,8 @@ def test_a_dva_with_another_policy_decides_the_same_again(tmp_path, policy):
 
 
 def test_a_dva_that_remembers_an_earlier_life_decides_the_same_again(tmp_path):
-    first = Run(scenario_of(horizon_s=30), 1)
     store = Store(tmp_path / "memory.sqlite")
-    first.dva._memory = store
-    first.run()
+    Run(scenario_of(horizon_s=30), 1, watched=Watched(Clock(), Recorder(), memory=store)).run()
     path = tmp_path / "dva.trace.jsonl"
     run = trace_of(path, "drive-to-event", store, horizon_s=60)
     assert '"do": "recall"' in path.read_text()

@@ -101,9 +101,13 @@ def test_what_is_left_against_a_peer_after_a_good_message_still_counts():
 
 def test_no_more_peers_are_remembered_than_stated():
     heard = Nuisances()
-    for peer in range(5000):
-        heard.bad(peer, 0.0)
-    assert len(heard._counts) == Nuisances.PEERS
+    for peer in ("first", "second"):
+        for _ in range(21):
+            heard.bad(peer, 0.0)
+    for number in range(Nuisances.PEERS - 1):
+        heard.bad(number, 0.0)
+    assert heard.hearing("second", 0.0) is Hearing.READ
+    assert heard.hearing("first", 0.0) is Hearing.ANSWERED
 
 
 # --- sessions ------------------------------------------------------------------------------

@@ -122,16 +122,18 @@ def test_a_figure_that_breaks_a_promise_is_told_of_it(bad, promise, expected):
     assert [text for text in outcome.broken if text.startswith(f"{promise}: ") and expected in text]
 
 
-@pytest.mark.parametrize("good", [Plain, Refusing])
+@pytest.mark.parametrize(
+    "good",
+    [
+        Plain,
+        Refusing,
+        but(written=lambda self, values: values / 100),  # drawn in percent
+        but(written=lambda self, values: values / 1000),  # drawn in milliseconds
+    ],
+)
 def test_a_figure_that_keeps_its_promises_breaks_none(good):
     outcome = tried(check_figure, good, shapes=FEW)
     assert (outcome.broken, outcome.warnings) == ((), ())
-
-
-def test_numbers_may_be_drawn_in_percent_or_milliseconds_but_not_as_others():
-    known = figures._numbers(b"share,time_s\n0.25,1.5\n")
-    assert not len(figures._missing(np.array([25.0, 1500.0, 0.0, np.nan]), known))
-    assert figures._missing(np.array([26.0]), known).tolist() == [26.0]
 
 
 def test_a_colour_of_the_palette_is_known_however_it_is_written():

@@ -21,6 +21,7 @@ class Hearer:
         self.places = {}
         self.ledger = EventLedger(RULES, DVA, lambda who: self.places.get(who, PLACE), 5.0, str)
         self.table, self._number = EventTable(), 0
+        self._looked = 0
         self.event = self.table.add("fire", PLACE, 0.5, 0.0)
 
     def assigns(self, now: float, robot: str = ROBOT) -> None:
@@ -51,10 +52,11 @@ class Hearer:
 
     def broken(self, until: float, works: bool = True) -> list[str]:
         """Everything that is wrong until then, looked at twice a second."""
-        first = int(2 * self.ledger._now) + 1
+        first = self._looked + 1
+        self._looked = int(2 * until)
         return [
             what
-            for tick in range(first, int(2 * until) + 1)
+            for tick in range(first, self._looked + 1)
             for _, what in self.ledger.check(tick / 2, Page(self.table, (), works))
         ]
 

@@ -11,7 +11,10 @@ from helpers.processes.second_process import run_here_and_elsewhere
 from dva_sim.core.dispatch import known_policies
 from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation.timed import TimedRecording, build, simulate_timed
+from dva_sim.simulation.timed.travel import Rooms
 from dva_sim.worlds.hazards import make_hazard
+from dva_sim.worlds.planning import Planner
+from dva_sim.worlds.site import FOOTPRINT, load_site
 
 AREA = {"width_m": 100.0, "height_m": 60.0}
 TIMES = ("detected", "assigned", "departed", "arrived", "confirmed", "closed")
@@ -133,9 +136,6 @@ def test_one_who_is_called_on_the_way_back_turns_around_at_once():
 
 
 def test_each_room_of_the_site_is_reached_by_the_planner_s_way():
-    from dva_sim.worlds.planning import Planner
-    from dva_sim.worlds.site import FOOTPRINT, load_site
-
     scenario = {
         "model": "timed",
         "site": {"name": "caparica", "spots": 1},
@@ -153,16 +153,14 @@ def test_each_room_of_the_site_is_reached_by_the_planner_s_way():
 
 
 def test_from_half_way_nine_ways_in_ten_are_as_long_as_the_planner_finds_within_a_tenth():
-    from dva_sim.simulation.timed.travel import Rooms
-
-    rooms = Rooms("caparica", 1, "path")
+    rooms, planner = Rooms("caparica", 1, "path"), Planner(load_site("caparica"), FOOTPRINT)
     start, goal, rng = rooms.spots(3)[0], rooms.spots(12)[0], np.random.default_rng(1)
     errors = []
     for gone in rng.uniform(0, rooms.length(start, goal), 12):
         here = rooms.along(start, goal, gone)
         for zone in (5, 9, 14):
             there = rooms.spots(zone)[0]
-            planned = rooms._ways.planner.distance(here.point, there.point)
+            planned = planner.distance(here.point, there.point)
             errors.append(rooms.length(here, there) / planned - 1)
     assert np.median(np.abs(errors)) < 0.03
     assert np.quantile(np.abs(errors), 0.9) < 0.10
