@@ -1,5 +1,6 @@
 """A recording that lacks topics: `check` and `replay` say which rules they could not judge."""
 
+import re
 from collections.abc import Collection
 from pathlib import Path
 
@@ -116,18 +117,18 @@ def test_check_and_replay_name_the_rules_and_the_missing_topics(
     # A file that says how many messages it had is known to have been filtered.
     assert code == (ExitCode.DOES_NOT_HOLD if counts else ExitCode.NOT_JUDGED)
     for rule in rules:
-        assert f"{rule} not judged: the recording lacks /observed/" in said, rule
+        assert re.search(rf"{rule} not judged: .* /observed/", said), rule
     assert topics[-1] in said
-    assert said.count(" not judged: the recording lacks") == len(lacking)
+    assert said.count(" not judged: ") == len(lacking)
 
     console = Console(width=300)
     with console.capture() as captured, pytest.raises(RulesNotJudged) as caught:
         stories.replay(file, Wanted(), where=console)
-    assert str(caught.value) == f"facts are missing to judge {', '.join(lacking)}"
+    assert str(caught.value).endswith(f" {', '.join(lacking)}")
     told = captured.get()
     assert "none was broken" not in told
     assert topics[-1] in told
-    assert ("the recording lacks /story" in told) == ("/story" in topics)
+    assert (" /story" in told) == ("/story" in topics)
 
 
 def test_a_whole_recording_is_judged(whole: Path, capsys: pytest.CaptureFixture[str]) -> None:

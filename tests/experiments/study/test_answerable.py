@@ -1,5 +1,7 @@
 """A study that cannot answer its question says so before it is run; one contrast is taken."""
 
+import re
+
 import pytest
 from helpers.processes.command_line import call
 from helpers.studies import synthetic_results
@@ -89,7 +91,7 @@ def test_settings_that_leave_two_levels_compare_these(tmp_path):
     assert left.predictions[0].contrast == ("req-rep", "latest-wins")  # and so it is not run
     alone = load_study(path, ["factors.pattern=req-rep"])
     assert alone.answer is None
-    assert unnamed(alone.lost[0], "will not be computed", "'latest-wins'") == []
+    assert unnamed(alone.lost[0], "not be computed", "'latest-wins'") == []
     assert list(why_unanswered(alone)) == []  # said once
 
 
@@ -106,12 +108,5 @@ def test_the_only_contrast_is_the_answer_of_a_study_without_one(tmp_path):
     facts["study"] = declared | {"persons": 8, "replications": 1, "seed": 1}
     reading = synthetic_results.reading(tmp_path / "r", rows, facts)
     assert view_of(declared, reading.runs).contrast == ("latest-wins", "req-rep")
-    assert (
-        unnamed(
-            reading.answer.lead,
-            "shorter with latest-wins PUB/SUB than with REQ/REP",
-            "\N{MINUS SIGN}9.9",
-        )
-        == []
-    )
+    assert re.search("shorter .*latest-wins.*REQ/REP.*\N{MINUS SIGN}9.9", reading.answer.lead)
     assert "No answer was declared" in " ".join(reading.answer.notes)

@@ -83,10 +83,10 @@ def test_lines_of_pooled_conditions_have_z_and_no_band(compared):
 
 
 def test_a_condition_that_is_not_played_is_shown_with_its_reason(compared):
-    group = replace(compared.groups[0], left_out="the service time equals the period")
+    group = replace(compared.groups[0], left_out="too slow")
     *_, line = evidence.lines_of(replace(compared, left_out=[group]), {})
     assert (line.line, line.verdict) == (group.condition.label, "shown only")
-    assert line.note == "the service time equals the period"
+    assert line.note == "too slow"
 
 
 def test_a_control_that_is_not_found_out_breaks_the_rule(compared):

@@ -119,9 +119,8 @@ def test_the_headline_names_every_miss_and_what_the_rule_asks_for():
     held_out = [line for line in LINES.values() if line.kind == "held-out"]
     verdicts = judge(held_out, {line.id: certain(-9.0) for line in held_out})
     text = headline([*verdicts, *rule_of(held_out, verdicts, RULE)])
-    assert text.startswith("0 of 19 lines hold; these do not: ")
-    assert not unnamed(text, *(line.id for line in held_out))
-    assert not unnamed(text, "held-out lines (0, 0 of 19; asked for: at least 0.8)")
+    assert text.startswith("0 of 19 ")
+    assert not unnamed(text, *(line.id for line in held_out), "(0, 0 of 19;", " 0.8)")
 
 
 def test_words_give_target_band_and_unit():

@@ -162,7 +162,7 @@ def test_kept_bands_are_taken_before_any_are_made(results, monkeypatch):
     kept = {(asked[0].config, asked[0].seeds): BANDS}
     monkeypatch.setattr(measured, "read_kept", lambda: kept)
     found = beside_of(asked, {}, 1, 1)
-    assert found.notes == ["The bands of 1 configurations were kept before they were measured."]
+    assert [unnamed(note, "1 configurations", "kept") for note in found.notes] == [[]]
     assert found.tables == {}
     assert {(e.low, e.predicted, e.high) for e in found.lines[:-1]} == {(1, 2, 3)}
 
