@@ -81,11 +81,15 @@ def from_then_on(start, conditions, where=lambda x, y: True):
     return air
 
 
+@pytest.fixture
+def building() -> Building:
+    return Building()
+
+
 # --- alarm -----------------------------------------------------------------------------
 
 
-def test_who_hears_the_alarm_gets_ready_walks_to_the_nearer_exit_and_is_out():
-    building = Building()
+def test_who_hears_the_alarm_gets_ready_walks_to_the_nearer_exit_and_is_out(building):
     one = building.bystander((10.0, 1.5))
     building.pass_time(5.0)
     assert one.activity == "working"
@@ -117,8 +121,7 @@ def test_the_time_to_get_out_of_an_empty_corridor_is_premovement_and_distance_by
     assert np.mean(late) < 1.5
 
 
-def test_a_second_alarm_makes_nobody_later_or_earlier():
-    building = Building()
+def test_a_second_alarm_makes_nobody_later_or_earlier(building):
     one = building.bystander()
     one.alarm(0.0)
     building.pass_time(10.0)
@@ -157,8 +160,9 @@ def test_25_people_in_a_room_need_the_time_that_its_door_takes_and_no_less():
         CLEAR._replace(gas=0.0088, explosive=0.2),  # methane
     ],
 )
-def test_who_notices_smoke_heat_water_or_the_smell_of_gas_gets_ready_without_an_alarm(conditions):
-    building = Building()
+def test_who_notices_smoke_heat_water_or_the_smell_of_gas_gets_ready_without_an_alarm(
+    building, conditions
+):
     one = building.bystander(air=from_then_on(4.0, conditions))
     building.pass_time(10.0)
     assert one.activity == "alarmed"
@@ -166,16 +170,14 @@ def test_who_notices_smoke_heat_water_or_the_smell_of_gas_gets_ready_without_an_
     assert building.story == ["notices danger"]
 
 
-def test_who_feels_a_fire_waits_for_nothing():
-    building = Building()
+def test_who_feels_a_fire_waits_for_nothing(building):
     one = building.bystander(air=from_then_on(4.0, CLEAR._replace(heat_flux=1.2)))
     building.pass_time(6.0)
     assert one.activity == "evacuating"
     assert one.leaves_at == pytest.approx(4.0, abs=PERIOD)
 
 
-def test_who_sees_flames_gets_ready_and_nobody_smells_carbon_monoxide():
-    building = Building()
+def test_who_sees_flames_gets_ready_and_nobody_smells_carbon_monoxide(building):
     poisoned = from_then_on(0.0, CLEAR._replace(co=900.0))
     one = building.bystander((10.0, 1.5), air=clean_air)
     two = building.bystander((20.0, 1.5), air=poisoned)
@@ -184,8 +186,7 @@ def test_who_sees_flames_gets_ready_and_nobody_smells_carbon_monoxide():
     assert [p.activity for p in (one, two, three)] == ["working", "working", "alarmed"]
 
 
-def test_who_cannot_bear_it_leaves_at_once():
-    building = Building()
+def test_who_cannot_bear_it_leaves_at_once(building):
     one = building.bystander(air=from_then_on(4.0, CLEAR._replace(heat_flux=3.0)))
     building.pass_time(5.0)
     assert one.activity == "evacuating"
@@ -194,8 +195,7 @@ def test_who_cannot_bear_it_leaves_at_once():
 # --- the way out -----------------------------------------------------------------------
 
 
-def test_the_nearer_exit_is_not_taken_through_what_nobody_endures():
-    building = Building()
+def test_the_nearer_exit_is_not_taken_through_what_nobody_endures(building):
     fire = from_then_on(0.0, CLEAR._replace(heat_flux=9.0), lambda x, y: x < 6.0)
     one = building.bystander((10.0, 1.5), air=fire)
     one.alarm(0.0)
@@ -205,8 +205,7 @@ def test_the_nearer_exit_is_not_taken_through_what_nobody_endures():
     assert one.dose.heat == 0.0
 
 
-def test_who_finds_the_way_ahead_become_so_turns_round():
-    building = Building()
+def test_who_finds_the_way_ahead_become_so_turns_round(building):
     fire = from_then_on(24.0, CLEAR._replace(heat_flux=9.0), lambda x, y: x < 3.0)
     one = building.bystander((10.0, 1.5), air=fire)
     one.alarm(0.0)
@@ -294,9 +293,8 @@ def test_an_exit_within_10_m_is_taken_through_smoke_that_gets_no_thicker():
     assert choose_escape(planner, (26.0, 1.5), refuges, strict).goal == (1.0, 1.5)
 
 
-def test_who_has_no_way_left_stands_still_and_leaves_when_there_is_one_again():
+def test_who_has_no_way_left_stands_still_and_leaves_when_there_is_one_again(building):
     """Flames on both sides from 23 to 60 s."""
-    building = Building()
     burns = CLEAR._replace(temperature=150.0, heat_flux=20.0)
 
     def air(x, y, time):
@@ -361,8 +359,7 @@ def test_nobody_stays_where_the_gas_that_leaks_could_explode(gas, limit):
         (CLEAR._replace(extinction=0.9, water=0.3), pace_in_smoke(0.9) * pace_in_water(0.3)),
     ],
 )
-def test_smoke_and_water_slow_people_down_by_the_share_that_hazards_say(conditions, pace):
-    building = Building()
+def test_smoke_and_water_slow_people_down_by_the_share_that_hazards_say(building, conditions, pace):
     one = building.bystander(air=from_then_on(0.0, conditions))
     one.alarm(0.0)
     building.run_until(lambda: one.activity == "safe", 200.0)
@@ -385,8 +382,7 @@ def test_a_dose_adds_up_and_who_has_too_much_stays_where_it_is():
     assert (one.x, one.activity) == (here, "incapacitated")
 
 
-def test_without_hazards_nobody_looks_at_the_air_and_standing_people_cost_nothing():
-    building = Building()
+def test_without_hazards_nobody_looks_at_the_air_and_standing_people_cost_nothing(building):
     building.bystander()
     building.pass_time(100.0)
     assert building.clock.env.peek() == math.inf
@@ -395,8 +391,7 @@ def test_without_hazards_nobody_looks_at_the_air_and_standing_people_cost_nothin
 # --- while nothing is wrong ------------------------------------------------------------
 
 
-def test_those_who_move_around_change_between_their_places_and_others_stay():
-    building = Building()
+def test_those_who_move_around_change_between_their_places_and_others_stay(building):
     mover = building.bystander((10.0, 1.0), [(10.0, 1.0), (25.0, 1.0)], moves=True)
     other = building.bystander((5.0, 1.5))
     seen, done = [], []
@@ -409,8 +404,7 @@ def test_those_who_move_around_change_between_their_places_and_others_stay():
     assert (other.x, other.y) == (5.0, 1.5)
 
 
-def test_who_is_on_the_way_elsewhere_when_the_alarm_sounds_stops_and_leaves():
-    building = Building()
+def test_who_is_on_the_way_elsewhere_when_the_alarm_sounds_stops_and_leaves(building):
     one = building.bystander((10.0, 1.0), [(35.0, 1.0)], moves=True)
     building.run_until(lambda: one.activity == "walking", 100.0)
     one.alarm(building.clock.now)

@@ -55,13 +55,17 @@ class Bench:
             self.clock.every(1.0 / rate, send, start=0.001 * number)
 
 
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
 @pytest.mark.parametrize(
     "emergency",
     [EMERGENCY, EMERGENCY.replace(b"<EmergencyMsg>", b"<EmergencyMsg >")],
     ids=["as we write it", "as others may"],
 )
-def test_an_emergency_overtakes_all_that_waits(emergency):
-    bench = Bench()
+def test_an_emergency_overtakes_all_that_waits(bench, emergency):
     for number in range(200):
         bench.ask(b"%d" % number)
     bench.ask(emergency)
@@ -69,8 +73,7 @@ def test_an_emergency_overtakes_all_that_waits(emergency):
     assert bench.done == [b"0", emergency]
 
 
-def test_what_only_calls_itself_an_emergency_overtakes_nothing_and_keeps_none_out():
-    bench = Bench()
+def test_what_only_calls_itself_an_emergency_overtakes_nothing_and_keeps_none_out(bench):
     for number in range(LIMIT + 1):
         bench.ask(b"<EmergencyMsg>%d" % number)
     bench.ask(EMERGENCY)
@@ -90,8 +93,7 @@ class Noted(NamedTuple):
     body: m.Body
 
 
-def test_who_sends_much_waits_for_itself_and_not_the_others():
-    bench = Bench()
+def test_who_sends_much_waits_for_itself_and_not_the_others(bench):
     for number in range(50):
         bench.ask(b"<SetTeleOp>flood %d" % number, peer="h flood")
     bench.ask(b"<SetTeleOp>holder", peer="h")
@@ -99,8 +101,7 @@ def test_who_sends_much_waits_for_itself_and_not_the_others():
     assert bench.done[:3] == [b"<SetTeleOp>flood 0", b"<SetTeleOp>flood 1", b"<SetTeleOp>holder"]
 
 
-def test_what_the_holder_asks_for_comes_before_its_commands_that_wait():
-    bench = Bench()
+def test_what_the_holder_asks_for_comes_before_its_commands_that_wait(bench):
     for number in range(5):
         bench.ask(b"<SetTeleOp>%d" % number, peer="h")
     bench.ask(b"stop", peer="h")
@@ -109,8 +110,7 @@ def test_what_the_holder_asks_for_comes_before_its_commands_that_wait():
 
 
 @pytest.mark.parametrize(("latest_wins", "done"), [(True, [0, 4]), (False, [0, 1, 2, 3, 4])])
-def test_of_published_commands_the_newest_or_all_wait(latest_wins, done):
-    bench = Bench()
+def test_of_published_commands_the_newest_or_all_wait(bench, latest_wins, done):
     bench.inbox.latest_wins = latest_wins
     for number in range(5):
         bench.inbox.published(b"%d" % number)
@@ -119,8 +119,7 @@ def test_of_published_commands_the_newest_or_all_wait(latest_wins, done):
     assert bench.inbox.superseded == 5 - len(done)
 
 
-def test_a_queue_that_one_peer_has_filled_takes_what_another_sends():
-    bench = Bench()
+def test_a_queue_that_one_peer_has_filled_takes_what_another_sends(bench):
     for number in range(LIMIT + 50):
         bench.ask(b"<SetTeleOp>%d" % number, peer="h flood")
     dropped = bench.inbox.overflowed
@@ -147,8 +146,9 @@ SERVICE, REST, AFTER_HOLDER = 0.05, 4, 1.0  # [s], in times of the service, [s]
 @pytest.mark.parametrize("others", [1, 20])
 @pytest.mark.parametrize("of", ["s", "sd"])
 @pytest.mark.parametrize("urgent", [0, 20])
-def test_how_long_the_holder_waits_does_not_depend_on_how_many_send_how_much(others, of, urgent):
-    bench = Bench()
+def test_how_long_the_holder_waits_does_not_depend_on_how_many_send_how_much(
+    bench, others, of, urgent
+):
     bench.flood([f"{of[n % len(of)]} {n}" for n in range(others)])
     bench.flood([f"s urgent {n}" for n in range(urgent)], EMERGENCY)
     period = 0.3037 if urgent else 0.1037
@@ -162,8 +162,7 @@ def test_how_long_the_holder_waits_does_not_depend_on_how_many_send_how_much(oth
 
 @pytest.mark.parametrize("others", [1, 20])
 @pytest.mark.parametrize("flood", [b"%d of %d", b"<SetTeleOp>%d of %d", EMERGENCY])
-def test_an_emergency_is_done_after_two_services_whoever_sends_what(others, flood):
-    bench = Bench()
+def test_an_emergency_is_done_after_two_services_whoever_sends_what(bench, others, flood):
     bench.flood([f"{'sdh'[n % 3]} {n}" for n in range(others)], flood)
     sent = {EMERGENCY + b" " * n: 1.0 + 0.2037 * n for n in range(1, 15)}
     for data, when in sent.items():
@@ -173,8 +172,7 @@ def test_an_emergency_is_done_after_two_services_whoever_sends_what(others, floo
 
 
 @pytest.mark.system
-def test_a_flood_of_emergencies_leaves_every_second_turn_and_no_backlog():
-    bench = Bench()
+def test_a_flood_of_emergencies_leaves_every_second_turn_and_no_backlog(bench):
     bench.flood([f"s {n}" for n in range(20)], EMERGENCY, rate=500.0)
     bench.clock.call_at(1.0, bench.ask, b"start", "h")
     bench.clock.call_at(1.0, bench.ask, b"grant", "d")
@@ -209,8 +207,7 @@ def test_who_holds_a_robot_and_says_nothing_does_not_silence_strangers():
     assert pauses == pytest.approx(SERVICE + REST * SERVICE + AFTER_HOLDER)
 
 
-def test_strangers_have_their_turns_however_much_the_holder_sends():
-    bench = Bench()
+def test_strangers_have_their_turns_however_much_the_holder_sends(bench):
     bench.flood(["h"], b"<SetTeleOp>%d of %d", rate=200.0)
     bench.flood(["s a", "s b"], b"%d of %d")
     bench.flood(["d"], b"dva %d %d")
@@ -231,8 +228,7 @@ def test_commands_of_strangers_have_their_turns_among_what_others_ask():
     assert bench.times[b"<SetTeleOp>"] < 1.0 + 22 * SERVICE
 
 
-def test_a_connection_that_is_not_the_holders_has_so_many_places_and_is_told_so():
-    bench = Bench()
+def test_a_connection_that_is_not_the_holders_has_so_many_places_and_is_told_so(bench):
     for number in range(EACH + 4):
         bench.ask(b"%d" % number, peer="s")
         bench.ask(b"<SetTeleOp>%d" % number, peer="h")
@@ -242,8 +238,7 @@ def test_a_connection_that_is_not_the_holders_has_so_many_places_and_is_told_so(
     assert len(bench.done) == 2 * (EACH + 4) - 3
 
 
-def test_a_thousand_connections_keep_neither_the_holder_nor_the_dva_out():
-    bench = Bench()
+def test_a_thousand_connections_keep_neither_the_holder_nor_the_dva_out(bench):
     for number in range(2 * LIMIT):
         bench.ask(b"%d" % number, peer=f"s {number}")
     bench.ask(b"grant", peer="d")
@@ -253,8 +248,7 @@ def test_a_thousand_connections_keep_neither_the_holder_nor_the_dva_out():
     assert bench.done == [b"0", b"start", b"grant"]
 
 
-def test_who_becomes_the_holder_while_it_waits_has_the_holders_turn():
-    bench = Bench()
+def test_who_becomes_the_holder_while_it_waits_has_the_holders_turn(bench):
     for number in range(20):
         bench.ask(b"%d" % number, peer=f"s {number}")
     bench.ask(b"start", peer="s last")

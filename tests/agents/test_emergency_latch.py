@@ -43,6 +43,11 @@ class Stopped:
         hear(self.robot, m.Reply(1, m.OK, "", m.EmergencyRelease(tick, released_by, released)))
 
 
+@pytest.fixture
+def stopped() -> Stopped:
+    return Stopped()
+
+
 def test_nothing_is_ordered_while_an_emergency_holds_the_robot():
     for order in ORDERS.values():
         for holder in (ANA, DVA):
@@ -52,14 +57,12 @@ def test_nothing_is_ordered_while_an_emergency_holds_the_robot():
 
 
 @pytest.mark.parametrize("name", ORDERS)
-def test_a_release_by_a_person_lets_orders_through_again(name):
-    stopped = Stopped()
+def test_a_release_by_a_person_lets_orders_through_again(stopped, name):
     stopped.answer("person", releaser=RUI)
     assert stopped.say(ANA, ORDERS[name], 3.0).code == m.OK
 
 
-def test_a_new_holder_does_not_release_it():
-    stopped = Stopped()
+def test_a_new_holder_does_not_release_it(stopped):
     stopped.say(DVA, m.PermissionGrant(RUI, "both", 8), 3.0)
     stopped.robot.inquiry.next(3.0)
     hear(stopped.robot, confirmation(m.PermissionGrant(RUI, "both", 8)), 3.1)
@@ -89,21 +92,18 @@ def test_a_mission_never_releases_it(name):
         assert Stopped("drive", holder).say(holder, ORDERS[name], 60.0).code == m.BUSY
 
 
-def test_once_a_person_is_needed_a_later_answer_does_not_loosen_that():
-    stopped = Stopped()
+def test_once_a_person_is_needed_a_later_answer_does_not_loosen_that(stopped):
     stopped.answer("person")
     stopped.answer("drive")
     assert stopped.say(ANA, m.StartTeleOp(), 5.0).code == m.BUSY
 
 
-def test_a_dva_that_knows_no_releases_leaves_it_to_the_holder():
-    stopped = Stopped()
+def test_a_dva_that_knows_no_releases_leaves_it_to_the_holder(stopped):
     stopped.robot.latch.take_refusal()
     assert stopped.say(ANA, m.StartTeleOp(), 5.0).code == m.OK
 
 
-def test_a_release_for_an_earlier_emergency_does_not_count():
-    stopped = Stopped()
+def test_a_release_for_an_earlier_emergency_does_not_count(stopped):
     stopped.say(ANA, m.Emergency(), 3.0, 0)
     stopped.answer("person", tick=2000, releaser=RUI)
     assert stopped.robot.latch.holds
@@ -111,21 +111,18 @@ def test_a_release_for_an_earlier_emergency_does_not_count():
     assert not stopped.robot.latch.holds
 
 
-def test_a_message_in_the_dvas_name_releases_nothing():
-    stopped = Stopped()
+def test_a_message_in_the_dvas_name_releases_nothing(stopped):
     assert stopped.say(RUI, m.ReleaseEmergency(ROBOT), 3.0).code == m.NOT_PERMITTED
     assert stopped.say(DVA, m.ReleaseEmergency(ROBOT), 3.0).code == m.OK
     assert stopped.robot.latch.holds
 
 
-def test_a_restart_of_its_program_keeps_it_stopped():
-    stopped = Stopped()
+def test_a_restart_of_its_program_keeps_it_stopped(stopped):
     stopped.robot.restart(clock_offset=500.0, now=10.0)
     assert stopped.robot.latch.message(12.0) == m.RobotEmergency(RUI, 10.0, 2000)
 
 
-def test_the_first_who_stopped_it_is_named_and_the_last_who_released_it():
-    stopped = Stopped()
+def test_the_first_who_stopped_it_is_named_and_the_last_who_released_it(stopped):
     stopped.say(ANA, m.Emergency(), 4.0, 0)
     assert stopped.robot.latch.message(5.0) == m.RobotEmergency(RUI, 3.0, 4000)
     stopped.answer("person", tick=4000, releaser=ANA)
@@ -143,8 +140,7 @@ def test_a_hand_at_the_robot_releases_it_and_a_taker_does_not():
     assert stopped.robot.take_by_hand("warden", 6.0, moving=False).code == m.OK
 
 
-def test_a_robot_that_stands_after_a_sleep_takes_the_next_order():
-    stopped = Stopped()
+def test_a_robot_that_stands_after_a_sleep_takes_the_next_order(stopped):
     stopped.answer("person", releaser=RUI)
     stopped.robot.stand(10.0)
     assert stopped.say(ANA, m.StartTeleOp(), 9.0).code == m.STALE

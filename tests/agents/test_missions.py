@@ -39,11 +39,15 @@ def untouched(*robots: Robot) -> bool:
     return all(robot.body.contacts == 0 for robot in robots)
 
 
+@pytest.fixture
+def fleet() -> Fleet:
+    return Fleet()
+
+
 # --- getting there ------------------------------------------------------------------------
 
 
-def test_a_robot_visits_its_waypoints_in_order_and_is_done():
-    fleet = Fleet()
+def test_a_robot_visits_its_waypoints_in_order_and_is_done(fleet):
     robot = fleet.robot(1, (*WEST, EASTWARD), to((13.1, 12.0), (13.1, 20.0)))
     fleet.run(120.0)
     assert robot.end == ("done", "")
@@ -52,8 +56,7 @@ def test_a_robot_visits_its_waypoints_in_order_and_is_done():
     assert untouched(robot)
 
 
-def test_a_patrol_goes_round_as_often_as_it_was_told():
-    fleet = Fleet()
+def test_a_patrol_goes_round_as_often_as_it_was_told(fleet):
     beat = ((9.0, 12.0), WEST)
     robot = fleet.robot(1, (*WEST, EASTWARD), to(*beat, laps=3))
     fleet.run(400.0)
@@ -63,16 +66,14 @@ def test_a_patrol_goes_round_as_often_as_it_was_told():
     assert robot.body.distance == pytest.approx(legs - 6 * 2 * NEAR + NEAR, abs=1.0)
 
 
-def test_a_patrol_without_a_number_of_laps_does_not_end():
-    fleet = Fleet()
+def test_a_patrol_without_a_number_of_laps_does_not_end(fleet):
     robot = fleet.robot(1, (*WEST, EASTWARD), to((8.0, 12.0), WEST, laps=0))
     fleet.run(300.0)
     assert not robot.over
     assert len(robot.steps) > 8
 
 
-def test_there_is_no_way_into_a_wall_block_and_the_robot_says_so_at_once():
-    fleet = Fleet()
+def test_there_is_no_way_into_a_wall_block_and_the_robot_says_so_at_once(fleet):
     robot = fleet.robot(1, (*WEST, EASTWARD), to((100.0, 100.0)))
     fleet.run(10.0)
     assert robot.end == ("failed", "no way")
@@ -98,8 +99,7 @@ CAR = RobotProfile(
 
 
 @pytest.mark.parametrize("heading", [EASTWARD, WESTWARD])
-def test_a_car_that_cannot_turn_on_the_spot_turns_in_the_corridor(heading):
-    fleet = Fleet()
+def test_a_car_that_cannot_turn_on_the_spot_turns_in_the_corridor(fleet, heading):
     robot = fleet.robot(1, (*WEST, heading), to((13.1, 12.0), (13.1, 20.0)), CAR)
     assert robot.body.motors.turning_radius > 0.3
     fleet.run(60.0)
@@ -110,8 +110,7 @@ def test_a_car_that_cannot_turn_on_the_spot_turns_in_the_corridor(heading):
 # --- other robots -------------------------------------------------------------------------
 
 
-def test_two_that_meet_head_on_in_a_corridor_get_past_each_other():
-    fleet = Fleet()
+def test_two_that_meet_head_on_in_a_corridor_get_past_each_other(fleet):
     east = fleet.robot(1, (*WEST, EASTWARD), to(EAST))
     west = fleet.robot(2, (*EAST, WESTWARD), to(WEST))
     fleet.run(120.0)
@@ -123,8 +122,7 @@ def test_two_that_meet_head_on_in_a_corridor_get_past_each_other():
 
 
 @pytest.mark.parametrize(("south", "north"), [(1, 2), (2, 1)])
-def test_at_a_door_that_lets_one_through_the_lower_number_goes_first(south, north):
-    fleet = Fleet()
+def test_at_a_door_that_lets_one_through_the_lower_number_goes_first(fleet, south, north):
     a = fleet.robot(south, (*SOUTH_OF_DOOR, NORTHWARD), to(NORTH_OF_DOOR))
     b = fleet.robot(north, (*NORTH_OF_DOOR, SOUTHWARD), to(SOUTH_OF_DOOR))
     fleet.run(120.0)
@@ -136,8 +134,7 @@ def test_at_a_door_that_lets_one_through_the_lower_number_goes_first(south, nort
     assert unnamed(first.reasons(), "somebody")
 
 
-def test_who_is_in_the_door_already_goes_first_whatever_its_number():
-    fleet = Fleet()
+def test_who_is_in_the_door_already_goes_first_whatever_its_number(fleet):
     within = fleet.robot(2, (33.15, 18.2, SOUTHWARD), to(SOUTH_OF_DOOR))
     comes = fleet.robot(1, (33.15, 15.6, NORTHWARD), to(NORTH_OF_DOOR))
     fleet.run(120.0)
@@ -147,8 +144,7 @@ def test_who_is_in_the_door_already_goes_first_whatever_its_number():
 
 
 @pytest.mark.system
-def test_five_in_one_corridor_all_arrive():
-    fleet = Fleet()
+def test_five_in_one_corridor_all_arrive(fleet):
     for number, x in enumerate((4.0, 6.0), 1):
         fleet.robot(number, (x, 12.0, EASTWARD), to((28.0 + 2 * number, 12.0)))
     for number, x in enumerate((24.0, 26.5, 29.0), 3):
@@ -158,8 +154,7 @@ def test_five_in_one_corridor_all_arrive():
     assert untouched(*fleet.robots)
 
 
-def test_a_robot_that_is_parked_in_the_corridor_is_driven_around():
-    fleet = Fleet()
+def test_a_robot_that_is_parked_in_the_corridor_is_driven_around(fleet):
     robot = fleet.robot(1, (*WEST, EASTWARD), to(EAST))
     parked = fleet.parked(2, 12.0, 12.0)
     fleet.run(120.0)
@@ -168,8 +163,7 @@ def test_a_robot_that_is_parked_in_the_corridor_is_driven_around():
     assert parked.distance == 0.0
 
 
-def test_where_somebody_stands_in_the_only_door_there_is_no_way_after_a_minute():
-    fleet = Fleet()
+def test_where_somebody_stands_in_the_only_door_there_is_no_way_after_a_minute(fleet):
     robot = fleet.robot(1, (*SOUTH_OF_DOOR, NORTHWARD), to(NORTH_OF_DOOR))
     fleet.parked(2, 33.15, 18.2)
     fleet.run(120.0)
@@ -179,8 +173,7 @@ def test_where_somebody_stands_in_the_only_door_there_is_no_way_after_a_minute()
     assert untouched(robot)
 
 
-def test_a_place_where_somebody_stands_already_counts_as_visited_from_beside_it():
-    fleet = Fleet()
+def test_a_place_where_somebody_stands_already_counts_as_visited_from_beside_it(fleet):
     robot = fleet.robot(1, (*WEST, EASTWARD), to((12.0, 12.0), WEST))
     fleet.parked(2, 12.0, 12.0)
     fleet.run(120.0)
@@ -191,8 +184,7 @@ def test_a_place_where_somebody_stands_already_counts_as_visited_from_beside_it(
 # --- people -------------------------------------------------------------------------------
 
 
-def test_beside_somebody_who_stands_at_the_wall_a_robot_is_slow_and_keeps_its_distance():
-    fleet = Fleet()
+def test_beside_somebody_who_stands_at_the_wall_a_robot_is_slow_and_keeps_its_distance(fleet):
     robot = fleet.robot(1, (*WEST, EASTWARD), to(EAST))
     fleet.person(12.0, 12.9)
     fleet.run(120.0)
@@ -203,8 +195,7 @@ def test_beside_somebody_who_stands_at_the_wall_a_robot_is_slow_and_keeps_its_di
     assert max(robot.speeds) > 0.48
 
 
-def test_somebody_who_walks_towards_a_robot_passes_it_without_a_touch():
-    fleet = Fleet()
+def test_somebody_who_walks_towards_a_robot_passes_it_without_a_touch(fleet):
     robot = fleet.robot(1, (*WEST, EASTWARD), to(EAST))
     person = fleet.person(20.0, 12.0, vx=-1.2)
     fleet.run(120.0, lambda: person.walk(0.0, 0.0) if person.x < 3.0 else None)
@@ -215,8 +206,7 @@ def test_somebody_who_walks_towards_a_robot_passes_it_without_a_touch():
     assert robot.speeds[nearest] < 0.05  # the person walks past, the robot stands
 
 
-def test_somebody_who_stands_in_the_middle_is_gone_around_and_never_touched():
-    fleet = Fleet()
+def test_somebody_who_stands_in_the_middle_is_gone_around_and_never_touched(fleet):
     robot = fleet.robot(1, (*WEST, EASTWARD), to(EAST))
     person = fleet.person(12.0, 12.0)
     fleet.run(200.0)
@@ -282,8 +272,7 @@ def test_a_battery_that_is_nearly_empty_ends_a_mission_but_not_the_way_home():
 # --- inspection ---------------------------------------------------------------------------
 
 
-def test_an_inspection_ends_where_the_event_is_seen_and_faces_it():
-    fleet = Fleet()
+def test_an_inspection_ends_where_the_event_is_seen_and_faces_it(fleet):
     place = (10.0, 20.0)  # in the workshop, whose door is at (6.05, 13.2)
     fleet.hazards = [HazardSpot("fire", *place, 0.5, shines=True)]
     robot = fleet.robot(1, (*EAST, WESTWARD), MissionGoal((place,), event="fire"))
@@ -296,8 +285,7 @@ def test_an_inspection_ends_where_the_event_is_seen_and_faces_it():
     assert abs(math.remainder(bearing - robot.body.pose().heading, 2 * math.pi)) < 0.15
 
 
-def test_an_inspection_with_nothing_in_view_goes_near_looks_all_around_and_ends_by_itself():
-    fleet = Fleet()
+def test_an_inspection_with_nothing_in_view_goes_near_looks_all_around_and_ends_by_itself(fleet):
     place = (10.0, 20.0)
     robot = fleet.robot(1, (6.05, 12.0, NORTHWARD), MissionGoal((place,), event="fire"))
     headings: list[float] = []
@@ -308,8 +296,7 @@ def test_an_inspection_with_nothing_in_view_goes_near_looks_all_around_and_ends_
     assert robot.when("done") - robot.when("waiting") == pytest.approx(INSPECT_FOR, abs=0.2)
 
 
-def test_something_else_at_the_place_is_not_the_event():
-    fleet = Fleet()
+def test_something_else_at_the_place_is_not_the_event(fleet):
     place = (10.0, 20.0)
     fleet.hazards = [
         HazardSpot("flood", *place, 0.5),

@@ -87,6 +87,11 @@ NEEDED = [
 ]
 
 
+@pytest.fixture
+def office() -> Office:
+    return staffed()
+
+
 @pytest.mark.parametrize("role", LEVELS)
 @pytest.mark.parametrize(
     ("body", "needs"), NEEDED, ids=lambda x: getattr(x, "__name__", str(x)[:20])
@@ -107,8 +112,7 @@ TYPES = ("ControlRoom", "TeleOp", "Teleoperation", "Remote Control", "Guard", "S
 
 
 @pytest.mark.parametrize("kind", TYPES)
-def test_a_device_of_which_the_dva_was_told_nothing_may_look_and_no_more(kind):
-    office = staffed()
+def test_a_device_of_which_the_dva_was_told_nothing_may_look_and_no_more(office, kind):
     office.fire(12)
     office.register(UNLISTED, kind)
     reply, _ = decide(office, m.GetDispatch(), room=UNLISTED)
@@ -134,8 +138,7 @@ def test_a_phone_decides_as_its_role_allows_and_is_asked_first(kind):
     ("kind", "follows"),
     [("TeleOp", True), ("Remote Control", True), ("Sensor", False), ("Robot", False)],
 )
-def test_people_who_report_an_event_get_its_number_and_state(kind, follows):
-    office = staffed()
+def test_people_who_report_an_event_get_its_number_and_state(office, kind, follows):
     office.register(UNLISTED, kind)
     report = m.EventReport(None, "flood", east(30), 0.5, 0.9, "detected")
     reply, _ = decide(office, report, room=UNLISTED)
@@ -174,8 +177,7 @@ def test_a_revoked_permission_ends_for_robot_and_holder_and_frees_the_event():
 # --- sending -----------------------------------------------------------------------------------
 
 
-def test_who_is_sent_gets_the_order_and_the_policy_is_overruled():
-    office = staffed()
+def test_who_is_sent_gets_the_order_and_the_policy_is_overruled(office):
     office.fire(12)  # the robot is sent
     facts(office)
     reply, sends = decide(office, m.Assign(1, GUARD, reason="it is locked", decisions=1), 2.0)
@@ -208,8 +210,7 @@ def test_a_control_room_may_drive_itself_and_names_no_other():
     assert decide(office, m.Assign(1, ROBOT, ROOM), 1.0)[1] == [Send(ROOM, order(1, ROBOT))]
 
 
-def test_who_is_at_an_event_is_not_called_away_by_being_sent_to_another():
-    office = staffed()
+def test_who_is_at_an_event_is_not_called_away_by_being_sent_to_another(office):
     office.fire(12)
     office.fire(60, now=1.0)
     reply, sends = decide(office, m.Assign(2, ROBOT, decisions=1), 2.0)
@@ -228,8 +229,7 @@ def test_a_robot_in_somebody_elses_hands_is_not_sent():
     assert "remote control" in reply.text
 
 
-def test_nobody_is_called_from_a_scene_but_by_being_taken_off():
-    office = staffed()
+def test_nobody_is_called_from_a_scene_but_by_being_taken_off(office):
     office.fire(12)
     office.progress(OPERATOR, "arrived", 5.0)
     status = decide(office, m.GetEventList(), 6.0)[0].content
@@ -239,8 +239,7 @@ def test_nobody_is_called_from_a_scene_but_by_being_taken_off():
     assert decide(office, m.TakeOff(1, ROBOT, decisions=now), 7.0)[0].code == m.OK
 
 
-def test_who_was_taken_off_is_not_sent_there_again_by_the_policy():
-    office = staffed()
+def test_who_was_taken_off_is_not_sent_there_again_by_the_policy(office):
     office.fire(12)
     _, sends = decide(office, m.TakeOff(1, ROBOT, "its battery is low"), 1.0)
     assert sends == [Send(OPERATOR, OVER), Send(GUARD, order(1))]
@@ -252,8 +251,7 @@ def test_who_was_taken_off_is_not_sent_there_again_by_the_policy():
 
 
 @pytest.mark.invariant("S6")
-def test_an_event_nobody_is_left_for_is_escalated_at_its_deadline_all_the_same():
-    office = staffed()
+def test_an_event_nobody_is_left_for_is_escalated_at_its_deadline_all_the_same(office):
     office.fire(12)
     for device in (ROBOT, GUARD, OTHER_GUARD):
         decide(office, m.TakeOff(1, device), 1.0)
@@ -349,8 +347,7 @@ def test_without_having_seen_it_nobody_takes_an_event_out_of_anothers_hands():
     assert (reply.code, sends) == (m.BUSY, [])
 
 
-def test_the_first_to_acknowledge_has():
-    office = staffed()
+def test_the_first_to_acknowledge_has(office):
     office.fire(12)
     assert decide(office, m.Acknowledge(1), 3.0)[0].code == m.OK
     reply, _ = decide(office, m.Acknowledge(1), 5.0, OTHER_ROOM)
@@ -378,8 +375,7 @@ def test_the_same_decision_once_more_changes_nothing(body):
     assert (reply.code, sends, repr(office.event()), facts(office)) == (m.OK, [], before, [])
 
 
-def test_what_is_not_there_is_refused_by_name():
-    office = staffed()
+def test_what_is_not_there_is_refused_by_name(office):
     office.fire(12)
     assert decide(office, m.Acknowledge(7))[0].code == m.UNKNOWN_EVENT
     assert decide(office, m.Assign(1, OPERATOR, decisions=1))[0].code == m.UNKNOWN_DEVICE

@@ -39,6 +39,11 @@ def stopped(office: Office, emergency: m.RobotEmergency = STOPPED, now: float = 
     return release_of(office.say(ROBOT, emergency, now)[0])
 
 
+@pytest.fixture
+def office() -> Office:
+    return staffed()
+
+
 def test_who_releases_depends_on_who_is_registered():
     for roles, rule in [
         ({}, "drive"),
@@ -53,8 +58,7 @@ def test_who_releases_depends_on_who_is_registered():
         assert stopped(office) == m.EmergencyRelease(7000, rule, None), roles
 
 
-def test_a_stopped_robot_is_sent_nowhere_and_its_event_is_open_to_others():
-    office = staffed()
+def test_a_stopped_robot_is_sent_nowhere_and_its_event_is_open_to_others(office):
     office.fire(12)
     assert office.event().responder == ROBOT
     stopped(office)
@@ -68,8 +72,7 @@ def test_a_stopped_robot_is_sent_nowhere_and_its_event_is_open_to_others():
     assert "emergency" in candidate.reason
 
 
-def test_a_released_robot_is_told_to_ask_and_may_be_sent():
-    office = staffed()
+def test_a_released_robot_is_told_to_ask_and_may_be_sent(office):
     stopped(office)
     reply, sends = office.say(ROOM, m.ReleaseEmergency(ROBOT, "nobody is hurt"), 5.0)
     assert reply.code == m.OK
@@ -79,8 +82,7 @@ def test_a_released_robot_is_told_to_ask_and_may_be_sent():
     assert office.event().responder == ROBOT
 
 
-def test_a_release_is_for_one_emergency():
-    office = staffed()
+def test_a_release_is_for_one_emergency(office):
     stopped(office)
     office.say(ROOM, m.ReleaseEmergency(ROBOT), 5.0)
     assert stopped(office, LATER, 6.0).released is None
@@ -124,8 +126,7 @@ def test_only_a_robot_reports_an_emergency():
     assert staffed().say(GUARD, STOPPED, 1.0)[0].code == m.NOT_SUPPORTED
 
 
-def test_stop_and_release_are_in_the_trail_with_who_and_when():
-    office = staffed()
+def test_stop_and_release_are_in_the_trail_with_who_and_when(office):
     stopped(office)
     stopped(office, now=2.0)
     office.say(ROOM, m.ReleaseEmergency(ROBOT, "checked"), 5.0)
@@ -136,32 +137,28 @@ def test_stop_and_release_are_in_the_trail_with_who_and_when():
     ]
 
 
-def test_a_robot_whose_program_was_replaced_is_stopped_again():
-    office = staffed()
+def test_a_robot_whose_program_was_replaced_is_stopped_again(office):
     stopped(office)
     office.number = 0  # of its new program
     sends = office.register(ROBOT, "Robot", now=3.0)
     assert Send(ROBOT, m.Emergency()) in sends
 
 
-def test_a_robot_that_no_longer_says_that_it_is_stopped_is_sent_again():
-    office = staffed()
+def test_a_robot_that_no_longer_says_that_it_is_stopped_is_sent_again(office):
     stopped(office)
     office.status(ROBOT, 10, 2.0 + UNCONFIRMED_AFTER)
     office.core.tick(2.5 + UNCONFIRMED_AFTER)
     assert not office.core.emergencies.holds(ROBOT)
 
 
-def test_a_stopped_robot_that_is_silent_is_not_forgotten():
-    office = staffed()
+def test_a_stopped_robot_that_is_silent_is_not_forgotten(office):
     stopped(office)
     office.core.tick(5000.0)
     assert office.core.emergencies.holds(ROBOT)
     assert ROBOT in office.core.registry.entries
 
 
-def test_a_restarted_dva_knows_who_is_stopped(tmp_path):
-    office = staffed()
+def test_a_restarted_dva_knows_who_is_stopped(office, tmp_path):
     memory = Store(tmp_path / "dva.sqlite")
     stopped(office)
     assert memory.keep(office.core, office.core.events.changes(), 1.0) is None
@@ -173,8 +170,7 @@ def test_a_restarted_dva_knows_who_is_stopped(tmp_path):
     assert stopped(office, now=102.0).released.device == ROOM
 
 
-def test_a_release_is_remembered_too(tmp_path):
-    office = staffed()
+def test_a_release_is_remembered_too(office, tmp_path):
     memory = Store(tmp_path / "dva.sqlite")
     stopped(office)
     memory.keep(office.core, office.core.events.changes(), 1.0)

@@ -19,6 +19,7 @@ from dva_sim.core.permissions import Access, AccessRule
 from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 
+THIRD = "02:00:00:03:00:03"
 HANDOVER = Send(OPERATOR, m.HandoverRequest(ROBOT, OTHER_OPERATOR, "remote control"))
 
 
@@ -160,28 +161,29 @@ def test_who_does_not_come_for_it_in_time_gets_nothing(office):
     assert ask(office, OPERATOR, None, 33.0)[0].code == m.OK
 
 
-def test_a_late_yes_takes_nothing_from_the_next_holder(office):
-    third = "02:00:00:03:00:03"
-    office.register(third, "TeleOp")
+def asked_and_given_back(office: Office) -> list[Send]:
+    """The holder is asked for the robot, and gives it back with a third operator there."""
+    office.register(THIRD, "TeleOp")
     over = hold(office)
     asked = ask(office)[1]
     office.say(OPERATOR, over)
-    assert ask(office, third, None, 1.0)[0].code == m.OK
+    return asked
+
+
+def test_a_late_yes_takes_nothing_from_the_next_holder(office):
+    asked = asked_and_given_back(office)
+    assert ask(office, THIRD, None, 1.0)[0].code == m.OK
     assert office.ok(asked, 2.0) == []
-    assert office.core.sessions.permissions.grants[ROBOT].holder == third
+    assert office.core.sessions.permissions.grants[ROBOT].holder == THIRD
 
 
 def test_a_late_yes_takes_nothing_from_who_was_sent_with_it_meanwhile(office):
-    third = "02:00:00:03:00:03"
-    office.register(third, "TeleOp")
-    over = hold(office)
-    asked = ask(office)[1]
-    office.say(OPERATOR, over)
+    asked = asked_and_given_back(office)
     office.busy(GUARD, OPERATOR)
     office.fire(12, now=1.0)
-    assert office.event().operator == third
+    assert office.event().operator == THIRD
     assert office.ok(asked, 2.0) == []
-    assert office.event().operator == third
+    assert office.event().operator == THIRD
 
 
 # --- forced ------------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 """Robots that the DVA sends round while nothing happens."""
 
 import numpy as np
+import pytest
 from helpers.dva.dispatch_office import DVA, GUARD, OPERATOR, ROBOT, Office, crow, east
 
 from dva_sim.core.dispatcher import REST, Patrols
@@ -32,25 +33,27 @@ def sent_out(office: Office) -> int:
     return grant.session
 
 
+@pytest.fixture
+def office() -> PatrolOffice:
+    return PatrolOffice()
+
+
 def test_a_robot_without_a_beat_stays_where_it_is():
     office = Office()
     assert [office.tick(float(t)) for t in range(0, 60, 5)] == [[]] * 12
 
 
-def test_a_robot_sets_out_when_it_has_rested_and_not_before():
-    office = PatrolOffice()
+def test_a_robot_sets_out_when_it_has_rested_and_not_before(office):
     assert [office.tick(t) for t in (0.0, 5.0, REST - 0.1)] == [[], [], []]
     sent_out(PatrolOffice())
 
 
-def test_a_robot_under_way_is_left_alone():
-    office = PatrolOffice()
+def test_a_robot_under_way_is_left_alone(office):
     sent_out(office)
     assert [office.tick(REST + t) for t in (5.0, 15.0, 40.0)] == [[], [], []]
 
 
-def test_a_patrolling_robot_is_sent_to_an_event_and_its_operator_gets_it():
-    office = PatrolOffice()
+def test_a_patrolling_robot_is_sent_to_an_event_and_its_operator_gets_it(office):
     patrol = sent_out(office)
     office.silence(GUARD, 20.0)
     [order] = office.fire(12, now=21.0)
@@ -63,15 +66,13 @@ def test_a_patrolling_robot_is_sent_to_an_event_and_its_operator_gets_it():
     assert [send.to for send in sends] == [ROBOT]
 
 
-def test_nobody_is_told_that_the_dva_itself_holds_a_robot_no_longer():
-    office = PatrolOffice()
+def test_nobody_is_told_that_the_dva_itself_holds_a_robot_no_longer(office):
     office.tick(0.0)
     [grant] = office.tick(REST)
     assert {send.to for send in office.no([grant], REST)} == {ROBOT}
 
 
-def test_a_robot_that_comes_to_stand_is_sent_home_and_then_round_again():
-    office = PatrolOffice()
+def test_a_robot_that_comes_to_stand_is_sent_home_and_then_round_again(office):
     session = sent_out(office)
     office.tick(15.0)
     for start in (20.0, 50.0):
@@ -87,8 +88,7 @@ def test_a_robot_that_comes_to_stand_is_sent_home_and_then_round_again():
         office.tick(start + 2.0 * REST)
 
 
-def test_a_robot_that_comes_back_from_an_order_takes_up_its_round():
-    office = PatrolOffice()
+def test_a_robot_that_comes_back_from_an_order_takes_up_its_round(office):
     sent_out(office)
     content = office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"), 20.0)[0].content
     assert isinstance(content, m.Permission)
@@ -102,7 +102,6 @@ def test_a_robot_that_comes_back_from_an_order_takes_up_its_round():
     assert grant.body.session > content.session
 
 
-def test_a_dva_that_closes_stops_its_patrols():
-    office = PatrolOffice()
+def test_a_dva_that_closes_stops_its_patrols(office):
     session = sent_out(office)
     assert office.core.close() == [Send(ROBOT, m.PermissionRevocation(ROBOT, DVA, session))]

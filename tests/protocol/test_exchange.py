@@ -21,6 +21,11 @@ def kept(cache: ReplyCache) -> list[int]:
     return [number for number, key in enumerate(KEYS) if cache.get(key) is not None]
 
 
+@pytest.fixture
+def heard() -> Nuisances:
+    return Nuisances()
+
+
 def test_the_last_64_replies_to_a_source_are_kept():
     cache = ReplyCache()
     for key in KEYS:
@@ -51,8 +56,7 @@ def test_who_has_asked_longest_ago_is_forgotten_first():
 # --- who sends what is no message ------------------------------------------------------------
 
 
-def test_a_program_that_errs_now_and_then_is_answered_for_ever():
-    heard = Nuisances()
+def test_a_program_that_errs_now_and_then_is_answered_for_ever(heard):
     for second in range(1000):
         for _ in range(9):
             heard.bad("clumsy", float(second))
@@ -70,8 +74,7 @@ def test_a_flood_is_first_not_answered_and_then_not_read():
     assert heard.hearing("another", 0.2) is Hearing.ANSWERED
 
 
-def test_who_stops_is_read_again_ten_seconds_later_and_answered_soon_after():
-    heard = Nuisances()
+def test_who_stops_is_read_again_ten_seconds_later_and_answered_soon_after(heard):
     for _ in range(100_000):
         heard.bad("flood", 1.0)
     assert heard.hearing("flood", 10.9) is Hearing.IGNORED
@@ -79,8 +82,7 @@ def test_who_stops_is_read_again_ten_seconds_later_and_answered_soon_after():
     assert heard.hearing("flood", 19.1) is Hearing.ANSWERED
 
 
-def test_a_good_message_halves_what_is_held_against_a_peer():
-    heard = Nuisances()
+def test_a_good_message_halves_what_is_held_against_a_peer(heard):
     for _ in range(80):
         heard.bad("mixed", 0.0)
     heard.good("mixed", 0.0)
@@ -89,8 +91,7 @@ def test_a_good_message_halves_what_is_held_against_a_peer():
     assert heard.hearing("mixed", 1.9) is Hearing.ANSWERED
 
 
-def test_what_is_left_against_a_peer_after_a_good_message_still_counts():
-    heard = Nuisances()
+def test_what_is_left_against_a_peer_after_a_good_message_still_counts(heard):
     for _ in range(3):
         heard.bad("mixed", 0.0)
     heard.good("mixed", 0.0)  # one and a half are left
@@ -99,8 +100,7 @@ def test_what_is_left_against_a_peer_after_a_good_message_still_counts():
     assert heard.hearing("mixed", 0.0) is Hearing.READ
 
 
-def test_no_more_peers_are_remembered_than_stated():
-    heard = Nuisances()
+def test_no_more_peers_are_remembered_than_stated(heard):
     for peer in ("first", "second"):
         for _ in range(21):
             heard.bad(peer, 0.0)

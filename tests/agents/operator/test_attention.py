@@ -26,6 +26,15 @@ class Robot:
         self.left += 1
 
 
+def two_screens() -> tuple[Clock, Robot, Robot, Attention]:
+    """Two robots that somebody has begun to look at."""
+    clock, one, two = Clock(), Robot(), Robot()
+    attention = Attention(clock, 1.0, HABITS, repeat(0.0))
+    attention.begin(one)
+    attention.begin(two)
+    return clock, one, two, attention
+
+
 @pytest.mark.parametrize(
     ("why", "waits", "chosen"),
     [
@@ -59,10 +68,7 @@ def test_of_a_single_robot_everything_is_seen_at_once_and_all_the_time():
 
 def test_two_robots_share_the_eyes_and_each_turn_costs_the_switch():
     """3 s of looking, up to 0.5 s until the person moves on, 1 s to find into the other."""
-    clock, one, two = Clock(), Robot(), Robot()
-    attention = Attention(clock, 1.0, HABITS, repeat(0.0))
-    attention.begin(one)
-    attention.begin(two)
+    clock, one, two, attention = two_screens()
     clock.run(90.0)
     attention.end(one)
     attention.end(two)
@@ -90,10 +96,7 @@ def test_looks_differ_as_the_spread_of_their_logarithm_says():
 
 
 def test_who_waits_for_a_judgement_keeps_the_eyes_until_it_is_over():
-    clock, one, two = Clock(), Robot(), Robot()
-    attention = Attention(clock, 1.0, HABITS, repeat(0.0))
-    attention.begin(one)
-    attention.begin(two)
+    clock, one, two, attention = two_screens()
     clock.run(0.2)
     two.waits_since = 0.2
     clock.run(50.0)

@@ -21,13 +21,19 @@ def office(control: str, span: int = 2, robots: int = 2) -> tuple[PretendedDva, 
     return dva, dva.operator()
 
 
+def both_ordered(control: str) -> tuple[PretendedDva, OperatorAgent]:
+    """An operator who has been sent with one robot to either side."""
+    dva, operator = office(control)
+    assert dva.order(1, EAST, robot=ROBOT) == dva.order(2, WEST, robot=OTHER_ROBOT) == m.OK
+    return dva, operator
+
+
 def modes(dva: PretendedDva) -> list[Mode]:
     return [robot.controller.mode for robot in dva.field.robots.values()]
 
 
 def test_two_missions_run_at_the_same_time_and_both_are_judged():
-    dva, operator = office("supervisory")
-    assert dva.order(1, EAST, robot=ROBOT) == dva.order(2, WEST, robot=OTHER_ROBOT) == m.OK
+    dva, operator = both_ordered("supervisory")
     dva.run_until(lambda: len(operator.works) == 2 and modes(dva) == [Mode.MISSION] * 2)
     assert operator.activity == "watches robot-1, watches robot-2"
     dva.run_until(lambda: "done" in dva.progress(1) and "done" in dva.progress(2))
@@ -40,9 +46,7 @@ def test_two_missions_run_at_the_same_time_and_both_are_judged():
 
 
 def test_while_one_place_is_searched_the_other_robot_waits_for_the_eyes():
-    dva, operator = office("supervisory")
-    dva.order(1, EAST, robot=ROBOT)
-    dva.order(2, WEST, robot=OTHER_ROBOT)
+    dva, operator = both_ordered("supervisory")
     dva.run_until(lambda: "done" in dva.progress(1) and "done" in dva.progress(2))
     first, second = sorted(dva.when(event, "refuted") for event in (1, 2))
     assert second - first > 0.9 * operator._seat.person.search
@@ -53,8 +57,7 @@ def test_while_one_place_is_searched_the_other_robot_waits_for_the_eyes():
 
 
 def test_two_robots_driven_by_hand_go_one_after_the_other():
-    dva, _ = office("direct")
-    assert dva.order(1, EAST, robot=ROBOT) == dva.order(2, WEST, robot=OTHER_ROBOT) == m.OK
+    dva, _ = both_ordered("direct")
     dva.run_until(lambda: "departed" in dva.progress(1))
     dva.run_for(5.0)
     assert modes(dva) == [Mode.TELEOPERATION, Mode.IDLE]
@@ -92,9 +95,7 @@ def test_a_newer_order_for_a_robot_in_hand_leaves_the_other_alone():
 
 
 def test_what_waits_for_its_turn_can_be_called_off():
-    dva, operator = office("direct")
-    dva.order(1, EAST, robot=ROBOT)
-    dva.order(2, WEST, robot=OTHER_ROBOT)
+    dva, operator = both_ordered("direct")
     assert dva.say(OPERATOR, m.OrderProgress(2, "done")) == m.OK
     dva.run_until(lambda: "done" in dva.progress(1))
     dva.run_for(10.0)
@@ -103,9 +104,7 @@ def test_what_waits_for_its_turn_can_be_called_off():
 
 
 def test_who_leaves_puts_both_robots_to_rest():
-    dva, operator = office("supervisory")
-    dva.order(1, EAST, robot=ROBOT)
-    dva.order(2, WEST, robot=OTHER_ROBOT)
+    dva, operator = both_ordered("supervisory")
     dva.run_until(lambda: modes(dva) == [Mode.MISSION] * 2)
     operator.put_down()
     dva.run_for(5.0)
@@ -114,9 +113,7 @@ def test_who_leaves_puts_both_robots_to_rest():
 
 
 def test_a_revoked_permission_ends_one_mission_and_not_the_other():
-    dva, operator = office("supervisory")
-    dva.order(1, EAST, robot=ROBOT)
-    dva.order(2, WEST, robot=OTHER_ROBOT)
+    dva, operator = both_ordered("supervisory")
     dva.run_until(lambda: modes(dva) == [Mode.MISSION] * 2)
     over = m.PermissionRevocation(ROBOT, OPERATOR, dva.sessions[ROBOT].session)
     dva.say(ROBOT, over)

@@ -61,10 +61,14 @@ class Hearer:
         ]
 
 
+@pytest.fixture
+def heard() -> Hearer:
+    return Hearer()
+
+
 @pytest.mark.invariant("S6")
 @pytest.mark.parametrize(("robot", "breaks"), [(ROBOT, True), (OTHER, False)])
-def test_an_order_with_another_robot_has_its_own_time_to_set_out(robot, breaks):
-    heard = Hearer()
+def test_an_order_with_another_robot_has_its_own_time_to_set_out(heard, robot, breaks):
     assert heard.broken(1.0) == []
     heard.orders(1.0)
     assert heard.broken(20.0) == []
@@ -74,8 +78,7 @@ def test_an_order_with_another_robot_has_its_own_time_to_set_out(robot, breaks):
 
 @pytest.mark.invariant("S6")
 @pytest.mark.parametrize(("is_given_again", "breaks"), [(False, True), (True, False)])
-def test_work_that_is_over_and_given_again_at_once_has_its_own_time(is_given_again, breaks):
-    heard = Hearer()
+def test_work_that_is_over_and_given_again_at_once_has_its_own_time(heard, is_given_again, breaks):
     assert heard.broken(1.0) == []
     heard.orders(1.0)
     heard.event.times["departed"] = 1.5
@@ -106,8 +109,9 @@ def forgets(table: EventTable, event: Event, severity: float) -> None:
     ("merge", "severity", "breaks"),
     [(raises, 0.9, False), (keeps, 0.9, True), (forgets, 0.9, True), (keeps, 0.4, False)],
 )
-def test_an_event_is_as_severe_as_the_worst_report_that_the_dva_has_taken(merge, severity, breaks):
-    heard = Hearer()
+def test_an_event_is_as_severe_as_the_worst_report_that_the_dva_has_taken(
+    heard, merge, severity, breaks
+):
     assert heard.broken(1.0) == []
     heard.says(1.0, m.EventReport(None, "fire", PLACE, severity, 0.9, "detected"))
     merge(heard.table, heard.event, severity)
@@ -116,8 +120,7 @@ def test_an_event_is_as_severe_as_the_worst_report_that_the_dva_has_taken(merge,
 
 
 @pytest.mark.invariant("S6")
-def test_a_severity_that_is_lost_later_is_noticed():
-    heard = Hearer()
+def test_a_severity_that_is_lost_later_is_noticed(heard):
     heard.says(0.0, m.EventReport(None, "fire", PLACE, 0.9, 0.9, "detected"))
     raises(heard.table, heard.event, 0.9)
     heard.is_answered(m.OK)
@@ -127,8 +130,7 @@ def test_a_severity_that_is_lost_later_is_noticed():
 
 
 @pytest.mark.invariant("S6")
-def test_of_a_report_that_was_refused_nothing_need_be_noted():
-    heard = Hearer()
+def test_of_a_report_that_was_refused_nothing_need_be_noted(heard):
     heard.says(0.0, m.EventReport(None, "fire", PLACE, 0.9, 0.9, "detected"))
     heard.is_answered(m.BUSY)
     assert heard.broken(2.0) == []
@@ -145,8 +147,7 @@ def test_of_a_report_that_was_refused_nothing_need_be_noted():
         (False, 50.0, False),  # an order came to nothing
     ],
 )
-def test_a_restart_gives_an_event_no_more_time_to_wait(is_restarted, since, breaks):
-    heard = Hearer()
+def test_a_restart_gives_an_event_no_more_time_to_wait(heard, is_restarted, since, breaks):
     assert heard.broken(10.0) == []
     assert heard.broken(50.0, works=not is_restarted) == []
     heard.event.waiting_since = since
@@ -155,8 +156,7 @@ def test_a_restart_gives_an_event_no_more_time_to_wait(is_restarted, since, brea
 
 @pytest.mark.invariant("S6")
 @pytest.mark.parametrize(("is_sent", "breaks"), [(True, True), (False, False)])
-def test_an_order_that_still_waits_for_its_device_was_not_accepted(is_sent, breaks):
-    heard = Hearer()
+def test_an_order_that_still_waits_for_its_device_was_not_accepted(heard, is_sent, breaks):
     heard.orders(1.0)
     assert heard.broken(2.0) == []
     heard.says(2.0, m.OrderProgress(heard.event.number, "declined"))
@@ -196,8 +196,7 @@ def test_nobody_is_booked_as_arrived_who_has_not_been_there():
 
 
 @pytest.mark.invariant("S7")
-def test_an_arrival_that_is_forgotten_when_another_is_sent_is_none_of_the_other():
-    heard = Hearer()
+def test_an_arrival_that_is_forgotten_when_another_is_sent_is_none_of_the_other(heard):
     heard.places[OTHER] = AFAR
     assert heard.broken(1.0) == []
     heard.orders(1.0)
@@ -210,8 +209,7 @@ def test_an_arrival_that_is_forgotten_when_another_is_sent_is_none_of_the_other(
 
 @pytest.mark.invariant("S6")
 @pytest.mark.parametrize(("has_set_out", "breaks"), [(True, False), (False, True)])
-def test_who_registers_again_on_the_way_has_taken_the_event_up(has_set_out, breaks):
-    heard = Hearer()
+def test_who_registers_again_on_the_way_has_taken_the_event_up(heard, has_set_out, breaks):
     assert heard.broken(1.0) == []
     heard.orders(1.0)
     heard.says(1.0, m.Registration("operator-1", "TeleOp", "192.168.1.9"))
