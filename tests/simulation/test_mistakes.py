@@ -5,10 +5,12 @@ from pathlib import Path
 from typing import Any
 
 from helpers.mistakes import check_mistake, each_mistake, mistakes, of_file
+from helpers.worlds.small_site import TWO_ROOMS, feature, write_site
 
 from dva_sim.kernel import resources
 from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation import middleware, task, timed, transports
+from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.run_journal import recording_of
 from dva_sim.simulation.models import model_of
 from dva_sim.simulation.scenario import build, load
@@ -233,6 +235,30 @@ def journal(*lines):
     recording_of(build(load("drive-to-event"), {}), 1, lines)
 
 
+FIRE = {"site": {"name": "tiny.yaml"}, "events": [{"kind": "fire", "reported": True}]}
+GUARD_ALONE = {"robot": {"count": 0}, "operator": {"count": 0}, "guard": {"count": 1}}
+TWICE = {"mobilisation_s": 30.0, "traits": {"mobilisation_s": 60.0}}
+PLACES = [
+    feature("robot_base", "Point", [(1, 1)]),
+    feature("guard_post", "Point", [(1, 3)]),
+]
+
+
+def placed(*teams):
+    """Runs of a drill on a site of two small rooms, one after the other."""
+    write_site(Path(), TWO_ROOMS + PLACES)
+    for team in teams:
+        Run(build(FIRE | team, {}), 1)
+
+
+PLACED = mistakes(
+    placed,
+    (GUARD_ALONE | {"guard": {"count": 1, "way_m": 500.0}}, "'tiny' 500 m guard-1; 7 m"),
+    ({"robot": {"count": 7}}, {"robot": {"count": 8}}, "'tiny' room 7 robots 8"),
+    (GUARD_ALONE | {"bystander": {"count": 100}}, "'tiny' 23 bystanders"),
+    ({"robot": {"count": 30, "way_m": 3.0}}, "'tiny' 3 m robot-3; 2 robot.way_m"),
+    (GUARD_ALONE | {"guard": {"count": 1} | TWICE}, "mobilisation_s traits"),
+)
 OTHERS = [
     *mistakes(
         habit,
@@ -269,6 +295,6 @@ OTHERS = [
 ]
 
 
-@each_mistake([*TIMED, *EVENTS, *TASKS, *OTHERS])
+@each_mistake([*TIMED, *EVENTS, *TASKS, *PLACED, *OTHERS])
 def test_a_mistake_ends_in_one_line_with_its_names(tmp_path, act, error, names):
     check_mistake(tmp_path, act, error, names)

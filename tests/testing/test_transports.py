@@ -52,7 +52,7 @@ class Alters(Around):
 
 class Stalls(Around):
     def send(self, data):
-        time.sleep(0.05)
+        time.sleep(0.01)
         return self._end.send(data)
 
 
@@ -96,7 +96,7 @@ class Impatient(Over):
 def test_a_transport_that_breaks_a_promise_is_told_of_it(bad, promise, monkeypatch):
     monkeypatch.setattr(transports, "ARRIVES_S", 0.5)
     monkeypatch.setattr(transports, "CONNECTS_S", 1.0)
-    monkeypatch.setattr(transports, "SLACK_S", 1.0)
+    monkeypatch.setattr(transports, "SLACK_S", 0.2)
     outcome = tried(check_transport, bad)
     while kept:
         kept.pop().close()

@@ -1,13 +1,10 @@
 """Robots and guards can begin a given way from the event, wherever it is."""
 
 import math
-import re
 from typing import Any
 
 import pytest
-from helpers.wording import unnamed
 
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import simulate
 from dva_sim.simulation.full.run import Run
@@ -54,12 +51,6 @@ def test_a_longer_way_begins_elsewhere_with_the_same_event_and_the_same_person()
     assert 18.0 / 2.2 < times[1] - times[0] < 18.0 / 0.6  # the same mobilisation, the same pace
 
 
-@pytest.mark.system
-def test_a_way_that_is_longer_than_any_on_the_site_is_refused_with_the_longest_there_is():
-    with pytest.raises(ConfigError, match=r"500 m .*guard-1"):
-        Run(drill(guard={"count": 1, "way_m": 500.0}, **GUARD_ALONE), 1)
-
-
 def test_more_robots_and_guards_than_a_plan_has_places_begin_apart_wherever_it_is_free():
     run = Run(drill(robot={"count": 30}, guard={"count": 20}), 1)
     site, bases, posts = run.stage.site, run.stage.site.robot_bases, run.stage.site.guard_posts
@@ -85,28 +76,6 @@ def test_another_seed_has_other_places_for_robots_without_a_base_of_their_own():
     assert one.robot_bases[3:] != other.robot_bases[3:]
 
 
-@pytest.mark.system
-def test_more_robots_than_fit_are_refused_with_how_many_do():
-    with pytest.raises(ConfigError, match="900") as refused:
-        Run(drill(robot={"count": 900}), 1)
-    found = re.search(r"'caparica' .* (\d+) robots", str(refused.value))
-    assert found is not None
-    most = int(found[1])
-    assert len(Run(drill(robot={"count": most}), 1).field.robots) == most
-
-
-@pytest.mark.system
-def test_more_bystanders_than_fit_are_refused_with_how_many_found_a_place():
-    with pytest.raises(ConfigError, match=r" \d+ bystanders"):
-        Run(drill(bystander={"count": 1000}, **GUARD_ALONE, guard={"count": 1}), 1)
-
-
-@pytest.mark.system
-def test_who_finds_no_place_so_far_from_the_event_is_told_with_how_many_did():
-    with pytest.raises(ConfigError, match=r"robot-\d+; \d+ "):
-        Run(drill(robot={"count": 60, "way_m": 9.0}), 1)
-
-
 def test_a_fire_breaks_out_as_far_from_everybody_as_can_be_where_robots_are_everywhere():
     run = Run(drill(robot={"count": 50}), 1)
     place = run.field.incidents[0].hazard.position
@@ -124,10 +93,3 @@ def test_guards_get_ready_in_the_time_the_scenario_says_with_the_spread_of_their
     ]
     assert waits[1] - waits[0] == pytest.approx(89.0 * waits[1] / 90.0, rel=0.02)
     assert scenarios.guard_profile(late.scenario).mobilisation_s.spread == 0.45
-
-
-def test_a_mobilisation_that_is_given_twice_is_refused():
-    twice = {"count": 1, "mobilisation_s": 30.0, "traits": {"mobilisation_s": 60.0}}
-    with pytest.raises(ConfigError) as refused:
-        drill(guard=twice, **GUARD_ALONE)
-    assert unnamed(str(refused.value), "mobilisation_s", "traits") == []

@@ -29,7 +29,7 @@ def run(**changed):
 def test_commands_and_pictures_cross_a_real_link_and_are_as_old_as_it_makes_them():
     need_link()
     link = {"up": {"delay_s": 0.1}, "down": {"delay_s": 0.2}}
-    found, row = run(link=link, pictures={"rate_hz": 10, "bytes": 2000})
+    found, row = run(link=link, pictures={"rate_hz": 10, "bytes": 2000}, set_up_s=5.0)
     assert row["connected"] == 1
     assert row["command_age_p50_s"] > 0.1
     assert row["picture_age_p50_s"] > 0.2

@@ -107,7 +107,7 @@ def test_the_rule_has_a_line_for_each_thing_it_asks(compared):
 @pytest.mark.parametrize("again", [False, pytest.param(True, marks=pytest.mark.soak)])
 def test_the_command_writes_tables_and_figures(runs, tmp_path, capsys, monkeypatch, again):
     """And the same bytes again."""
-    monkeypatch.setattr(comparison, "QUICK_RUNS", 3)
+    monkeypatch.setattr(comparison, "QUICK_RUNS", 2)
     monkeypatch.setattr(comparison, "QUICK_CONTROL_RUNS", 2)
     few = [run for run in runs if run.condition.label == LABELS[0]]
     first, second = tmp_path / "a", tmp_path / ("b" if again else "a")
@@ -123,7 +123,7 @@ def test_the_command_writes_tables_and_figures(runs, tmp_path, capsys, monkeypat
 
 
 def test_the_number_of_processes_changes_nothing(runs, monkeypatch):
-    monkeypatch.setattr(comparison, "QUICK_RUNS", 4)
+    monkeypatch.setattr(comparison, "QUICK_RUNS", 2)
     one = [run for run in runs if run.condition.label == "req10_d50_j0_l5_r0_p5_T2500"]
     alone, together = (
         compare(grouped(one), NetworkSetting(quick=True, workers=workers)) for workers in (1, 2)
@@ -132,7 +132,7 @@ def test_the_number_of_processes_changes_nothing(runs, monkeypatch):
 
 
 def test_a_mechanism_that_is_left_out_has_its_line(runs, monkeypatch):
-    monkeypatch.setattr(comparison, "QUICK_RUNS", 3)
+    monkeypatch.setattr(comparison, "QUICK_RUNS", 2)
     one = [run for run in runs if run.condition.label == "pub10_d50_j0_l5_r0_p5"]
     found = compare(grouped(one), NetworkSetting(quick=True, ablate=True))
     left_out = {name for name, *_ in evidence.ablation(found)}
