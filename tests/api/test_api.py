@@ -134,10 +134,11 @@ def test_a_script_needs_no_guard(study):
         "import dva_sim\n"
         "def progress(done, total): names.append(__file__)\n"
         "names = []\n"
-        "results = dva_sim.run('late.yaml', 'out', jobs=2, report=False, progress=progress)\n"
+        "results = dva_sim.run('late.yaml', 'out', set={'persons': 1}, jobs=2, report=False,"
+        " progress=progress)\n"
         "print(results.runs.rows, len(set(names)))\n"
     )
-    assert python(str(script), folder=study.parent) == "4 1\n"
+    assert python(str(script), folder=study.parent) == "2 1\n"
 
 
 def test_a_dry_run_asks_as_a_run_does():

@@ -14,7 +14,6 @@ import pytest
 from helpers.processes.command_line import call
 from helpers.wording import unnamed
 
-import dva_sim
 from dva_sim.console.replay.console import player_of
 from dva_sim.console.replay.player import playing
 from dva_sim.core.dva import Dva
@@ -23,7 +22,7 @@ from dva_sim.core.store import Store
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError, ExitCode
 from dva_sim.kernel.recorder import Recorder
-from dva_sim.live import recorded_lines, recording
+from dva_sim.live import recording
 from dva_sim.live.recording import Keeper, LiveRecorder, TraceFile
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
@@ -404,16 +403,3 @@ def test_a_trace_on_a_full_disk_ends_and_is_told_once():
         take("line")
     (line,) = reports
     assert unnamed(line, "trace", os.strerror(errno.ENOSPC)) == []
-
-
-@pytest.mark.parametrize("data", [b"", b"5\n", b"{}\n", b'{"format": 99}\n'])
-def test_what_holds_no_lines_ends_in_one_line(tmp_path, data):
-    part = tmp_path / "run.mcap.part"
-    part.write_bytes(data)
-    for make in (
-        lambda: recorded_lines.record(part, tmp_path / "made"),
-        lambda: dva_sim.replay(part),
-    ):
-        with pytest.raises(ConfigError, match=r"run\.mcap\.part: contains no lines"):
-            make()
-    assert part.exists()

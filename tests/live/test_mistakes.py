@@ -5,11 +5,13 @@ from pathlib import Path
 import pytest
 from helpers.mistakes import Refused, check_mistake, command, each_mistake, mistakes, of_file
 
+import dva_sim
 from dva_sim.agents.robot.decision_log import replay
 from dva_sim.cli.device_keys import make_keys
-from dva_sim.live import supervisor
+from dva_sim.live import recorded_lines, supervisor
 
 EARLIER = ("there.mcap", "cut.mcap.part", "traces/dva.trace.jsonl", "traces/robot-1.trace.jsonl")
+NO_LINES = ("", "5\n", "{}\n", '{"format": 99}\n')
 
 
 def live(words):
@@ -79,6 +81,17 @@ OTHERS = [
         (b'{"robot": "robot-1"}\n', "foreign:1:"),
     ),
     *mistakes(trace, ("none", "none: read")),
+    *(
+        case
+        for read in (lambda name: recorded_lines.record(Path(name), Path("made")), dva_sim.replay)
+        for case in mistakes(
+            of_file(read, "run.mcap.part"),
+            *(
+                (data, "run.mcap.part: no lines")
+                for data in ("", "5\n", "{}\n", '{"format": 99}\n')
+            ),
+        )
+    ),
 ]
 
 

@@ -67,6 +67,13 @@ def made_keys(*ids):
     create_keys(Path("keys"), ids)
 
 
+def unmade_keys(device):
+    try:
+        create_keys(Path(), ["fine", device])
+    finally:
+        assert not list(Path().iterdir())
+
+
 def keys_in(name):
     create_keys(Path(name), [ROBOT])
 
@@ -108,6 +115,10 @@ KEY = "02-00-00-01-00-01.key"
 KEYS = [
     *mistakes(of_file(keys_in, "file"), ("", "file cannot written")),
     *mistakes(made_keys, (ROBOT.replace(":", "-"), "same file")),
+    *mistakes(
+        unmade_keys,
+        *((each, "id") for each in ("", "../robot", "a b", "-", 'x"', "é", "x" * 65, "a\n")),
+    ),
     *mistakes(key_of, (ROBOT, "nowhere", "dva-sim keys"), ("robot-9", "public key robot-9")),
     *mistakes(key_of, (ROBOT, ".", "no keys")),
     *mistakes(

@@ -4,10 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 from helpers.processes.command_line import ended
-from helpers.wording import unnamed
 
 from dva_sim.experiments.execution.executors import local
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Breach
 from dva_sim.storms import campaign, shrinking, storm
 from dva_sim.storms.campaign import Journal, StormTally, outcomes
@@ -48,15 +46,6 @@ def test_a_journal_that_was_cut_short_loses_its_last_line_alone(tmp_path, played
     assert sorted(key[1] for key in Journal(file).outcomes) == [0, 1]
     play_all(file, range(3))
     assert sorted(key[1] for key in Journal(file).outcomes) == [0, 1, 2]
-
-
-def test_a_file_that_is_no_journal_is_refused_and_stays(tmp_path):
-    file = tmp_path / "storms.jsonl"
-    file.write_text("{}\n", encoding="utf-8")
-    with pytest.raises(ConfigError) as refused:
-        Journal(file)
-    assert unnamed(str(refused.value), "storms.jsonl") == []
-    assert file.read_text(encoding="utf-8") == "{}\n"
 
 
 def test_an_outcome_comes_back_from_the_journal(tmp_path):

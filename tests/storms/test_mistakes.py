@@ -3,7 +3,9 @@
 from pathlib import Path
 
 from helpers.mistakes import check_mistake, each_mistake, mistakes, of_file
+from helpers.mutation.bugs import named
 
+from dva_sim.storms.campaign import Journal
 from dva_sim.storms.drawing import draw
 from dva_sim.storms.plan import load_plan
 
@@ -15,6 +17,8 @@ MISTAKES = [
         ("seed: 1\nfaults: [{kind: x}]\ncalm_s: 2\n", "plan.yaml at_s"),
         ("[]\n", "plan.yaml"),
     ),
+    *mistakes(of_file(lambda name: Journal(Path(name)), "storms.jsonl"), ("{}\n", "storms.jsonl")),
+    *mistakes(named, ("stop-ignore", "stop-ignore stop-ignored")),
 ]
 
 

@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import pytest
 from helpers.mutation import bugs, hunting
-from helpers.mutation.bugs import BUGS, named, planted
+from helpers.mutation.bugs import BUGS, planted
 from helpers.mutation.hunting import hunt, hunted
 from helpers.mutation.planting import Bug
 from helpers.wording import unnamed
 from storms.test_storms import small
 
 from dva_sim.agents.robot.controller import RobotController
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.storms.plan import Fault, StormPlan
 from dva_sim.storms.shrinking import Shrinker
 from dva_sim.storms.storm import play
@@ -58,12 +57,6 @@ def test_a_bug_whose_function_is_gone_fails_when_it_is_planted(monkeypatch):
     monkeypatch.delattr(RobotController, "_stop")
     with pytest.raises(AttributeError, match="_stop is no function"), planted("stop-ignored"):
         pass
-
-
-def test_an_unknown_bug_is_refused():
-    with pytest.raises(ConfigError) as refused:
-        named("stop-ignore")
-    assert unnamed(str(refused.value), "stop-ignore", "stop-ignored") == []
 
 
 def test_a_bug_that_does_nothing_is_not_found(monkeypatch):

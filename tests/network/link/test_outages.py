@@ -3,8 +3,7 @@
 import pytest
 from helpers.network.links import link
 
-from dva_sim.kernel.errors import ConfigError
-from dva_sim.network.link import Link, LinkConfig, check_partitions, part_links
+from dva_sim.network.link import Link, LinkConfig, part_links
 
 
 def heard(line: Link, times: list[float]) -> list[float]:
@@ -82,9 +81,3 @@ def test_nodes_that_are_kept_apart_share_the_link_and_its_counts_with_others():
     assert (mine.offered, mine.delay, mine.room) == (4, 0.5, 9000)
     assert whole.is_ideal()
     assert not mine.is_ideal()
-
-
-def test_a_partition_of_nobody_is_refused():
-    check_partitions(PARTITIONS, ["dva", "operator-1", "robot-1"])
-    with pytest.raises(ConfigError, match=r"'operator-\*' .*known: "):
-        check_partitions(PARTITIONS, ["dva", "robot-1"])
