@@ -171,7 +171,8 @@ class AgentDevice:
         self._life += 1
         if self._dva_beats is not None:
             self._dva_beats.close()
-        self._dva_beats, self.dva_watch = None, DvaWatch()
+        self._dva_beats = None
+        self.dva_watch = DvaWatch()
 
     def crash(self) -> None:
         """Be gone without a word: what was asked is never asked again, nor its answer heard."""
@@ -184,7 +185,8 @@ class AgentDevice:
         """Continue as the same device in a new process, which numbers from 1."""
         self.crash()
         self.outbox = Outbox(self.id_tag, *self.time_of_day)
-        self._replies, self._nuisances = ReplyCache(), Nuisances()
+        self._replies = ReplyCache()
+        self._nuisances = Nuisances()
         self.come_back()
 
     def come_back(self) -> None:

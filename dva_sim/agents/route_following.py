@@ -117,7 +117,8 @@ class _Line:
             reach: Largest progress beyond the distance moved [m].
         """
         if last is not self._last or x != self._found.x or y != self._found.y:
-            self._last, self._found = last, self._nearest(last, x, y, reach)
+            self._last = last
+            self._found = self._nearest(last, x, y, reach)
         return self._found
 
     def _nearest(self, last: _Place, x: float, y: float, reach: float) -> _Place:

@@ -21,11 +21,13 @@ from dva_sim.worlds.camera import Camera, Figure, SmokeView
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.hazards import Raster, Surroundings
 
-WIDTH, HEIGHT = 320, 240  # pixels
+WIDTH = 320  # [pixels]
+HEIGHT = 240  # [pixels]
 WIDEST = 150.0  # field of view that one flat picture can show [deg]
 AIR_S = 0.5  # smoke and water are drawn as they were at the last multiple of this [s]
 HAZE = 0.005  # thinner smoke is not seen [1/m]
-BEST, WORST = 85, 20  # quality of a JPEG
+BEST = 85  # quality of a JPEG
+WORST = 20  # quality of a JPEG
 
 Line = dict[str, Any]
 

@@ -85,7 +85,7 @@ def compared(
         ConfigError: no such measure or factor.
     """
     matched = comparison.matched
-    (pairs, runs) = comparison.paired
+    pairs, runs = comparison.paired
     wanted: Sequence[str | None] = measures or [None]
     return {
         "a": _side(comparison.sides[0]),

@@ -39,7 +39,8 @@ _MANY_RUNS = 100_000  # whose list takes seconds, too
 _LINE_S = 30.0  # between two lines of progress in a file
 _MINUTE_S = 60
 _HOUR_S = 3600
-_SURE_AFTER_S, _SURE_SHARE = 10.0, 0.05  # before both, the first runs say little of the others
+_SURE_AFTER_S = 10.0  # before this and the share, the first runs say little of the others
+_SURE_SHARE = 0.05
 
 
 def run(options: RunOptions) -> ExitCode:

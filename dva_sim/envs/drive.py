@@ -35,7 +35,8 @@ COLUMNS: Final = (
     "asked_speed",  # what the last action asked for, as shares of the limits
     "asked_turn",
 )
-NEAR, FAR = 0.8, 2.5  # [m]
+NEAR = 0.8  # [m]
+FAR = 2.5  # [m]
 MOST: Final = 1e4  # bound of all observations
 ROUNDING: Final = 1e-6  # of a share at its limit, as of float32
 

@@ -18,7 +18,8 @@ from dva_sim.recordings.writing import schema_of_channel
 
 PROTOCOLS: Final = "foxglove.sdk.v1", "foxglove.websocket.v1"  # they differ in nothing used here
 MOST_WAITING: Final = 8_000_000  # design: of a viewer; then its oldest messages are dropped [B]
-MESSAGE, TIME = 1, 2  # kinds of binary messages
+MESSAGE = 1  # kind of binary messages
+TIME = 2  # kind of binary messages
 SERVER_INFO: Final = {"op": "serverInfo", "name": "dva-sim", "capabilities": ["time"]}
 
 

@@ -48,7 +48,7 @@ class Inlets:
     def _take(self, number: int, reads: int) -> None:
         """Take whole lines until the part has ended, however it did."""
         rest = b""
-        (keep, judge) = self._takers
+        keep, judge = self._takers
         while data := os.read(reads, 1 << 18):
             whole, _, rest = (rest + data).rpartition(b"\n")
             if whole and keep is not None:

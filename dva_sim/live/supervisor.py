@@ -273,7 +273,8 @@ class Supervisor:
 
     def _take_reports(self, part: _Part) -> None:
         for line in part.reports.lines():
-            part.latest, part.heard = Report(**line), time.monotonic()
+            part.latest = Report(**line)
+            part.heard = time.monotonic()
             self._hear(part.child.name, part.latest)
         if not part.reports.is_open:
             self._selector.unregister(part.reports)

@@ -266,7 +266,8 @@ def _nothing() -> None:
     return None
 
 
-UDP_HEADER, IP_HEADER = 8, 20  # [B]
+UDP_HEADER = 8  # [B]
+IP_HEADER = 20  # [B]
 FRAGMENT = 1480  # payload of a full IPv4 packet on Ethernet [B]
 
 

@@ -201,7 +201,8 @@ class Paced(Requested):
 
     @override
     def begin(self, line: Line) -> None:
-        self.line, self._window = line, RequestWindow(line.rate_hz)
+        self.line = line
+        self._window = RequestWindow(line.rate_hz)
         line.open_requests(MOST)
 
     @override

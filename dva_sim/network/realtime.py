@@ -320,7 +320,8 @@ class PacedClock(LiveClock):
         self._pulses.append(_Pulse(period, action))
 
     def _rebase(self, virtual: int) -> None:
-        self._base, self._since = virtual, time.monotonic_ns() // 1000
+        self._base = virtual
+        self._since = time.monotonic_ns() // 1000
 
     def _real(self) -> int:
         if self._halted:

@@ -102,7 +102,8 @@ class Flow(Protocol):
 
 
 BATCH = 8192  # bytes that the encoder hands over, and the decoder reads, at once
-SIGNATURE, GREETING = 10, 64  # the beginning of a greeting, and all of it [B]
+SIGNATURE = 10  # the beginning of a greeting [B]
+GREETING = 64  # all of it [B]
 READY = 43  # the READY command of a DEALER or ROUTER; the shortest has 27 [B]
 
 # How much of the other end's greeting must be heard before what is said next; at last nothing.

@@ -127,7 +127,7 @@ class Form:
         given = signature(kind).parameters
         for (name, hint), node in zip(get_type_hints(kind).items(), declared, strict=True):
             tag = node.get("name", "")
-            (least, most) = limits.occurs(node)
+            least, most = limits.occurs(node)
             inner = _value_of(node, _inner(hint))
             if most > 1:
                 self._add("%s", [(name, _several(tag, inner.write, least, most))])

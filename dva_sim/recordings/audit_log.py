@@ -26,7 +26,8 @@ from dva_sim.kernel.errors import ConfigError, DvaSimError
 
 FORMAT: Final = 1
 SUFFIX: Final = ".sqlite"
-BEGIN, END = "begin", "end"  # actions of the rows around what one console wrote
+BEGIN = "begin"  # action of the row before what one console wrote
+END = "end"  # action of the row after it
 NOTHING_BEFORE: Final = "0" * 64  # what the first row follows
 OPEN_WITHIN: Final = 2.0  # that long somebody else may have the file to itself [s]
 _TABLES = f"""

@@ -29,7 +29,10 @@ from dva_sim.simulation.full.observation_json import as_plain
 from dva_sim.worlds.hazards import Hazard, Raster
 from dva_sim.worlds.site import Site
 
-POSE, ACTIVITY, FIX, SEEN = "pose", "activity", "fix", "seen"  # last parts of topics
+POSE = "pose"  # last part of a topic, as the next three
+ACTIVITY = "activity"
+FIX = "fix"
+SEEN = "seen"
 ALIVE_S = 1.0  # who stands still is told of so often, on whole multiples [s]
 
 

@@ -359,7 +359,7 @@ def _track(
     for time, content in contents:
         while since <= time:
             mode = following["activity"]
-            (since, following) = next(turns)
+            since, following = next(turns)
         here = _point(time, content, mode)
         track += _left_out(track[-1], here.time, period) if track else ()
         track.append(here)

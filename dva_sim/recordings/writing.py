@@ -95,7 +95,8 @@ def _map_files(site: Site) -> dict[str, bytes]:
 
 FORMAT = 1  # of what is attached; a reader refuses a later one
 COUNTS = "dva-sim messages"  # metadata of how many each topic has, by which filtering is found
-ABOUT, DIGEST = "dva-sim", "digest"  # name of the metadata, and of one entry of it
+ABOUT = "dva-sim"  # name of the metadata
+DIGEST = "digest"  # an entry of the metadata
 RUN = "run.json"
 SCENARIO = "scenario.json"
 TABLES = "tables.json"
@@ -104,7 +105,8 @@ DESCRIBED = ("title", "shows", "colour", "mark")  # of a hazard whose class a re
 HELD_TO = "held_to"  # what robots are held to, where the facts are recorded that this is judged by
 SENT = ("responder", "operator", "actor")  # to an event
 DRIVE = ("robot", "operator", "event", "ordered_s", "started_s", "ended_s", "outcome")
-SUFFIX, PART = ".mcap", ".part"  # a recording; what a live run puts together until its end
+SUFFIX = ".mcap"  # a recording
+PART = ".part"  # what a live run puts together until its end
 CHUNK = 256 * 1024  # what a file that was cut short loses at most, unpacked [B]
 
 Tables = Mapping[str, Any]

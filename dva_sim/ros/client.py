@@ -10,7 +10,8 @@ from dva_sim.network.realtime import LiveClock
 from dva_sim.ros.rosbridge import BadOperation, decode, encode
 from dva_sim.ros.websocket import WebSocketDialer, WebSocketUrl
 
-FIRST_PAUSE, LONGEST_PAUSE = 0.5, 2.0  # design: before another attempt to connect [s]
+FIRST_PAUSE = 0.5  # design: before the second attempt to connect [s]
+LONGEST_PAUSE = 2.0  # design: before another attempt to connect, at most [s]
 SILENT_AFTER: Final = 5.0  # design: a connection over which nothing comes is given up [s]
 LARGEST: Final = 16_000_000  # design: a larger message ends the connection [B]
 MOST_QUEUED: Final = 200_000  # design: commands are not queued behind so much [B]

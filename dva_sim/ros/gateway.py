@@ -169,7 +169,8 @@ class RosDriver:
             else:
                 on_result(False, f"{text}; call take_control again")
 
-        self._person.attended, self._person.console = True, self._console()
+        self._person.attended = True
+        self._person.console = self._console()
         self._person.take([robot], taken)
 
     def release(self, robot: str, on_result: OnResult) -> None:

@@ -59,7 +59,8 @@ class PeerTopic:
     """One subscription: time between two messages [s], and when the last one went [s]."""
 
     def __init__(self, period: float) -> None:
-        self.period, self.sent_at = period, -math.inf
+        self.period = period
+        self.sent_at = -math.inf
 
 
 class RosPeer:
@@ -77,11 +78,15 @@ class RosPeer:
     """
 
     def __init__(self, name: str, connection: WebSocketConnection, host: PeerHost) -> None:
-        self.name, self._connection, self._host = name, connection, host
+        self.name = name
+        self._connection = connection
+        self._host = host
         self.wants: dict[str, PeerTopic] = {}
         self.driver: RosDriver | None = None
         self.only_stops = False
-        self._room, self._filled_at, self._dropped = BURST, host.now(), 0
+        self._room = BURST
+        self._filled_at = host.now()
+        self._dropped = 0
         self._reported_at: dict[str, float] = {}
 
     def take(self, data: bytes) -> None:
@@ -157,10 +162,12 @@ class RosPeer:
             raise BadOperation(f"topic {topic!r} takes geometry_msgs/Twist or TwistStamped")
 
     def _publish(self, operation: Json) -> None:
-        topic, message = name_in(operation, "topic"), operation.get("msg")
-        twist = message.get("twist", message) if isinstance(message, dict) else None
+        topic = name_in(operation, "topic")
+        message = operation.get("msg")
+        twist: Any = message.get("twist", message) if isinstance(message, dict) else None
         try:
-            speed, turn_rate = twist["linear"]["x"], twist["angular"]["z"]  # type: ignore[index]
+            speed = twist["linear"]["x"]
+            turn_rate = twist["angular"]["z"]
         except (TypeError, KeyError):
             raise BadOperation(f"{topic}: no Twist with linear.x and angular.z") from None
         for what, value in (("linear.x", speed), ("angular.z", turn_rate)):
@@ -170,7 +177,8 @@ class RosPeer:
             raise BadOperation(f"{topic}: {why}")
 
     def _call(self, operation: Json) -> None:
-        service, number = name_in(operation, "service"), operation.get("id")
+        service = name_in(operation, "service")
+        number = operation.get("id")
 
         def answer(ok: bool, values: Any) -> None:
             reply = {"op": "service_response", "service": service, "values": values, "result": ok}
@@ -182,7 +190,8 @@ class RosPeer:
 
     def offer(self, topic: str, data: bytes) -> None:
         """Send a reading, unless it wants it later or has not taken the last ones."""
-        wanted, now = self.wants.get(topic), self._host.now()
+        wanted = self.wants.get(topic)
+        now = self._host.now()
         if wanted is None or now < wanted.sent_at + wanted.period - 1e-6:
             return
         if self._connection.waiting <= MOST_BEHIND:

@@ -25,7 +25,9 @@ AT_ONCE: Final = 1 << 16  # design: read before other sources have their turn [B
 MOST_WAITING: Final = 8_000_000  # design: of a peer [B]
 LINGERS: Final = 0.5  # design: a bridge may take to read the last commands of a run [s]
 SHAKES_WITHIN: Final = 5.0  # design: from TCP to WebSocket [s]
-NORMAL, TOO_SLOW, GOING = 1000, 1008, 1001  # close codes of RFC 6455
+NORMAL = 1000  # close code of RFC 6455
+TOO_SLOW = 1008  # close code of RFC 6455
+GOING = 1001  # close code of RFC 6455
 PORT: Final = 9090  # of rosbridge
 
 

@@ -47,7 +47,8 @@ class Lines:
         if not rest:
             return []
         lines = [b"".join(self._pieces), *rest[:-1]]
-        self._pieces, self._size = [rest[-1]], len(rest[-1])
+        self._pieces = [rest[-1]]
+        self._size = len(rest[-1])
         return lines
 
 

@@ -14,7 +14,8 @@ from dva_sim.storms.drivers import FIRST_NUMBER
 from dva_sim.storms.faults import DEADLINES, FAULTS, FaultKind
 from dva_sim.storms.plan import Fault, StormPlan
 
-FIRST, STORM = 15.0, 600.0  # faults begin and have ended [s]
+FIRST = 15.0  # faults begin [s]
+STORM = 600.0  # faults have ended [s]
 _SOURCES: Final = "", "operator", "driver", "dva", "robot"
 PROFILES: Final[dict[str, tuple[str, ...]]] = {
     "all": tuple(FAULTS),

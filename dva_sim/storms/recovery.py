@@ -71,7 +71,8 @@ class RecoveryProbes:
             others: Ids of the guards and operators.
             place: Place of the reported event, and destination of the robots.
         """
-        self._place, self._beats = place, dict.fromkeys((*robots, *others), 0.0)
+        self._place = place
+        self._beats = dict.fromkeys((*robots, *others), 0.0)
         self._open = dict.fromkeys(robots, "gives nobody the robot")
         self._open[DVA] = "takes no report"
         self._open[LIST] = "does not list everybody"

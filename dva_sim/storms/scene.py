@@ -63,7 +63,8 @@ class DvaLives:
         self.memory = self._opened()
 
     def _opened(self) -> Store:
-        self._writes_left, memory = None, Store(self._file)
+        self._writes_left = None
+        memory = Store(self._file)
         memory.between_writes = self._between_writes
         return memory
 
@@ -248,7 +249,7 @@ class StormScene:
     def free_place(self, chance: random.Random) -> Position:
         """Draw a place where a robot fits."""
         site = self.run.stage.site
-        (rows, columns) = self._free
+        rows, columns = self._free
         number = chance.randrange(len(rows))
         x, y = site.grid.to_xy(rows[number] + 0.5, columns[number] + 0.5)
         return Position(*site.frame.to_latlon(float(x), float(y)))

@@ -26,7 +26,8 @@ from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.exchange import Outbox
 from dva_sim.testing.promises import Case, Outcome, broken_in, is_slow, kept, part_by_part
 
-PHONE, ROBOT = "02:00:00:03:00:01", "02:00:00:01:00:01"
+PHONE = "02:00:00:03:00:01"
+ROBOT = "02:00:00:01:00:01"
 RATE: Final = 10.0  # commands per second
 LONG: Final = 20.0  # of a drive [s]
 DELAYS: Final = (0.0, 0.05, 0.5)  # one way [s]
@@ -120,11 +121,14 @@ class TriedDrive:
     spent: float = 0.0
 
     def __post_init__(self) -> None:
-        self.clock, self._outbox = self.network.clock, Outbox(self.node)
-        self._says, self._refusals = Outbox(self.robot), Refusals(self.node)
+        self.clock = self.network.clock
+        self._outbox = Outbox(self.node)
+        self._says = Outbox(self.robot)
+        self._refusals = Refusals(self.node)
         self._of: dict[int, Numbered] = {}
         self._last = 0
-        self._on, self._requester = False, None  # type: bool, Requester | None
+        self._on = False
+        self._requester: Requester | None = None
         self._subscription: Subscription | None = None
         latest = self.pattern.newest_wins
         self.inbox = CommandQueue(self.clock, lambda: self.service, self._handle, latest)
@@ -173,7 +177,8 @@ class TriedDrive:
     def _send(self, command: Any) -> bytes:
         if not isinstance(command, Numbered):
             raise TypeError(f"sends {type(command).__name__}, which the app has not made")
-        number, now = command.number, self.clock.now
+        number = command.number
+        now = self.clock.now
         if not self._on:
             self.wrong.append(("sends when the drive is over", f"command {number}"))
         if number in self.superseded:
@@ -279,7 +284,9 @@ class _Trial:
 
     def __init__(self, make: Callable[[], Pattern]) -> None:
         self._make = make
-        self.count, self.took, self.doubts = 0, list[float](), list[str]()
+        self.count = 0
+        self.took = list[float]()
+        self.doubts = list[str]()
         links = self._facts, self._good_links, self._copies, self._bad_link
         robots = self._slow_robot, self._gone, self._back_again, self._refused
         self.parts = (*links, *robots, self._after_the_end)
@@ -326,7 +333,8 @@ class _Trial:
     def _good_links(self) -> Iterator[Case]:
         """Check that commands keep coming, and stay fresh, on links without loss."""
         for delay in DELAYS:
-            drive, where = self._drive(delay), f"with a delay of {delay:g} s"
+            drive = self._drive(delay)
+            where = f"with a delay of {delay:g} s"
             yield from self._run(drive)
             most = 4 * delay + 1 / RATE + SLACK
             times = [when for _, when in drive.applied if when > 8 * delay + SLACK]
@@ -340,7 +348,8 @@ class _Trial:
 
     def _copies(self) -> Iterator[Case]:
         """Check that a new copy repeats the drive: no shared memory, no random numbers."""
-        one, other = self._drive(DELAYS[1]), self._drive(DELAYS[1])
+        one = self._drive(DELAYS[1])
+        other = self._drive(DELAYS[1])
         for drive in (one, other):
             yield from self._run(drive, LONG / 2)
         if one.sent != other.sent:
@@ -358,7 +367,8 @@ class _Trial:
         drive = self._drive(DELAYS[1], service=SLOW_SERVICE)
         yield from self._run(drive)
         answered = list[float]()
-        button, now = Requester(drive.network, PHONE, ROBOT, TIMEOUT), drive.clock.now
+        button = Requester(drive.network, PHONE, ROBOT, TIMEOUT)
+        now = drive.clock.now
         data = drive._outbox.encode(ROBOT, m.Emergency(), now)
         button.request(data, lambda _: answered.append(drive.clock.now))
         yield from self._run(drive, 1.5 * LONG)

@@ -292,7 +292,7 @@ class _MappingTrial:
             speed, rate = mapping.command(0.0, 0.0, PERIOD)
             for _ in range(200):
                 last = rate
-                (speed, rate) = mapping.command(0.0, 0.0, PERIOD)
+                speed, rate = mapping.command(0.0, 0.0, PERIOD)
                 if abs(rate) > abs(last) + 1e-9:
                     yield "turns faster and faster at rest", f"after {_pair_text((level, turn))}"
                     break

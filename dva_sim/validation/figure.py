@@ -68,7 +68,8 @@ def _draw_panel(axes: Axes, lines: Sequence[Evidence]) -> None:
         return
     distance = float(np.percentile(np.abs(np.log(every[:, 1:])), _REACH))
     reach = min(max(1.15 * distance, _LEAST), _MOST)
-    low, high = math.exp(-reach), math.exp(reach)
+    low = math.exp(-reach)
+    high = math.exp(reach)
     at, _, *ends = every.T
     axes.vlines(at, *np.clip(ends, low, high), color=FAINT, lw=2.5, zorder=1)
     axes.axhline(1.0, color=SOFT, lw=0.7, zorder=2)
@@ -87,7 +88,8 @@ def _draw_panel(axes: Axes, lines: Sequence[Evidence]) -> None:
 
 def ratios(line: Evidence) -> _Mark | None:
     """The line as ratios; None if it has no place on a logarithmic axis."""
-    low, high = line.low, line.high
+    low = line.low
+    high = line.high
     at = line.measured
     if at is None and low is not None and high is not None:
         at = 0.5 * (low + high)

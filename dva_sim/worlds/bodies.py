@@ -102,9 +102,12 @@ class Jam:
 US: Final = 1_000_000
 G: Final = 9.81  # [m/s^2]
 GRIP: Final = 0.8  # friction coefficient of rubber on a dry floor
-FRICTION, ELASTICITY = 0.3, 0.1  # of bumpers and walls; both multiply in a contact
+FRICTION = 0.3  # of bumpers and walls; both multiply in a contact
+ELASTICITY = 0.1  # of bumpers and walls; both multiply in a contact
 AT_REST = 1e-3  # slower than this, brakes hold [m/s, rad/s]
-WALL, ROBOT, PERSON = 1, 2, 3  # collision types
+WALL = 1  # collision type
+ROBOT = 2  # collision type
+PERSON = 3  # collision type
 
 # An assignment to an attribute of pymunk's costs twice as much as the function behind it.
 _set_force: Callable[[pymunk.Body, tuple[float, float]], None] = pymunk.Body.force.fset  # type: ignore[attr-defined]

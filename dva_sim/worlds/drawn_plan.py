@@ -214,7 +214,7 @@ def _without_holes(area: Any) -> Iterator[Any]:
     if not area.interiors:
         yield area
         return
-    (xmin, ymin, xmax, ymax) = area.bounds
+    xmin, ymin, xmax, ymax = area.bounds
     x = area.interiors[0].centroid.x
     for low, high in ((xmin, x), (x, xmax)):
         side = shapely.intersection(area, shapely.box(low, ymin, high, ymax))

@@ -38,8 +38,8 @@ class Sight:
         return self._kept(a, b)
 
     def _between(self, a: Point, b: Point) -> bool:
-        (ax, ay) = a
-        (bx, by) = b
+        ax, ay = a
+        bx, by = b
         sides = self._lines @ np.array([[ax, bx], [ay, by], [1.0, 1.0]])
         across = np.array([ay - by, bx - ax]) @ self._ends + (ax * by - bx * ay)
         one, other = sides.T
@@ -66,7 +66,7 @@ class Sight:
 
 def _side(p: Any, q: Any, point: Any) -> Any:
     """On which side of the line p-q a point lies, by sign."""
-    (px, py) = p
-    (qx, qy) = q
-    (x, y) = point
+    px, py = p
+    qx, qy = q
+    x, y = point
     return (qx - px) * (y - py) - (qy - py) * (x - px)

@@ -71,7 +71,8 @@ class OccupancyGrid:
     def window(self, points: NDArray[np.float64]) -> tuple[slice, slice]:
         """Rows and columns of the cells around some points `(n, 2)` [m]."""
         cells = np.array([self.to_cell(x, y) for x, y in points.tolist()])
-        (top, left), (bottom, right) = cells.min(axis=0), cells.max(axis=0) + 1
+        top, left = cells.min(axis=0)
+        bottom, right = cells.max(axis=0) + 1
         return slice(max(0, top), max(0, bottom)), slice(max(0, left), max(0, right))
 
     def middles(self, window: tuple[slice, slice]) -> NDArray[np.float64]:

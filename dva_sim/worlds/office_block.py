@@ -203,7 +203,8 @@ def _cuts(start: float, end: float, rng: np.random.Generator) -> list[float]:
 
 
 STAIRS_EVERY = 40.0  # along a facade [m]
-BASE_GAP, BASE_WALL = 1.2, 0.7  # between robot bases, and to the walls [m]
+BASE_GAP = 1.2  # between robot bases [m]
+BASE_WALL = 0.7  # from a robot base to the walls [m]
 APPROACH = 1.6  # free floor behind the door of a robot bay [m]
 
 
@@ -291,7 +292,8 @@ LARGE = (
 )
 COPY_ROOM_EVERY = 9
 MOST_BAYS = 4
-MEDIUM_FROM, LARGE_FROM = 20.0, 36.0  # [m^2]
+MEDIUM_FROM = 20.0  # [m^2]
+LARGE_FROM = 36.0  # [m^2]
 
 
 def assign(layout: Layout, bases: int) -> list[tuple[FloorCell, Use, str]]:

@@ -103,7 +103,8 @@ class PersonBody(Body):
 SLOP = 0.005  # overlap that a contact may keep; pymunk's default is for pixels [m]
 OVERLAP = 0.02  # overlap with a wall that is forgiven when a body is placed [m]
 
-_FIXED, _MOVING = 0b01, 0b10  # categories: what is asked of the space can leave walls out
+_FIXED = 0b01  # categories: what is asked of the space can leave walls out
+_MOVING = 0b10
 _MOVERS = pymunk.ShapeFilter(mask=_MOVING)
 
 

@@ -170,7 +170,8 @@ class Roadmap:
             price = 0.5 * (_price(self._room[here]) + _price(self._room[there]))
             pairs.append(np.stack([number[here][joined], number[there][joined]]))
             costs.append((length * price)[joined])
-        (a, b), cost = np.concatenate(pairs, axis=1), np.concatenate(costs)
+        a, b = np.concatenate(pairs, axis=1)
+        cost = np.concatenate(costs)
         return _both_ways(csr_array((cost, (a, b)), shape=(free.size, free.size)))
 
     def _length(self, start: Point, goal: Point) -> float:

@@ -59,7 +59,8 @@ class NamedArea:
     @cached_property
     def box(self) -> tuple[float, float, float, float]:
         """xmin, ymin, xmax, ymax [m]."""
-        (xmin, ymin), (xmax, ymax) = self.polygon.min(axis=0), self.polygon.max(axis=0)
+        xmin, ymin = self.polygon.min(axis=0)
+        xmax, ymax = self.polygon.max(axis=0)
         return float(xmin), float(ymin), float(xmax), float(ymax)
 
 

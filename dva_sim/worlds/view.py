@@ -248,10 +248,12 @@ def _outline(area: Any) -> Outline:
     return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
 
 
-LONG_SIDE, MOST_INCHES = 8.4, 18.0  # of the picture [in]; a page shows 840 pixels of it
+LONG_SIDE = 8.4  # of the picture [in]; a page shows 840 pixels of it
+MOST_INCHES = 18.0  # of the picture, at most [in]
 INCHES_PER_METRE = 0.07
 FONT = 7.5  # of the key [pt]
-KEY, KEY_LINE = 1.25, 0.17  # width of one of its entries, and height of a line [in]
+KEY = 1.25  # width of an entry of the key [in]
+KEY_LINE = 0.17  # height of a line of the key [in]
 
 
 def write_poster(site: Site, file: Path, coverage: bool, width: int) -> None:

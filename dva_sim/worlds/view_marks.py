@@ -51,7 +51,8 @@ def points_per_metre(ax: Axes) -> float:
     figure: Any = ax.get_figure(root=True)
     _, _, width, height = ax.get_position().bounds
     inches = figure.get_size_inches()
-    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    left, right = ax.get_xlim()
+    low, high = ax.get_ylim()
     across = width * inches[0] / (right - left)
     up = height * inches[1] / (high - low)
     return float(min(across, up)) * POINTS_PER_INCH
@@ -273,7 +274,7 @@ def _width(line: str) -> float:
 
 
 def _boxes(middles: NDArray[np.float64], width: float, height: float) -> Any:
-    (x, y) = middles.T
+    x, y = middles.T
     across = width / 2
     up = height / 2
     return shapely.box(x - across, y - up, x + across, y + up)

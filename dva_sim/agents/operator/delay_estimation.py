@@ -156,11 +156,14 @@ class PeriodEstimate:
     """
 
     MEMORY = 4.0  # design: what was seen fades over so many times as many effects
-    SHORTEST, LONGEST, STEPS = 0.1, 10.0, 40  # design: periods that are weighed [s]
+    SHORTEST = 0.1  # design: period that is weighed [s]
+    LONGEST = 10.0  # design: period that is weighed [s]
+    STEPS = 40  # design: periods that are weighed
     SURE = 0.95  # design: share of the weight below the period that is counted on
     BLURRED = 0.3  # design: times that differ by less are the same to a person [s]
     SURPRISE = 0.02  # design: likelihood of what a period does not explain
-    EARLY, LATE = 0.5, 1.5  # design: of the delay; seen sooner, it was asked for before
+    EARLY = 0.5  # design: share of the delay; seen sooner, it was asked for before
+    LATE = 1.5  # design: share of the delay
 
     def __init__(self, habits: DelayHabits) -> None:
         self._habits = habits

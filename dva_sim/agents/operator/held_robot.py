@@ -370,7 +370,7 @@ class HeldRobot:
     def tilted(self, number: int, at: float) -> None:
         """So many samples of the person's phone have come, the newest taken at a time [s]."""
         reach = self._console().reach(self.robot)
-        (level, turn) = self.app.shown
+        level, turn = self.app.shown
         speed = level * SPEED_PER_LEVEL / reach.speed
         self.steered(Input(number, at, speed, math.radians(turn) / reach.turn_rate))
 

@@ -20,7 +20,8 @@ from dva_sim.kernel.recorder import DriveLog
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
-ASK_BEFORE, ASK_AFTER = 3, 1  # design: asked so often for one order: before and in a drive
+ASK_BEFORE = 3  # design: requests for one order before a drive
+ASK_AFTER = 1  # design: requests for one order in a drive
 AS_SEEN = {
     "lost link": "presumes the link lost",
     REFUSED: "is refused",

@@ -119,10 +119,14 @@ class PersonAgent:
             held.ask(answers, level)
 
     def _hold(self, robot: str) -> HeldRobot:
-        console, tilt = lambda: self.console, lambda: self._tilt()
-        wanted = self.robots.__contains__
         return HeldRobot(
-            self.device, robot, console, tilt, self._alert, let_go=self._let_go, wanted=wanted
+            self.device,
+            robot,
+            lambda: self.console,
+            lambda: self._tilt(),
+            self._alert,
+            let_go=self._let_go,
+            wanted=self.robots.__contains__,
         )
 
     def release(self, on_result: OnResult) -> None:

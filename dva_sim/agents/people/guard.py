@@ -28,7 +28,8 @@ from dva_sim.protocol import messages as m
 from dva_sim.worlds.hazards import KINDS
 from dva_sim.worlds.planning import Planner
 
-STATUS_PERIOD, FIRST_STATUS = 2.0, 0.5  # design: of where a guard is [s]
+STATUS_PERIOD = 2.0  # design: between two reports of a guard's position [s]
+FIRST_STATUS = 0.5  # design: until the first of them [s]
 CONFIRMED = "confirmed"
 REFUTED = "refuted"
 CONTAINED = "contained"

@@ -251,7 +251,7 @@ def past(
         room: Distance to the nearest wall at many points `(n, 2)` [m].
         sideways: Half the depth of the person [m].
     """
-    (ux, uy) = along
+    ux, uy = along
     off = robot.radius + sideways
     sides = [(-1.0, uy, -ux), (1.0, -uy, ux)]  # right and left
     gaps = np.array([(robot.x + off * nx, robot.y + off * ny) for _, nx, ny in sides])

@@ -13,7 +13,8 @@ from dva_sim.agents.population import Trait
 from dva_sim.kernel.assumed import Assumed
 from dva_sim.kernel.config import Config
 
-SLOWEST, FASTEST = 0.6, 2.2  # design: where the law of walking speeds is cut [m/s]
+SLOWEST = 0.6  # design: lower bound of walking speeds [m/s]
+FASTEST = 2.2  # design: upper bound of walking speeds [m/s]
 
 
 class PaceProfile(Config):

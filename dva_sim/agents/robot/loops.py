@@ -81,7 +81,7 @@ class CollisionGuardedDrive:
 
     def _apply(self) -> None:
         around = self._around
-        (speed, turn_rate, until) = self._wanted
+        speed, turn_rate, until = self._wanted
         around.world.advance_to(around.clock.now)
         slower = around.guard.limit(around.body.pose(), speed, turn_rate, around.nearby())
         around.body.drive(slower, turn_rate, until)

@@ -29,8 +29,10 @@ HEADINGS = 16  # looked at for a way out
 TRIED = 0.5  # a heading so near one that did not help is not tried again [rad]
 THERE = 0.15  # a place beside the way is reached from here [m]
 FREE_FOR = 1.0  # the way must be free for so long before a robot goes on [s]; assumed
-LONGEST_RECOVERY, LONGEST_ASIDE = 12.0, 30.0  # [s]; assumed
-STILL, NOBODY_MOVES = 0.05, 4.0  # who stands [m/s] for so long will not pass [s]; assumed
+LONGEST_RECOVERY = 12.0  # [s]; assumed
+LONGEST_ASIDE = 30.0  # [s]; assumed
+STILL = 0.05  # slower people stand [m/s]; assumed
+NOBODY_MOVES = 4.0  # who stands for so long will not pass [s]; assumed
 PASSED = 0.10  # gap left between the way and who has passed [m]
 
 

@@ -124,7 +124,8 @@ def _convex(corners: tuple[Corner, ...]) -> bool:
     """Return True if the corners go once around the origin, always to the left."""
     turned = 0.0
     for number, (bx, by) in enumerate(corners):
-        (ax, ay), (cx, cy) = corners[number - 1], corners[(number + 1) % len(corners)]
+        ax, ay = corners[number - 1]
+        cx, cy = corners[(number + 1) % len(corners)]
         if (bx - ax) * (cy - by) <= (by - ay) * (cx - bx) or ax * by <= ay * bx:
             return False
         turned += math.atan2(ax * by - ay * bx, ax * bx + ay * by)

@@ -34,7 +34,8 @@ from dva_sim.worlds.physics import World
 
 LEASE = 60.0  # a subscription that is not renewed ends by itself after this [s]
 MOST = 64  # subscriptions at one robot
-FASTEST, SLOWEST = 20.0, 0.02  # values that a robot gives [Hz]
+FASTEST = 20.0  # values that a robot gives, at most [Hz]
+SLOWEST = 0.02  # values that a robot gives, at least [Hz]
 
 
 @dataclass(frozen=True)

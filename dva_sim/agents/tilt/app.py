@@ -180,7 +180,8 @@ class TiltApp:
     def sample(self, at: float, acceleration: Triple) -> None:
         """Take in a reading at a time [s], never before an earlier one: x, y, z [m/s^2]."""
         self.take_values(at - 2 * TIE)
-        self._heard_at, reading = at, self._read(*acceleration)
+        self._heard_at = at
+        reading = self._read(*acceleration)
         if self._held:
             self._miss(at, reading)
             return

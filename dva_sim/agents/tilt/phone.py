@@ -189,8 +189,8 @@ class Phone(TiltApp):
         add = self._filter.add
         watches = self._watches
         batch = self._batch
-        (rest_pitch, rest_roll) = self._rest
-        (pitch, roll) = self._aim
+        rest_pitch, rest_roll = self._rest
+        pitch, roll = self._aim
         at = self._sample_at
         dt = self._step
         fresh = self._fresh
@@ -203,7 +203,8 @@ class Phone(TiltApp):
             fresh += 1
             if watches:
                 self._watch(dt)
-            self._sampled_at, dt = at, interval()
+            self._sampled_at = at
+            dt = interval()
             at += dt
         if fresh != self._fresh:
             self._trail.sample(fresh - self._fresh, self._decay)

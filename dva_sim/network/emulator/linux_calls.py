@@ -273,8 +273,14 @@ def _add_route(peer: str, index: int, congestion: str) -> None:
     metrics = _attribute(_RTAX_CC_ALGO, congestion.encode() + b"\0")
     body = struct.pack(
         "BBBBBBBBI",
-        *(socket.AF_INET, 32, 0, 0),
-        *(_RT_TABLE_MAIN, _RTPROT_BOOT, _RT_SCOPE_LINK, _RTN_UNICAST),
+        socket.AF_INET,
+        32,
+        0,
+        0,
+        _RT_TABLE_MAIN,
+        _RTPROT_BOOT,
+        _RT_SCOPE_LINK,
+        _RTN_UNICAST,
         0,
     )
     body += _attribute(_RTA_DST, socket.inet_aton(peer))

@@ -18,7 +18,8 @@ from dva_sim.kernel.streams import Streams
 
 SLOT_S = 0.001
 _BLOCK = 8192  # slots drawn at once
-_STEP, _MASK = int(0.6180339887498949 * 2.0**64) | 1, 2**64 - 1  # the golden ratio of all bits
+_STEP = int(0.6180339887498949 * 2.0**64) | 1  # the golden ratio of all bits
+_MASK = 2**64 - 1
 _NORMAL = NormalDist()
 _EDGE = 1e-12  # quantiles of unbounded laws are asked for inside (edge, 1 - edge) only
 

@@ -45,7 +45,8 @@ from dva_sim.protocol.messages import OK, Reply, SetTeleOp, make_message, make_s
 OPERATOR_ID: Final = "02:00:00:00:00:01"
 ROBOT_ID: Final = "02:00:00:00:00:02"
 SESSION: Final = 1
-SPEED, TURN_RATE = 0.5, 0.1  # of every command [m/s], [rad/s]
+SPEED = 0.5  # of every command [m/s]
+TURN_RATE = 0.1  # of every command [rad/s]
 NOON: Final = "12:00:00.000"  # nobody reads it: ages are by number
 PROGRAM_PRIORITY: Final = 10  # real-time, below the link's
 NOT_CONNECTED: Final = 3  # exit code

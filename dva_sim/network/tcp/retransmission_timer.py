@@ -258,7 +258,8 @@ class Alarm:
             self.kind = REORDER
             at = self.doubt
         elif probing and (advanced or fresh):
-            self.kind, at = PROBE, min(at, now + self._probe_time(len(board.queue)))
+            self.kind = PROBE
+            at = min(at, now + self._probe_time(len(board.queue)))
         self._timer.set(max(at, now))
 
     def _stays_set(self, fresh: bool, probing: bool) -> bool:

@@ -11,7 +11,9 @@ import math
 from collections.abc import Iterable, Sequence
 
 REORDERED = 3  # later ones acknowledged, until one counts as lost: RFC 5681
-FIRST_TIMEOUT, LEAST_TIMEOUT, LONGEST_TIMEOUT = 1.0, 1.0, 60.0  # [s]: RFC 6298
+FIRST_TIMEOUT = 1.0  # [s]: RFC 6298
+LEAST_TIMEOUT = 1.0  # [s]: RFC 6298
+LONGEST_TIMEOUT = 60.0  # [s]: RFC 6298
 REPEATED = 32  # datagrams that an acknowledgement tells of: the bits of a word; assumed
 Echo = tuple[int, float]  # a datagram's number, and since when it had been there [s]
 

@@ -24,4 +24,7 @@ ACTIVITIES = {
 }
 KINDS = {ROBOT: "#2f7fd0", GUARD: "#2f7d32", BYSTANDER: "#8c6d5a"}
 
-FIRE, GAS, WATER, SMOKE = "#d1332e", "#b59a00", "#2a7fb8", "#55585e"  # over the floor
+FIRE = "#d1332e"  # over the floor, as the next three
+GAS = "#b59a00"
+WATER = "#2a7fb8"
+SMOKE = "#55585e"

@@ -18,7 +18,8 @@ from dva_sim.recordings.pictures.moments import Moments
 from dva_sim.worlds.hazards import Hazard, Raster
 
 LAYER = 2.2  # over the floors, under walls and names
-STAR, MARK = 12, 8  # sizes of the mark of a source [points]
+STAR = 12  # size of the mark of a source [points]
+MARK = 8  # size of the mark of a source [points]
 CELL = 0.25  # of the fields [m]
 MOST_CELLS = 120_000  # of a field; on a larger site cells are larger
 SMOKE_PATH = 2.5  # smoke covers the floor as it does a thing so far away [m]

@@ -24,7 +24,8 @@ LENGTH_S = 16.0  # a film lasts about this long; the run is sped up to fit
 HELD_S = 3.0  # so long does its last picture stand
 GLANCES = 2  # pictures of a camera that a film shows in a second: more are no easier to follow
 DPI = 100
-TRAFFIC, EYE = 0.8, 1.5  # heights of what is below maps, without a camera's picture and with it
+TRAFFIC = 0.8  # height of what is below maps, without a camera's picture
+EYE = 1.5  # height of what is below maps, with a camera's picture
 # What is there: its place from the left and from the top, its width and height, as shares.
 ALONE = (0.18, 0.0, 0.79, 0.68)
 STRIP = (0.62, 0.12, 0.35, 0.65)

@@ -16,10 +16,13 @@ from dva_sim.recordings.pictures.style import FONT, INK, TITLE, WIDTH, legend
 from dva_sim.simulation.full import Playback
 from dva_sim.worlds.view import limits, set_limits
 
-MARGIN, GAP = 0.06, 0.16  # around everything; between columns
+MARGIN = 0.06  # around everything
+GAP = 0.16  # between columns
 
 
-HEADING, TITLE_HEIGHT, LINE = 0.24, 0.22, 0.32  # of lines above all, above and below a map
+HEADING = 0.24  # of the lines above all
+TITLE_HEIGHT = 0.22  # of the lines above a map
+LINE = 0.32  # of a line below a map
 
 
 TALLEST = 7.5  # a map

@@ -22,7 +22,8 @@ from dva_sim.recordings.pictures.run_endings import RunVerdict
 from dva_sim.worlds.view import draw_site
 from dva_sim.worlds.view_marks import points_per_metre
 
-PLAIN, BOLD = 0.6, 0.68  # how wide a letter is on the average, at most [font sizes]
+PLAIN = 0.6  # width of a letter on the average, at most [font sizes]
+BOLD = 0.68  # width of a bold letter on the average, at most [font sizes]
 
 
 class Scene:

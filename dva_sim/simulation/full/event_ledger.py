@@ -352,8 +352,8 @@ class EventLedger:
         known = self._open
         self._open = {n: (e.kind, e.position) for n, e in events.open.items()}
         for number in known.keys() & self._open.keys():
-            (kind, place) = self._open[number]
-            (was, before) = known[number]
+            kind, place = self._open[number]
+            was, before = known[number]
             if kind != was or (place != before and apart(place, before) > MOVED):
                 yield "S6", f"event {number} was a {was} elsewhere before"
         every = (*events.open.values(), *events.closed.values())
@@ -373,7 +373,7 @@ class EventLedger:
         """
         for number in [n for n in self._open if n not in self._promised]:
             event = events.open.get(number)
-            (kind, place) = self._open[number]
+            kind, place = self._open[number]
             if event is None or event.kind != kind or apart(event.position, place) > MOVED:
                 del self._open[number]
                 self._lost[number] = kind, place, self._words.pop(number, Word())

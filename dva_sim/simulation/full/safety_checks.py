@@ -709,7 +709,8 @@ class SafetyAudit:
             witness.ends("teleoperation", now)
             witness.does = None
         elif done.what == "lets go":
-            witness.hand, witness.allowed = None, min(witness.allowed, now)
+            witness.hand = None
+            witness.allowed = min(witness.allowed, now)
             witness.let_go = now
         elif done.what == "stops":
             witness.note_stop(now, self._release)

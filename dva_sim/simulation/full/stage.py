@@ -244,10 +244,8 @@ def middle_of(site: Site, room: str) -> tuple[float, float]:
     """
     outline = site.room(room).area
     low_x, low_y, high_x, high_y = outline.bounds
-    (low_row, low_column), (high_row, high_column) = (
-        site.grid.to_cell(low_x, low_y),
-        site.grid.to_cell(high_x, high_y),
-    )
+    low_row, low_column = site.grid.to_cell(low_x, low_y)
+    high_row, high_column = site.grid.to_cell(high_x, high_y)
     rows, columns = np.mgrid[low_row : high_row + 1, low_column : high_column + 1]
     points = site.grid.to_xy(rows + 0.5, columns + 0.5)
     inside = shapely.contains_xy(outline, points[..., 0], points[..., 1])

@@ -370,7 +370,7 @@ def _cut(way: NDArray[np.float64], left: float) -> Pose | None:
     if at < 0.0:
         return None
     place = min(int(np.searchsorted(gone, at, side="right")) - 1, len(steps) - 1)
-    (x, y) = way[place]
+    x, y = way[place]
     ahead = way[place + 1] - way[place]
     share = (at - gone[place]) / steps[place] if steps[place] > 0.0 else 0.0
     heading = math.atan2(ahead[1], ahead[0])

@@ -31,7 +31,8 @@ STEP = 0.15  # of resampling for the entropy, as published [s]
 BAND = 0.05  # of prediction errors, see `steering_entropy` [rad/s]; assumed
 EDGES = (-5.0, -2.5, -1.0, -0.5, 0.5, 1.0, 2.5, 5.0)  # of the nine bins, in bands, as published
 TRACK_STEP = 0.5  # between the points of a track that was not filmed [s]
-LEVEL_SPEED, LEVEL_TURN = 0.025, 0.035  # half a step of the phone, two degrees a second
+LEVEL_SPEED = 0.025  # half a step of the phone
+LEVEL_TURN = 0.035  # two degrees a second
 
 
 # --- columns -----------------------------------------------------------------------------------

@@ -107,7 +107,8 @@ def _check_position(scenario: Scenario, event: EventConfig, path: KeyPath, error
     """Refuse a place where no event can be, or that is in another room."""
     if event.position is None:
         return
-    (x, y), site = event.position, site_of(scenario, seed=0)
+    x, y = event.position
+    site = site_of(scenario, seed=0)
     if why := why_not(site, x, y):
         raise error(f"position ({x:g}, {y:g}) {why}", path)
     if event.room is not None and (around := site.room_at(x, y)) != event.room:

@@ -259,7 +259,7 @@ def _goal(
     streams: Streams,
 ) -> Goal:
     task = scenario.task
-    (first, second) = condition
+    first, second = condition
     if isinstance(task, Pointing):
         angle = 0.0 if task.axes == 1 else number * (math.pi + math.pi / task.targets)
         way = Wandering(task, first, angle, streams.fresh("target"))

@@ -58,7 +58,7 @@ class HandDevice(ABC):
     def command(self, reading: Pair | None, dt: float) -> Pair:
         """At the machine: the velocity [m/s] for a step, given what has arrived, if anything."""
         gain = self._gain
-        (x, y) = self._last
+        x, y = self._last
         if self.is_place:
             if reading is None:
                 return 0.0, 0.0
@@ -94,9 +94,9 @@ class Mouse(HandDevice):
 
     @override
     def move(self, dt: float) -> None:
-        (ax, ay) = self._aim
-        (vx, vy) = self._velocity
-        (x, y) = self._place
+        ax, ay = self._aim
+        vx, vy = self._velocity
+        x, y = self._place
         keep = self._keep
         self._velocity = vx, vy = ax + (vx - ax) * keep, ay + (vy - ay) * keep
         nx, ny = shaken(vx, vy, self._noise)
@@ -124,8 +124,8 @@ class Joystick(HandDevice):
 
     @override
     def move(self, dt: float) -> None:
-        (ax, ay) = self._aim
-        (x, y) = self._hand
+        ax, ay = self._aim
+        x, y = self._hand
         keep = self._keep
         self._hand = x, y = ax + (x - ax) * keep, ay + (y - ay) * keep
         x, y = shaken(x, y, self._noise)
@@ -208,8 +208,8 @@ class TiltPosition(Tilt):
     @override
     def move(self, dt: float) -> None:
         limit = self._limit
-        (x, y) = self._aim
-        (vx, vy) = self._rate
+        x, y = self._aim
+        vx, vy = self._rate
         self._aim = clamped(x + vx * dt, limit), clamped(y + vy * dt, limit)
 
 

@@ -194,7 +194,8 @@ class CursorTrial(Trial[Sighting]):
     def sight(self) -> Sighting:
         """Velocities are those of the last frames; see `Motion`."""
         now = self.now
-        (x, y) = (self.plant.x, self.plant.y)
+        x = self.plant.x
+        y = self.plant.y
         tx, ty = self.goal.target(now)
         self._motion.add(Places(now, x, y, target_x=tx, target_y=ty))
         vx, vy, tvx, tvy = self._motion.velocities()

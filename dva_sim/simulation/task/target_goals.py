@@ -73,8 +73,8 @@ class Wandering:
         """Go straight on until `now` [s], and back from the limit."""
         passed = now - self._time
         limit = self.edge
-        (x, y) = self._place
-        (vx, vy) = self._velocity
+        x, y = self._place
+        vx, vy = self._velocity
         x = x + vx * passed
         y = y + vy * passed
         vx = -abs(vx) if x > limit else abs(vx) if x < -limit else vx
@@ -139,7 +139,7 @@ class PointGoal(ToTarget):
 
     @override
     def check(self, now: float, x: float, y: float, dt: float) -> bool:
-        (tx, ty) = self.target(now)
+        tx, ty = self.target(now)
         axis = self._way.axis
         dx = x - tx
         dy = y - ty
@@ -156,7 +156,8 @@ class PointGoal(ToTarget):
             self._pressed_at = math.inf
             return False
         self._selected = inside
-        self._end, self._off = dx * axis[0] + dy * axis[1], math.hypot(dx, dy)
+        self._end = dx * axis[0] + dy * axis[1]
+        self._off = math.hypot(dx, dy)
         return True
 
     def _is_selected(self, now: float, inside: bool) -> bool:

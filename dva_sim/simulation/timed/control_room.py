@@ -161,7 +161,8 @@ class Operator:
 
 
 ADDRESS = "192.168.1.9"  # in the registration, where nobody has a real one
-FASTEST, SLOWEST = 2.0, 0.5  # bounds of a person's speed, by the group's mean
+FASTEST = 2.0  # upper bound of a person's speed, by the group's mean
+SLOWEST = 0.5  # lower bound of a person's speed, by the group's mean
 IDS = {"guard": 1, "robot": 2, "operator": 3, "caller": 4, "second": 5}
 TYPES = {"guard": GUARD, "robot": ROBOT}
 

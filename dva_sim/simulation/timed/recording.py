@@ -85,8 +85,16 @@ _NAN = math.nan
 
 # The first ten columns.
 _known_of = attrgetter(
-    *("number", "stream", "index", "place.zone", "place.x", "place.y"),
-    *("true", "severity", "occurred", "noticed"),
+    "number",
+    "stream",
+    "index",
+    "place.zone",
+    "place.x",
+    "place.y",
+    "true",
+    "severity",
+    "occurred",
+    "noticed",
 )
 
 

@@ -14,7 +14,8 @@ from dva_sim.simulation.timed.recording import TimedRecording
 from dva_sim.simulation.timed.scenario import TimedScenario
 from dva_sim.simulation.timed.simulation import Shift
 
-MOST_EVENTS, MOST_UNITS = 12, 4  # an exact plan for more takes too long
+MOST_EVENTS = 12  # an exact plan for more takes too long
+MOST_UNITS = 4  # likewise
 
 
 class _Nobody(Policy):

@@ -289,7 +289,8 @@ def terrain_of(scenario: TimedScenario) -> Terrain:
 CLEARANCE = 0.4  # radius that must fit where an event happens [m]
 MOST_PATHS = 5000  # kept at a time
 FOUND = 3600.0  # what no detector notices people do, after so long [s]; assumed
-WALL, PASSAGE = 0.05, 0.6  # thickness of a wall, and the least width to pass [m]
+WALL = 0.05  # thickness of a wall [m]
+PASSAGE = 0.6  # least width to pass [m]
 
 
 class _Ways:

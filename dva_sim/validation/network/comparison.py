@@ -107,7 +107,8 @@ def _effort(job: StudyJob) -> float:
     return count * float(row["hz"]) * float(row["dur_s"])
 
 
-RUNS, QUICK_RUNS = 200, 40  # of a condition under loss
+RUNS = 200  # of a condition under loss
+QUICK_RUNS = 40  # of a condition under loss
 CONTROL_RUNS = 50
 QUICK_CONTROL_RUNS = 20
 JITTER_RUNS = 20  # where nothing is lost, but delays are left to chance
@@ -120,7 +121,8 @@ CONTROLS: dict[str, Depth] = {
 
 Rows = dict[ModelRuns, list[Row]]
 
-WANTED, WANTED_POOLED = 150, 40  # conditions that should be judged
+WANTED = 150  # conditions that should be judged
+WANTED_POOLED = 40  # pooled conditions that should be judged
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,8 @@ Floats = NDArray[np.float64]
 
 EXACT_S = 0.0005  # the laws without loss hold to this
 SIGNIFICANT = 0.05
-MAX_BIAS, MAX_TAIL_BIAS = 0.05, 0.10  # median over conditions; the latter of ages' tails
+MAX_BIAS = 0.05  # median over conditions
+MAX_TAIL_BIAS = 0.10  # median over conditions, of the tails of ages
 MIN_EVENTS = 5  # fewer time-outs or alerts than this, expected in all runs, tell nothing
 MIN_CONDITIONS = 10  # fewer have no median to speak of
 MIN_SHARE = 0.9  # of the model's runs in which a measure must be defined

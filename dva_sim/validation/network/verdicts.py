@@ -234,7 +234,8 @@ CellWord = Literal["inside", "outside", "shown only"]
 SHARES: dict[ConditionKind, float] = {"lossless": 0.05, "overload": 0.10, "pooled": 0.05}
 """Half-widths of bands; of pooled conditions, where runs hardly differ."""
 BOUNDED_SHARE = 0.15  # of an overload with bounded buffers
-TIME_MS, RATE_HZ = 2.0, 0.05  # added to the share
+TIME_MS = 2.0  # added to the share
+RATE_HZ = 0.05  # added to the share
 NOT_REALTIME_MS = 10.0  # added for 95th percentiles without real-time priority
 LATE_MS = 5.0  # no 95th percentile is judged if the link's own 99th is later
 INTERVAL = (2.5, 97.5)  # percentiles of the model's runs

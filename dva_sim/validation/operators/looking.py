@@ -30,12 +30,11 @@ LEG_S = 40.0  # that a vehicle drives; published: 39.7 s
 GOES_ON_S = 10.0  # without being looked at, on the way that it was given; assumed
 TICK_S = 0.1
 TRIALS = 60  # of each choice
-HALF_CLEAR, SHORTER = (
-    0.25,
-    1.0 / 3.0,
-)  # half as clear as an event, a third of its criterion; assumed
+HALF_CLEAR = 0.25  # half as clear as an event; assumed
+SHORTER = 1.0 / 3.0  # a third of its criterion; assumed
 PICTURE_S = 1.0 / 30.0
-ANGLE, PASSED_S = 0.05, 4.0  # of an item beside the way of a searcher, and how long; assumed
+ANGLE = 0.05  # of an item beside the way of a searcher; assumed
+PASSED_S = 4.0  # how long it is passed; assumed
 ITEMS = 20
 WALKERS = 40
 

@@ -20,8 +20,10 @@ from dva_sim.worlds.site import Site
 OPEN_AIR = np.uint32(1 << 24)
 
 HORIZON = 60.0  # floors and ceilings end there [m]
-MIDDLE, DISTANT = 5.0, 16.0  # from here on coarser cells do [m]
-TILE, JOINT = 1.0, 0.035  # of a floor [m]
+MIDDLE = 5.0  # from here on coarser cells do [m]
+DISTANT = 16.0  # from here on still coarser cells do [m]
+TILE = 1.0  # of a floor [m]
+JOINT = 0.035  # of a floor [m]
 HAZE = 250.0  # daylight falls off to a half over this distance [m], assumed
 LAMPS = 3.0  # about so far apart [m]
 
@@ -154,7 +156,8 @@ class Floors:
         draw.polygon([tuple(c) for c in corners.tolist()], fill=colour)
 
     def _lamps_of(self, draw: Any, polygon: NDArray[np.float64]) -> None:
-        (xmin, ymin), (xmax, ymax) = polygon.min(axis=0), polygon.max(axis=0)
+        xmin, ymin = polygon.min(axis=0)
+        xmax, ymax = polygon.max(axis=0)
         long_x = xmax - xmin >= ymax - ymin
         half = np.array([0.6, 0.12] if long_x else [0.12, 0.6]) / self._rooms.cell
         for x in _evenly(xmin, xmax):

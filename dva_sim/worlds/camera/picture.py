@@ -230,7 +230,7 @@ class Camera:
             if not CLOSEST < ahead[number] < HORIZON:
                 continue
             thing = things[number]
-            (dx, dy) = gaps[number]
+            dx, dy = gaps[number]
             if isinstance(thing, Figure):
                 sprite: Sprite | None = sprite_of(thing, math.atan2(dy, dx))
             else:

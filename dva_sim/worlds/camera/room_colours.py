@@ -18,7 +18,8 @@ ACCENTS = 12  # different colours of rooms
 MOST_CELLS = 4_000_000  # of a floor
 BORDER = 1.0  # of unknown ground around a site [m]
 BLOCK = 16  # cells; floors are made of whole blocks, so that coarser ones fit
-FACADE, PLAIN = (0.74, 0.60, 0.50), (0.66, 0.68, 0.70)  # from outside; of bare maps
+FACADE = (0.74, 0.60, 0.50)  # from outside
+PLAIN = (0.66, 0.68, 0.70)  # of bare maps
 GOLDEN = 0.61803399  # steps of the hue, so that neighbours differ
 
 

@@ -158,7 +158,8 @@ class Surfaces:
         z1 = local[index, 0][which]
         t1 = local[index, 1][which]
         slope = slopes[column]
-        (dz, dt) = (step[which, 0], step[which, 1])
+        dz = step[which, 0]
+        dt = step[which, 1]
         # The ray t = slope z meets the line (z1, t1) + s (dz, dt).
         closing = dt - slope * dz
         depth = det[which] / closing

@@ -29,8 +29,10 @@ POST = (54, 128, 62)
 
 
 TEXELS = 128  # of a wall, from the floor to the ceiling
-PANEL, PANEL_COLUMNS = 1.2, 32  # a wall has a joint every so often [m]
-WINDOW, WINDOW_COLUMNS = 2.4, 64  # and an outer wall a window [m]
+PANEL = 1.2  # a wall has a joint every so often [m]
+PANEL_COLUMNS = 32
+WINDOW = 2.4  # and an outer wall a window [m]
+WINDOW_COLUMNS = 64
 SIGN_COLUMNS = 96  # of a lintel, from post to post
 THROUGH = 0.15  # so far on both sides of a wall its rooms are looked for [m]
 BEYOND = 0.4  # so far behind a door its room is looked for [m]

@@ -258,7 +258,7 @@ class SolvedField(HazardField):
 
     def march(self, time: float) -> tuple[March, float]:
         """Return the march that holds the state at `time` [s], and the age in it [s]."""
-        (shared, step) = self._solved
+        shared, step = self._solved
         start = self._start
         age = time - start
         stopped = self.until - start
@@ -276,7 +276,8 @@ class SolvedField(HazardField):
         """
         if (time, self.until) != self._moment:
             march, age = self.march(time)
-            self._moment, self._states = (time, self.until), march.around(age)
+            self._moment = (time, self.until)
+            self._states = march.around(age)
         return self._states
 
     def state(self, time: float) -> Floats:

@@ -133,6 +133,7 @@ def _bend(path: Route, along: float, look: float) -> float:
 def _direction(path: Route, along: float, by: float) -> Velocity:
     """Return the direction of a path at a place, averaged over so much of it either way [m]."""
     along = min(max(along, by), path.length - by)
-    (ax, ay), (bx, cy) = path.point_at(along - by), path.point_at(along + by)
+    ax, ay = path.point_at(along - by)
+    bx, cy = path.point_at(along + by)
     length = math.hypot(bx - ax, cy - ay)
     return ((bx - ax) / length, (cy - ay) / length) if length else (0.0, 0.0)

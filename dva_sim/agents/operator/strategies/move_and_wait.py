@@ -137,7 +137,8 @@ def straight_way(route: Route, here: Pair, along: float, most: float, slack: flo
 
 def _apart(route: Route, here: Pair, along: float, way: float) -> float:
     """Return how far a route departs from the straight line to a place ahead on it [m]."""
-    (ax, ay), (bx, by) = here, route.point_at(along + way)
+    ax, ay = here
+    bx, by = route.point_at(along + way)
     length = math.hypot(bx - ax, by - ay)
     if length == 0.0:
         return 0.0

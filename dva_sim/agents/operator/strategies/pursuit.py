@@ -39,8 +39,11 @@ from dva_sim.agents.route_following import (
     wrap,
 )
 
-FAR, NEAR, INTEGRAL = 16.0, 4.0, 3.0  # source: Salvucci 2006: gains, the last one in 1/s
-NEAR_TIME, FAR_TIME = 0.37, 0.93  # source: Salvucci, Gray 2004: to the points, on the road [s]
+FAR = 16.0  # source: Salvucci 2006: gain
+NEAR = 4.0  # source: Salvucci 2006: gain
+INTEGRAL = 3.0  # source: Salvucci 2006: gain [1/s]
+NEAR_TIME = 0.37  # source: Salvucci, Gray 2004: to the near point, on the road [s]
+FAR_TIME = 0.93  # source: Salvucci, Gray 2004: to the far point, on the road [s]
 LARGEST = 0.07  # source: Salvucci 2006: direction of the near point that counts at most [rad]
 
 

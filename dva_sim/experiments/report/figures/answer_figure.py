@@ -97,7 +97,8 @@ def _marks(ax: Axes, f: Finding, over: Factor | None) -> None:
     from matplotlib.lines import Line2D
 
     x = np.arange(len(f.mean))
-    (differs, is_open) = (f.differs, f.is_open)
+    differs = f.differs
+    is_open = f.is_open
     ax.axhline(0, color=INK, lw=0.8, zorder=1)
     if over is not None and over.is_numeric and style.is_to_scale(over):
         ax.plot(x, f.mean, color=ONE.colour, lw=1, alpha=0.5, zorder=2)

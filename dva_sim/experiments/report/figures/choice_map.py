@@ -29,9 +29,11 @@ if TYPE_CHECKING:
 
 _ROW = 0.36  # height of a situation [in]
 _ACROSS = 100  # characters that the heads of all columns hold side by side
-_WORDS, _SMALL_WORDS = 8.5, 6.8  # in a cell, and where there are many side by side [pt]
+_WORDS = 8.5  # in a cell [pt]
+_SMALL_WORDS = 6.8  # in a cell where there are many columns side by side [pt]
 _MANY = 8  # columns
-_FAINT, _STRONG = 0.12, 0.85  # how much colour the least and the greatest regret have
+_FAINT = 0.12  # colour of the least regret
+_STRONG = 0.85  # colour of the greatest regret
 _DECADES = 2.0  # from the least coloured regret to the full colour
 
 

@@ -85,7 +85,7 @@ def _mark(ax: Axes, row: int, claim: Tested) -> None:
 def _claimed(ax: Axes, row: int, claim: Tested) -> None:
     """Shade what was claimed, from the margin to the edge of the axes."""
     margin = claim.hypothesis.margin
-    (left, right) = ax.get_xlim()
+    left, right = ax.get_xlim()
     low, high = {
         "above": (margin, max(right, margin)),
         "below": (min(left, -margin), -margin),

@@ -133,7 +133,8 @@ _AROUND = 0.85  # height of a panel's title and axis [in]
 _TITLE = 72  # characters of titles that stand abreast
 
 
-_PER_INCH, _LEAST = 13, 12  # characters of a factor's name along the height, and the fewest
+_PER_INCH = 13  # characters of a factor's name along the height
+_LEAST = 12  # characters of it, at least
 
 
 _NAME = 24  # characters of a stop's name in a line

@@ -37,7 +37,8 @@ from dva_sim.validation.network.beside.carriers import why_not
 from dva_sim.validation.network.beside.virtual_run import ProgramTimes, VirtualRun
 from dva_sim.validation.network.reference import FOLDER
 
-PLAYS, QUICK_PLAYS = 20, 5  # for each seed
+PLAYS = 20  # for each seed
+QUICK_PLAYS = 5  # for each seed
 DRAWS: Final = 4000
 INTERVAL: Final = (2.5, 97.5)
 KEPT: Final = "middleware-predictions"
