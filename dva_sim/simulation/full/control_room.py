@@ -80,6 +80,18 @@ def make_core(stage: Stage, permissions: Permissions) -> Dva:
     permissions.own = DVA
     rate_hz = stage.scenario.dva.sensor_rate_hz
     policy = load_policy(dispatch.policy, dispatch.options)
+    ids = {label: id_tag for id_tag, label in stage.labels.items()}
+    rules = [
+        AccessRule(
+            holders=frozenset(rule.holders),
+            robots=frozenset(rule.robots),
+            levels=frozenset(rule.levels),
+            sensors=None if rule.sensors is None else frozenset(rule.sensors),
+            since=rule.from_s,
+            until=math.inf if rule.until_s is None else rule.until_s,
+        )
+        for rule in stage.scenario.access
+    ]
     return Dva(
         policy,
         _Ways(stage),
@@ -91,10 +103,10 @@ def make_core(stage: Stage, permissions: Permissions) -> Dva:
         rng=stage.streams["dva/policy"],
         sessions=Sessions(permissions),
         ground=_ground(stage) if policy.relocates else SiteKnowledge(),
-        access=_access(stage.scenario),
+        access=Access(rules) if rules else Access(),
         patrols=_patrols(stage),
         sensing=Sensing({n: _ALARMS[n] for n in stage.scenario.dva.sensors}, rate_hz),
-        supervisors=_supervisors(stage),
+        supervisors=frozenset(ids.get(name, name) for name in stage.scenario.dva.supervisors),
         roles=Roles(control_rooms_of(stage.scenario)),
         ask_first=dispatch.mode == "ask_first",
         policy_name=dispatch.policy.rpartition(":")[2],
@@ -109,12 +121,6 @@ _ALARMS = {
 }
 """From where on a sensor of a robot gives the alarm: where a fixed detector would. It cannot tell
 which gas it is: the one that explodes first counts."""
-
-
-def _supervisors(stage: Stage) -> frozenset[str]:
-    """The ids of those whom the scenario calls supervisors, by label or id: keys are of ids."""
-    ids = {label: id_tag for id_tag, label in stage.labels.items()}
-    return frozenset(ids.get(name, name) for name in stage.scenario.dva.supervisors)
 
 
 MOVED_SINCE = 2.0  # since somebody last told where it is; assumed [m]
@@ -172,22 +178,6 @@ def _ground(stage: Stage) -> SiteKnowledge:
     goals = [m.Position(*frame.to_latlon(middle.x, middle.y)) for middle in middles]
     area = np.array([room.area for room in rooms])
     return SiteKnowledge(None, stations, _Ways(stage)(starts, goals)[1].T, area / area.sum())
-
-
-def _access(scenario: Scenario) -> Access:
-    """Without rules in the scenario everything is allowed to who asks."""
-    rules = [
-        AccessRule(
-            holders=frozenset(rule.holders),
-            robots=frozenset(rule.robots),
-            levels=frozenset(rule.levels),
-            sensors=None if rule.sensors is None else frozenset(rule.sensors),
-            since=rule.from_s,
-            until=math.inf if rule.until_s is None else rule.until_s,
-        )
-        for rule in scenario.access
-    ]
-    return Access(rules) if rules else Access()
 
 
 def _patrols(stage: Stage) -> Patrols:

@@ -174,7 +174,8 @@ class DvaAgent:
         answered: list[tuple[float, m.Reply | None]] = []
 
         def answer(data: bytes) -> None:
-            answered.append((self.stopwatch() - begun, _reply_in(data)))
+            body = decode(data).body
+            answered.append((self.stopwatch() - begun, body if isinstance(body, m.Reply) else None))
             request.answer(data)
 
         self._take(request._replace(answer=answer))
@@ -408,8 +409,3 @@ def _reads_log(data: bytes) -> bool:
         return isinstance(decode(data).body, m.GetRequestLog)
     except ProtocolError:
         return False
-
-
-def _reply_in(data: bytes) -> m.Reply | None:
-    body = decode(data).body
-    return body if isinstance(body, m.Reply) else None

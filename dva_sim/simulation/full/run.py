@@ -57,11 +57,6 @@ MESSAGE = 1000  # more than any but a picture takes, with all headers [B]
 TOGETHER = 10  # messages that may coincide with a picture; assumed
 
 
-def connector_of(scenario: Scenario) -> Connector:
-    """Makes the connections of a scenario's network."""
-    return Connector(scenario.transport, scenario.network_depth, scenario.zeromq, load_of(scenario))
-
-
 def load_of(scenario: Scenario) -> Load:
     """Return the greatest load of a robot's link, in the busier direction."""
     frame = scenario.camera.frame_bytes
@@ -168,7 +163,9 @@ class Run:
         self.clock = watched.clock
         self.recorder = watched.recorder
         self._observers: tuple[Observer, ...] = ()  # the audit first, once all are in place
-        self._connector = connector_of(scenario)
+        self._connector = Connector(
+            scenario.transport, scenario.network_depth, scenario.zeromq, load_of(scenario)
+        )
         self.network, self.stage = self._connected(seed, watched)
         check_partitions(scenario.link.partitions, self.stage.labels.values())
         self.is_real = watched.real is not None

@@ -529,7 +529,9 @@ class SafetyAudit:
             if isinstance(payload, bytes) and self._ledger.waits_for(payload):
                 self._ledger.says(_read(payload))
             if self._takeovers.waits and isinstance(payload, bytes) and b"<reply>" in payload:
-                self._answers_wish(_read(payload), now)
+                answer = _read(payload)
+                if answer is not None and isinstance(answer.body, m.Reply):
+                    self._takeovers.says(answer.destination, answer.body, now)
             return
         if source not in self._motors:
             return
@@ -747,10 +749,6 @@ class SafetyAudit:
         """Implement `Observer`."""
         self._report([*self._ledger.check(now, page)], now, self._dva)
         self._report([*self._hands_over(page, now)], now, self._dva)
-
-    def _answers_wish(self, answer: m.Message | None, now: float) -> None:
-        if answer is not None and isinstance(answer.body, m.Reply):
-            self._takeovers.says(answer.destination, answer.body, now)
 
     def _hands_over(self, page: Page, now: float) -> Iterator[Broken]:
         """Yield robots that are handed over before they stand and know that they are."""

@@ -309,7 +309,7 @@ class TeamBuilder:
             way = self._stage.planner.path(site.sample_free(rng, FOOTPRINT), goal)
             if way is None:
                 continue
-            longest = max(longest, _length(way))
+            longest = max(longest, float(np.hypot(*np.diff(way, axis=0).T).sum()))
             pose = _cut(way, length)
             if pose is not None and self._is_free(pose):
                 self._taken.append((pose.x, pose.y))
@@ -356,10 +356,6 @@ class Power:
         at_base = near and abs(body.speed) < STANDING
         battery.advance(self._clock.now, body.distance, body.work, at_base)
         return battery.share
-
-
-def _length(way: NDArray[np.float64]) -> float:
-    return float(np.hypot(*np.diff(way, axis=0).T).sum())
 
 
 def _cut(way: NDArray[np.float64], left: float) -> Pose | None:

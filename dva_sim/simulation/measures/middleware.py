@@ -125,8 +125,11 @@ def tables(run: MiddlewareRun) -> dict[str, list[Row]]:
     heard = [note for note in run.far if note.kind is NoteKind.APPLIED]
     taken = _times(run.far, NoteKind.PICTURE_TAKEN)
     shown = [note for note in run.near if note.kind is NoteKind.PICTURE_SHOWN]
+    ready = [note.time for note in run.near if note.kind is NoteKind.READY]
+    link = run.link
     row = {
-        **_connection(run),
+        "connected": int(bool(ready)),
+        "connected_after_s": ready[0] - run.window.start if ready else math.nan,
         "commands": sum(window.since <= time < window.until for time in sent.values()),
         "not_taken": len(refused),
         **command_row(
@@ -141,28 +144,6 @@ def tables(run: MiddlewareRun) -> dict[str, list[Row]]:
             _floats(note.time for note in shown),
             window,
         ),
-        **_link_row(run),
-    }
-    return {
-        "runs": [row],
-        "commands": _fates(
-            sent, compress(heard, is_applied([note.number for note in heard])), window
-        ),
-        "pictures": _fates(taken, shown, window),
-    }
-
-
-def _connection(run: MiddlewareRun) -> Row:
-    ready = [note.time for note in run.near if note.kind is NoteKind.READY]
-    return {
-        "connected": int(bool(ready)),
-        "connected_after_s": ready[0] - run.window.start if ready else math.nan,
-    }
-
-
-def _link_row(run: MiddlewareRun) -> Row:
-    link = run.link
-    return {
         "up_bytes": link.up.passed_bytes,
         "down_bytes": link.down.passed_bytes,
         "late_p99_s": link.late_p99_s,
@@ -170,6 +151,13 @@ def _link_row(run: MiddlewareRun) -> Row:
         "attempts": run.attempts,
         "disturbed": int(run.is_disturbed),
         "load": run.load,
+    }
+    return {
+        "runs": [row],
+        "commands": _fates(
+            sent, compress(heard, is_applied([note.number for note in heard])), window
+        ),
+        "pictures": _fates(taken, shown, window),
     }
 
 

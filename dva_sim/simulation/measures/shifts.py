@@ -299,7 +299,11 @@ def run_row(recording: TimedRecording, events: Columns, follow: float) -> Row:
     row["true_share"] = mean(events["is_true"])
     row |= _times(events, follow) | _fates(events, follow)
     if recording.scenario.dispatch.containment:
-        row |= _containment(only(events, events["is_true"]), follow)
+        curve = reaching(only(events, events["is_true"]), "containment_s")
+        row |= {
+            "contained_share": float(curve.at(follow)),
+            "containment_mean_s": curve.restricted_mean(follow),
+        }
     row |= {"zone_ratio": zone_ratio(events, follow)} | _bound(events, follow)
     row |= _team(recording) | _exposure(recording) | _dispatching(recording)
     return row | {"violations": sum(recording.violations.values()), "simulated_s": recording.ended}
@@ -330,14 +334,6 @@ def _fates(events: Columns, follow: float) -> Row:
     true = only(events, events["is_true"])
     row["confirmed_of_true_share"] = float(reaching(true, "confirmation_s").at(follow))
     return row
-
-
-def _containment(true: Columns, follow: float) -> Row:
-    curve = reaching(true, "containment_s")
-    return {
-        "contained_share": float(curve.at(follow)),
-        "containment_mean_s": curve.restricted_mean(follow),
-    }
 
 
 def _bound(events: Columns, follow: float) -> Row:

@@ -206,25 +206,14 @@ def steering(logs: Sequence[DriveLog], end: float) -> Row:
     made = sum(changes((speed, turn) for _, speed, turn in log.commands) for log in logs)
     turns = sum(reversals(turn for _, _, turn in log.commands) for log in logs)
     weights = sum(weight for weight, _ in known)
+    shares = [log.workload.get("move_and_wait_share", 0.0) for log in logs]
     return {
         "reversals_per_min": turns / minutes,
         "command_changes_per_min": made / minutes,
         "steering_entropy": sum(w * v for w, v in known) / weights if known else math.nan,
         "waiting_share": level / minutes,
-        **_strategies(logs, [len(s) for s in samples]),
-    }
-
-
-def _strategies(logs: Sequence[DriveLog], weights: Sequence[int]) -> Row:
-    """Return the strategies' own counts: 0 for those that neither wait nor change.
-
-    `move_waits` is how often the operators waited to see the result of a move,
-    `move_and_wait_share` how much of their driving they spent in that way of steering.
-    """
-    shares = [log.workload.get("move_and_wait_share", 0.0) for log in logs]
-    return {
         "move_waits": sum(log.workload.get("waits", 0.0) for log in logs),
-        "move_and_wait_share": float(np.average(shares, weights=weights)),
+        "move_and_wait_share": float(np.average(shares, weights=[len(s) for s in samples])),
     }
 
 
@@ -336,14 +325,11 @@ def operator_row(recording: Recording, operator: str) -> Row:
         "lost_links": sum(log.outcome == "lost link" for log in logs),
         "refused_drives": sum(log.outcome == "refused" for log in logs),
         "alerts": sum(log.alerts for log in logs),
-        "refusals": _by_code(sum((log.refused for log in logs), Counter[int]())),
+        "refusals": ", ".join(
+            f"{CODE_NAMES.get(code, code)} {count}"
+            for code, count in sorted(sum((log.refused for log in logs), Counter[int]()).items())
+        ),
     }
-
-
-def _by_code(refused: Counter[int]) -> str:
-    return ", ".join(
-        f"{CODE_NAMES.get(code, code)} {count}" for code, count in sorted(refused.items())
-    )
 
 
 _OF_A_RUN = ("utilisation", "attending_share", "queue_mean", "turns_per_min")

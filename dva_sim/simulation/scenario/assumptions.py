@@ -9,7 +9,6 @@ from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
 from dva_sim.agents.population import Population
 from dva_sim.kernel.assumed import Assumption, assumptions_in
 from dva_sim.kernel.config import Config
-from dva_sim.kernel.suggestions import unknown
 from dva_sim.simulation.scenario.scenario import Scenario
 
 _PROFILES: dict[str, type[Config]] = {
@@ -37,30 +36,10 @@ def as_json() -> list[dict[str, object]]:
 
 def lines() -> Iterator[str]:
     """The list for people, one line for each number."""
-    for group, members in _groups():
-        yield group
-        for name, each in members:
-            yield f"  {name:<22} {_value(each):<32} {each.why}".rstrip()
-
-
-def assumption_at(key: str) -> Assumption:
-    """The assumed number that a key sets.
-
-    Raises:
-        ValueError: there is none.
-    """
-    known = {each.key: each for each in all_assumptions()}
-    if key not in known:
-        raise ValueError(unknown("assumption", key, known))
-    return known[key]
-
-
-def _groups() -> Iterator[tuple[str, list[tuple[str, Assumption]]]]:
-    """Assumptions by the part of their key up to the last dot."""
     for group, members in groupby(all_assumptions(), lambda each: each.key.rpartition(".")[0]):
-        yield group, [(each.key.rpartition(".")[2], each) for each in members]
-
-
-def _value(each: Assumption) -> str:
-    unit = f" {each.unit}" if each.unit else ""
-    return f"{each.default:g}{unit}  [{each.low:g}, {each.high:g}]"
+        yield group
+        for each in members:
+            name = each.key.rpartition(".")[2]
+            unit = f" {each.unit}" if each.unit else ""
+            value = f"{each.default:g}{unit}  [{each.low:g}, {each.high:g}]"
+            yield f"  {name:<22} {value:<32} {each.why}".rstrip()

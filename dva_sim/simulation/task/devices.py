@@ -136,8 +136,9 @@ class Joystick(HandDevice):
     def reading(self) -> Pair:
         return self._shown
 
+    @override
     def farthest(self) -> dict[str, float]:
-        """See `HandDevice`: the largest deflection, in shares of a full one."""
+        # The largest deflection, in shares of a full one.
         return {"deflection_max": self._most}
 
 
@@ -163,8 +164,9 @@ class Tilt(HandDevice):
         self._rest = sum(r for r, _ in rest) / CALIBRATING, sum(p for _, p in rest) / CALIBRATING
         self._most = 0.0
 
+    @override
     def reading(self) -> Pair:
-        """See `HandDevice`: one more sample, filtered."""
+        # One more sample, filtered.
         pitch, roll = self._hand.step(self._aim[1], self._aim[0], self.period)
         self._most = max(self._most, abs(pitch), abs(roll))
         x, y = self._measured(pitch, roll)
@@ -173,8 +175,9 @@ class Tilt(HandDevice):
         self.failures = self._filter.failures
         return value
 
+    @override
     def farthest(self) -> dict[str, float]:
-        """See `HandDevice`: the largest tilt about either axis [rad]."""
+        # The largest tilt about either axis [rad].
         return {"tilt_max_rad": self._most}
 
     def _measured(self, pitch: float, roll: float) -> Pair:

@@ -61,11 +61,6 @@ def way_of(task: Task, first: float, width: float) -> Points:
     return list(task.points_m)
 
 
-def length_of(points: Points) -> float:
-    """Way along the corners [m]."""
-    return sum(math.dist(a, b) for a, b in pairwise(points))
-
-
 def extended(points: Points, by: float) -> Route:
     """The way, going straight on after its end [m]."""
     (ax, ay), (bx, by_) = points[-2:]
@@ -106,7 +101,7 @@ class DriveTrial(Trial[Observation]):
         device = Joystick(unit, seat.person, streams, self.STEP)
         super().__init__(scenario, seat, Reach(*self._top), device, streams, reaction)
         self.points = way_of(scenario.task, *condition)
-        self.length = length_of(self.points)
+        self.length = sum(math.dist(a, b) for a, b in pairwise(self.points))
         self.width = condition[1]
         self._kept = WayKept(0.5 * (self.width - plant.width_m))
         self._seen_way, self._way = (extended(self.points, RUN_OUT) for _ in range(2))

@@ -184,7 +184,7 @@ class Demand:
         total = [0.0] * len(zones)
         for stream in self._scenario.demand:
             weights = (
-                _listed_zones(stream)
+                Counter(event.zone for event in stream.listed if event.zone is not None)
                 or stream.zones
                 or {zone: self._terrain.size(number) for number, zone in enumerate(zones)}
             )
@@ -251,11 +251,6 @@ class Demand:
             self._noticed(incident)
         elif after < math.inf:
             self._clock.call_after(after, self._noticed, incident)
-
-
-def _listed_zones(stream: EventStream) -> Counter[str]:
-    """Count the listed events of each zone."""
-    return Counter(event.zone for event in stream.listed if event.zone is not None)
 
 
 def _rate(stream: EventStream) -> float:

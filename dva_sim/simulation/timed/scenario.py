@@ -24,7 +24,6 @@ from dva_sim.simulation.scenario.alarms import why_not
 from dva_sim.simulation.scenario.event_table import (
     EventTableConfig,
     Ground,
-    TableAlarm,
     TableEvents,
     WithTable,
     read_events,
@@ -116,7 +115,16 @@ def with_alarms(scenario: TimedScenario, error: Fail) -> TimedScenario:
     found = table_events(scenario, error)
     by_kind: dict[str, list[ListedEvent]] = {}
     for alarm in found.alarms:
-        by_kind.setdefault(alarm.kind, []).append(_listed(alarm))
+        by_kind.setdefault(alarm.kind, []).append(
+            ListedEvent(
+                at_s=alarm.at_s,
+                zone=alarm.room,
+                position=alarm.position,
+                severity=alarm.severity,
+                confidence=alarm.confidence,
+                false_alarm=alarm.false_alarm,
+            )
+        )
     taken = set(scenario.stream_names)
     streams = []
     for kind, events in by_kind.items():
@@ -136,17 +144,6 @@ def table_events(scenario: TimedScenario, error: Fail) -> TableEvents:
         return error(problem, ("events", *path))
 
     return read_events(scenario.events, scenario.horizon_s, _ground_of(scenario, error), fail)
-
-
-def _listed(alarm: TableAlarm) -> ListedEvent:
-    return ListedEvent(
-        at_s=alarm.at_s,
-        zone=alarm.room,
-        position=alarm.position,
-        severity=alarm.severity,
-        confidence=alarm.confidence,
-        false_alarm=alarm.false_alarm,
-    )
 
 
 def _ground_of(scenario: TimedScenario, error: Fail) -> Ground:

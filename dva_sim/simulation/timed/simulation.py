@@ -413,10 +413,12 @@ class Shift:
 
     def needs_people(self, incident: Incident) -> bool:
         """Return True if a person will be called to contain it."""
-        return self.scenario.dispatch.containment and incident.true and self._is_open(incident)
-
-    def _is_open(self, incident: Incident) -> bool:
-        return incident.event is not None and incident.event.open
+        return (
+            self.scenario.dispatch.containment
+            and incident.true
+            and incident.event is not None
+            and incident.event.open
+        )
 
     def spent(self, unit: Unit, phase: str, since: float) -> None:
         """A unit has been at something until now; what lies in the measured time counts."""

@@ -249,12 +249,14 @@ class Plane(Terrain):
         u, v = rng.random(2).tolist()
         return self.fix(u * self._whole[2], v * self._whole[3])
 
+    @override
     def origin(self) -> Place:
-        """See `Terrain`: the middle of the area."""
+        # The middle of the area.
         return self.fix(0.5 * self._whole[2], 0.5 * self._whole[3])
 
+    @override
     def size(self, zone: int) -> float:
-        """See `Terrain`: its area, unless events may happen outside all zones, too."""
+        # Its area, unless events may happen outside all zones, too.
         left, low, right, high = self._boxes[zone]
         return (right - left) * (high - low)
 
@@ -413,8 +415,9 @@ class Rooms(Terrain):
         room = self.site.room_at(pose.x, pose.y)
         return self.fix(pose.x, pose.y, self.zones.index(room) if room else -1)
 
+    @override
     def centre(self, zone: int) -> Place:
-        """See `Terrain`: the first of its places."""
+        # The first of its places.
         return self._spots[zone][0]
 
     @override
