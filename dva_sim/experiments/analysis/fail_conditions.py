@@ -149,7 +149,10 @@ def parse(text: str) -> Gate:
         ConfigError: it is none, told with what was expected.
     """
     words = _Reader(text)
-    statistic = _statistic(words)
+    name = words.word
+    if words.kind == "name" and name not in _STATISTICS and percent_of(name) is None:
+        raise words.error(unknown("statistic", name, [*_STATISTICS, "p1 to p99"]))
+    statistic = words.take("name", called="a statistic")
     words.take("sign", ("(",))
     measure = words.take("name", called="a measure")
     test = _test(words, measure) if statistic == "share" and words.kind == "sign" else None
@@ -172,13 +175,6 @@ def percent_of(statistic: str) -> float | None:
     """Parse a percentile's name: 95 for `p95`; None for other statistics."""
     found = re.fullmatch(r"p(\d\d?(?:\.\d+)?)", statistic)
     return float(found[1]) if found and float(found[1]) else None
-
-
-def _statistic(words: _Reader) -> str:
-    name = words.word
-    if words.kind == "name" and name not in _STATISTICS and percent_of(name) is None:
-        raise words.error(unknown("statistic", name, [*_STATISTICS, "p1 to p99"]))
-    return words.take("name", called="a statistic")
 
 
 def _test(words: _Reader, measure: str) -> Test | None:
@@ -268,8 +264,11 @@ def _verdicts(
 ) -> Iterator[GateVerdict]:
     for group in groups:
         crashed = [comparison.failed(n, group) for n in (0, 1)]
-        if gate.statistic != "missing":
-            _refuse_crashed(group, len(crashed[1] - crashed[0]))
+        if gate.statistic != "missing" and (only_second := len(crashed[1] - crashed[0])):
+            raise ConfigError(  # as their values are unknown
+                f"in part {group.part} {only_second} runs of the second folder failed that did not "
+                "in the first; a condition on missing(...) counts them"
+            )
         sides = [_tested(gate, comparison.rows(n, table, column, group), column) for n in (0, 1)]
         if not any(len(_values(gate, side)) for side in sides):
             continue
@@ -288,15 +287,6 @@ def _verdicts(
             second=second,
             bound=bound,
             missing=(shares[0], shares[1]),
-        )
-
-
-def _refuse_crashed(group: GateGroup, runs: int) -> None:
-    """Raise if runs failed in the second folder only: their values are unknown."""
-    if runs:
-        raise ConfigError(
-            f"in part {group.part} {runs} runs of the second folder failed that did not in the "
-            "first; a condition on missing(...) counts them"
         )
 
 

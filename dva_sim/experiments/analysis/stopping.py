@@ -32,16 +32,11 @@ def half_widths(study: Study, stop: StopRule, runs: Table) -> Floats:
     if not runs:
         return np.array([])
     if stop.comparison is None:
-        return _of_measure(stop, runs)
+        cells = Factor("cell", tuple(np.unique(runs["cell"]).tolist()))
+        part = RunGrid(runs, str(stop.part), [cells])
+        values = part.outcome(str(stop.measure))[part.ran]
+        return np.array([mean_interval(cell.ravel(), part.person).half_width for cell in values])
     return _of_contrast(study, study.contrasts[stop.comparison], runs, stop.level(study.persons))
-
-
-def _of_measure(stop: StopRule, runs: Table) -> Floats:
-    """Half-widths of each cell's mean, in excess of the reference run if there is one."""
-    cells = Factor("cell", tuple(np.unique(runs["cell"]).tolist()))
-    part = RunGrid(runs, str(stop.part), [cells])
-    values = part.outcome(str(stop.measure))[part.ran]
-    return np.array([mean_interval(cell.ravel(), part.person).half_width for cell in values])
 
 
 def _of_contrast(study: Study, asked: Contrast, runs: Table, level: float) -> Floats:

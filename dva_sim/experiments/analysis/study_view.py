@@ -320,7 +320,10 @@ def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
     over = known.get(declared.get("over", ""))
     line = known.get(declared.get("factor", ""))
     if over is None and not (line and "over" in declared):
-        over = _longest_numeric([f for f in part.factors if f is not line])
+        free = [f for f in part.factors if f is not line]
+        numeric = [f for f in free if f.is_numeric and len(f.levels) > 1]
+        longest = max(numeric, key=lambda f: len(f.levels), default=None)
+        over = longest or next(iter(free), None)
     line = line or next((f for f in part.factors if f is not over), None)
     within = {k: v for k, v in (declared.get("within") or {}).items() if k in known}
     measure = declared.get("measure") or _first_measure(part)
@@ -429,11 +432,6 @@ def _horizon(view: StudyView) -> float | None:
     missed = as_floats(view.part.treated["confirmed"]) == 0
     counted = np.unique(present(view.part.values(view.measure)[missed]))
     return float(counted[0]) if len(counted) == 1 else None
-
-
-def _longest_numeric(factors: Sequence[Factor]) -> Factor | None:
-    numeric = [f for f in factors if f.is_numeric and len(f.levels) > 1]
-    return max(numeric, key=lambda f: len(f.levels), default=None) or next(iter(factors), None)
 
 
 def _first_measure(part: RunGrid) -> str:

@@ -187,12 +187,7 @@ def verdict_with_interval(tested: Tested) -> str:
 def _found(tested: Tested) -> str:
     """`4.0 s (3.0 to 5.0 s, 90 %)`: the difference with the interval that decides."""
     text = _interval(tested.difference, tested.contrast.measure)
-    return text if tested.difference is None else f"{text[:-1]}, {_level(tested)})"
-
-
-def _level(tested: Tested) -> str:
-    """`90 %`, `99.4 %`: level of the interval that decides."""
-    return f"{100 * tested.level:.3g} %"
+    return text if tested.difference is None else f"{text[:-1]}, {100 * tested.level:.3g} %)"
 
 
 def _interval(found: Interval | None, measure: str) -> str:

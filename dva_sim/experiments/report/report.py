@@ -96,7 +96,9 @@ def blocks_of(reading: Reading, drawn: Sequence[Drawn]) -> list[Block]:
             _method(reading),
         )
     )
-    return [*blocks, *_words(blocks), *_manifest(reading)]
+    text = json.dumps(reading.manifest, indent=2, sort_keys=True, ensure_ascii=False)
+    manifest = Folded("Manifest: all that was asked, and by which program", (Verbatim(text),))
+    return [*blocks, *_words(blocks), manifest]
 
 
 def _status(reading: Reading) -> Iterator[Block]:
@@ -314,11 +316,6 @@ def _words(blocks: Sequence[Block]) -> Iterator[Block]:
         yield Heading(WORDS)
         entries = tuple((term.name, f"{term.means}.") for term in terms)
         yield Folded(f"What {len(terms)} words in this report mean", (Terms(entries),))
-
-
-def _manifest(reading: Reading) -> Iterator[Block]:
-    text = json.dumps(reading.manifest, indent=2, sort_keys=True, ensure_ascii=False)
-    yield Folded("Manifest: all that was asked, and by which program", (Verbatim(text),))
 
 
 def _levels(name: str, levels: Sequence[Any]) -> str:

@@ -70,7 +70,10 @@ def show_results(results: Results, console: Console) -> None:
         print_table(cells.heads, cells.rows, console, cells.labels)
         if cells.note:
             console.print(escape(cells.note), style="dim", soft_wrap=True)
-    console.print(f"\n{_tables(results)}", soft_wrap=True)
+    tables = ", ".join(results.tables) or "none"
+    console.print(
+        f"\nTables: {tables} (--table NAME shows one, --columns what they mean)", soft_wrap=True
+    )
 
 
 def show_table(results: Results, name: str, rows: int, console: Console) -> None:
@@ -185,8 +188,3 @@ def _machine(machine: Mapping[str, Any]) -> str:
     if "cpu_s" in machine:
         parts.append(f"{machine['cpu_s']:.0f} s of CPU time")
     return ", ".join(part for part in parts if part)
-
-
-def _tables(results: Results) -> str:
-    names = ", ".join(results.tables) or "none"
-    return f"Tables: {names} (--table NAME shows one, --columns what they mean)"

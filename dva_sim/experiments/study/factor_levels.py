@@ -22,7 +22,7 @@ from pydantic import Field, field_validator
 
 from dva_sim.agents.population import Population
 from dva_sim.experiments.study.designs import Row, ValueRange, keys_of, sample, value_at
-from dva_sim.experiments.study.parts import POINT, REPEATS, STRATEGY, Level, Range, RobustnessRule
+from dva_sim.experiments.study.parts import POINT, REPEATS, STRATEGY, Level, Range
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, validate
@@ -92,7 +92,12 @@ def parameter_sets(study: Study) -> list[Traits]:
     robustness = study.robustness
     if robustness is None or not robustness.sets:
         return [{}]
-    bands = _bands_of(study, robustness)
+    try:
+        document = load_yaml(resources.find(robustness.bands, PEOPLE, base=study.folder))
+    except ConfigError as error:
+        here = study.error(error.problem, (REPEATS, "bands"))
+        raise here if error.file is None else error from None
+    bands = validate(Bands, document.data, document.error).bands
     rng = Streams(study.seed).fresh("robustness")
     places = latin_hypercube(robustness.sets, len(bands), rng)
     drawn = (zip(bands.items(), row, strict=True) for row in places)
@@ -114,15 +119,6 @@ def _between(band: Range, share: float) -> float:
     low, high = band
     value = low * (high / low) ** share
     return float(f"{value:.{_DIGITS}g}")
-
-
-def _bands_of(study: Study, robustness: RobustnessRule) -> Mapping[str, Range]:
-    try:
-        document = load_yaml(resources.find(robustness.bands, PEOPLE, base=study.folder))
-    except ConfigError as error:
-        here = study.error(error.problem, (REPEATS, "bands"))
-        raise here if error.file is None else error from None
-    return validate(Bands, document.data, document.error).bands
 
 
 def levels_of_cells(study: Study) -> Iterator[Row]:

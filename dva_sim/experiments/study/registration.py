@@ -99,7 +99,12 @@ def register(study: Study, again: bool = False) -> str:
     Raises:
         ConfigError: nothing to register, a size left open, or a registration that is there.
     """
-    _refuse_what_is_open(study)
+    if not study.hypotheses:
+        raise study.error("nothing to register: no key 'hypotheses'", ())
+    for key, asked in (("stop", study.stop), ("budget_s", study.budget_s)):
+        if asked is not None:
+            problem = f"a registered study has a fixed number of persons; leave {key!r} out"
+            raise study.error(problem, (key,))
     path = study.folder / f"{study.file.stem}{REGISTRATION}"
     found = registration_of(study)
     if found is not None and not again:
@@ -220,15 +225,6 @@ def _remarks(found: Preregistration, study: Study) -> Iterator[str]:
     if found.earlier:
         times = "once" if len(found.earlier) == 1 else f"{len(found.earlier)} times"
         yield f"it had been registered {times} before, otherwise"
-
-
-def _refuse_what_is_open(study: Study) -> None:
-    if not study.hypotheses:
-        raise study.error("nothing to register: no key 'hypotheses'", ())
-    for key, asked in (("stop", study.stop), ("budget_s", study.budget_s)):
-        if asked is not None:
-            problem = f"a registered study has a fixed number of persons; leave {key!r} out"
-            raise study.error(problem, (key,))
 
 
 def _hash_of(scenario: Config, files: Mapping[str, str]) -> str:

@@ -304,15 +304,11 @@ def _faults_of_contrast(study: Study, asked: Contrast, path: KeyPath) -> Iterato
     if asked.contrast[0] == asked.contrast[1]:
         yield "contrast compares a level with itself", (*path, "contrast")
     if asked.over is None or path != (ANSWER,):
-        yield from _fault_of_place(study, asked, path)
-
-
-def _fault_of_place(study: Study, asked: Contrast, path: KeyPath) -> Iterator[Problem]:
-    """The levels of all other factors have to be given, or what is meant is open."""
-    given = {asked.factor, asked.over, *asked.within, *factors_in_rows(study)}
-    for name, levels in study.factors.items():
-        if len(levels) > 1 and name not in given:
-            yield f"should run over {name!r} or be within a level of it", path
+        # The levels of all other factors have to be given, or what is meant is open.
+        given = {asked.factor, asked.over, *asked.within, *factors_in_rows(study)}
+        for name, levels in study.factors.items():
+            if len(levels) > 1 and name not in given:
+                yield f"should run over {name!r} or be within a level of it", path
 
 
 def _faults_of_hypothesis(study: Study, name: str) -> Iterator[Problem]:

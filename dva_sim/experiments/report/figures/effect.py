@@ -60,7 +60,8 @@ class Differences(style.ReportFigure):
         zoomed = view.smallest_effect is not None and _zoom_on_small(axes, view.smallest_effect)
         mark_cuts(bars)
         _name(view, others, figure, axes, ends)
-        title = f"Difference against {name} in {_what(view)}"
+        excess = "excess " if view.part.has_reference(view.measure) else ""
+        title = f"Difference against {name} in {excess}{measure_name(view.measure)}"
         words = caption(
             "differences",
             baseline=name,
@@ -207,11 +208,6 @@ def _band(ax: Axes, bands: Band, look: Look, shift: float) -> float:
     ax.plot(x, bands.mean, "-", marker=look.mark, color=colour, ms=4.5)
     seen = present(bands.mean)
     return float(seen[-1]) if len(seen) else float("nan")
-
-
-def _what(view: StudyView) -> str:
-    in_excess = view.part.has_reference(view.measure)
-    return f"{'excess ' if in_excess else ''}{measure_name(view.measure)}"
 
 
 def cadences(view: StudyView, scenario: Mapping[str, Any]) -> list[Cadence | None]:

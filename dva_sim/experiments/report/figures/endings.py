@@ -20,7 +20,7 @@ from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import brief, level_name
-from dva_sim.statistics import CUT, Incidence, incidence
+from dva_sim.statistics import CUT, incidence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -94,13 +94,9 @@ def _shares(endings: Endings, mask: NDArray[np.bool_], times: Floats) -> dict[st
     ways = endings.ways[:-1]
     codes = {way: number for number, way in enumerate(ways, 1)}
     causes = np.array([codes.get(way, CUT) for way in endings.way[mask]], dtype=np.intp)
-    return shares_of(incidence(endings.time[mask], causes, len(ways)), ways, NOTHING, times)
-
-
-def shares_of(curve: Incidence, ways: Sequence[str], rest: str, times: Floats) -> dict[str, Floats]:
-    """Cumulative incidence of each way at some times `(n,)`, and what is left to none of them."""
+    curve = incidence(endings.time[mask], causes, len(ways))
     shares = {way: curve.at(times, code) for code, way in enumerate(ways, 1)}
-    return shares | {rest: 1.0 - sum(shares.values(), np.zeros_like(times))}
+    return shares | {NOTHING: 1.0 - sum(shares.values(), np.zeros_like(times))}
 
 
 def stack_in_time(
