@@ -114,7 +114,14 @@ class ControlRoomAgent:
                 for status in events:
                     self._note(status)
             case m.DispatchStatus():
-                self._switched(body)
+                before = self.dispatch
+                # What is published names no role.
+                role = body.role or (before.role if before else None)
+                self.dispatch = m.DispatchStatus(
+                    body.dispatch_mode, body.decide_within, body.switched, role
+                )
+                if before is None or before.dispatch_mode != body.dispatch_mode:
+                    self.on_dispatch(self.dispatch)
             case m.DeviceList(devices=devices):
                 self.devices = {device.id_tag: device for device in devices}
             case m.AuditRecord():
@@ -139,15 +146,6 @@ class ControlRoomAgent:
         closed = [n for n, status in self.events.items() if status.closed_for is not None]
         for number in sorted(closed)[:-MOST_CLOSED]:
             del self.events[number], self.received_at[number]
-
-    def _switched(self, status: m.DispatchStatus) -> None:
-        before = self.dispatch
-        role = status.role or (before.role if before else None)  # what is published names none
-        self.dispatch = m.DispatchStatus(
-            status.dispatch_mode, status.decide_within, status.switched, role
-        )
-        if before is None or before.dispatch_mode != status.dispatch_mode:
-            self.on_dispatch(self.dispatch)
 
     def _on_request(self, message: m.Message) -> m.Reply:
         """Answer a request of the DVA to a holder of robots: it has asked for nothing."""

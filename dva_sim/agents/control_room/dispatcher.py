@@ -158,7 +158,13 @@ class ScriptedDispatcher:
             return m.FalseAlarm(number, "as the script says", seen)
         if rule.sends == "others":
             return m.Escalate(number, "as the script says", seen)
-        chosen = self._earliest(rule.sends, proposal)
+        able = [
+            (who.arrival_in, who.device)
+            for who in proposal.candidates
+            if who.arrival_in is not None and self._kind(who.device) == rule.sends
+            if who.reason == FREE or who.device == proposal.device
+        ]
+        chosen = min(able)[1] if able else None
         if chosen is None and status.proposed is not None:
             chosen = proposal.device
         if chosen is None or chosen in (status.responder, status.actor):
@@ -169,29 +175,18 @@ class ScriptedDispatcher:
 
     def _rule(self, status: m.EventStatus, proposal: m.Proposal) -> Overrule | None:
         for place, rule in enumerate(self.profile.overrules):
-            if self._holds(rule, status, proposal):
+            below = rule.confidence_below
+            holds = (
+                rule.kind in (None, status.kind)
+                and status.severity >= rule.severity_from
+                and (below is None or status.confidence < below)
+                and rule.advised in (None, self._kind(proposal.device))
+            )
+            if holds:
                 whim = self._streams(f"overrule/{status.event_id}/{place}").random()
                 if whim < rule.share:
                     return rule
         return None
-
-    def _holds(self, rule: Overrule, status: m.EventStatus, proposal: m.Proposal) -> bool:
-        below = rule.confidence_below
-        return (
-            rule.kind in (None, status.kind)
-            and status.severity >= rule.severity_from
-            and (below is None or status.confidence < below)
-            and rule.advised in (None, self._kind(proposal.device))
-        )
-
-    def _earliest(self, kind: str, proposal: m.Proposal) -> str | None:
-        able = [
-            (who.arrival_in, who.device)
-            for who in proposal.candidates
-            if who.arrival_in is not None and self._kind(who.device) == kind
-            if who.reason == FREE or who.device == proposal.device
-        ]
-        return min(able)[1] if able else None
 
     def _kind(self, device: str | None) -> str | None:
         known = self.room.devices.get(device or "")

@@ -208,7 +208,8 @@ class PeriodEstimate:
             if lag < self.EARLY * delay:
                 return None
             if self._lags:
-                self._came(abs(lag - min(self._lags)))
+                span = self._periods + self.BLURRED
+                self._weigh(np.where(abs(lag - min(self._lags)) <= span, self.BLURRED / span, 0.0))
             self._lags.append(lag)
             return move._replace(seen=now)
         if move.ended is None:
@@ -221,11 +222,6 @@ class PeriodEstimate:
             self._weigh(1.0 - np.minimum(asked / self._periods, 1.0))
             return None
         return move
-
-    def _came(self, later: float) -> None:
-        """An effect came so much later than the soonest [s]: evenly, by up to a period."""
-        span = self._periods + self.BLURRED
-        self._weigh(np.where(later <= span, self.BLURRED / span, 0.0))
 
     def _lasted(self, lasts: float, asked: float) -> None:
         """A move lasted so long [s]: the whole periods just below what was asked, or just above."""

@@ -253,17 +253,14 @@ class Teleoperation(Work):
         """Count what a plug-in of a user got wrong; tell of the first time."""
         for plugged_in, whose, what in self._plugged_in:
             if plugged_in.failures != self._failures.get(whose, 0):
-                self._note(whose, plugged_in, what)
-
-    def _note(self, whose: str, plugged_in: Phone | CommandSender | Strategy, what: str) -> None:
-        known = self._failures.get(whose, 0)
-        failures = plugged_in.failures
-        self._failures[whose] = failures
-        if failures > known:
-            count = self._device.recorder.counters
-            count[f"failed: an answer of {whose}"] += failures - known
-            if not known:
-                self._device.tell(f"{what}: {plugged_in.first_failure}", "drive")
+                known = self._failures.get(whose, 0)
+                failures = plugged_in.failures
+                self._failures[whose] = failures
+                if failures > known:
+                    count = self._device.recorder.counters
+                    count[f"failed: an answer of {whose}"] += failures - known
+                    if not known:
+                        self._device.tell(f"{what}: {plugged_in.first_failure}", "drive")
 
     def _steer(self, seen: Observation, delay: float, usual: Callable[[float], Intent]) -> Intent:
         """Return the command to give; the guard's narrow mode is for those who know it holds them.

@@ -131,7 +131,8 @@ class HeldRobot:
                 on_result(True, f"{self.label} is yours")
             else:
                 self._be_gone()
-                on_result(False, f"{self.label}: {_why(reply)}")
+                why = reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
+                on_result(False, f"{self.label}: {why}")
 
         def unreachable() -> None:
             self._be_gone()
@@ -457,7 +458,3 @@ _NOT_NOW = {
     "stopping": "it has not stopped yet",
     "gone": "it is not yours",
 }
-
-
-def _why(reply: m.Reply) -> str:
-    return reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))

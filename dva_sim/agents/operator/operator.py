@@ -254,7 +254,11 @@ class OperatorAgent:
                 # or has meanwhile given the order for another robot.
                 body = m.OrderProgress(order.event_id, "done" if found else "failed")
                 device.ask(device.dva, body, ended, unheard)
-            self._be_free(drive)
+            if self._waiting and drive.session:
+                # Before it stands, the robot would refuse to start.
+                self.device.clock.call_after(self._habits.stands_after_s, self._put_away, drive)
+            else:
+                self._put_away(drive)  # nothing moves
 
         also = any(
             other.event_id == order.event_id and other.device != order.device
@@ -289,14 +293,6 @@ class OperatorAgent:
         work = self.works.get(robot)
         goes_on = work is not None and not work.over
         return goes_on or any(order.device == robot for _, order in self._waiting)
-
-    def _be_free(self, drive: Work) -> None:
-        """The robot was told to stop: what is next?"""
-        if self._waiting and drive.session:
-            # Before it stands, the robot would refuse to start.
-            self.device.clock.call_after(self._habits.stands_after_s, self._put_away, drive)
-        else:
-            self._put_away(drive)  # nothing moves
 
     def _put_away(self, drive: Work) -> None:
         del self.works[drive.robot]

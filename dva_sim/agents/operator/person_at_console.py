@@ -102,7 +102,15 @@ class PersonAgent:
         answers = Gathered(len(wanted), on_result)
         taken = []
         for robot in wanted:
-            held = self._hold(robot)
+            held = HeldRobot(
+                self.device,
+                robot,
+                lambda: self.console,
+                lambda: self._tilt(),
+                self._alert,
+                let_go=self._let_go,
+                wanted=self.robots.__contains__,
+            )
             held.on_frame = self._on_frame
             self.robots[robot] = held
             self.device.connect(robot)
@@ -117,17 +125,6 @@ class PersonAgent:
         for held in taken:
             self._note_event(held)
             held.ask(answers, level)
-
-    def _hold(self, robot: str) -> HeldRobot:
-        return HeldRobot(
-            self.device,
-            robot,
-            lambda: self.console,
-            lambda: self._tilt(),
-            self._alert,
-            let_go=self._let_go,
-            wanted=self.robots.__contains__,
-        )
 
     def release(self, on_result: OnResult) -> None:
         """Stop what is driven, give everything back, and leave the seat."""
@@ -225,7 +222,8 @@ class PersonAgent:
             case m.Order(device=str(), task="confirm") as order:
                 self._on_order(order)
             case m.OrderProgress(event_id=event, state="done"):
-                self._on_recall(event)
+                if self.order is not None and self.order.event_id == event:
+                    self._end_order(f"event {event} is settled, or another's", RECALLED)
             case m.HandoverRequest(device=robot, label=asker):
                 held = self.robots.get(robot)
                 if held is not None and held.is_driven:
@@ -257,10 +255,6 @@ class PersonAgent:
         if self.order is order and not self.attended:
             self.device.tell(f"declines event {order.event_id}: nobody sits here", "order")
             self._put_down("declined")
-
-    def _on_recall(self, event: int) -> None:
-        if self.order is not None and self.order.event_id == event:
-            self._end_order(f"event {event} is settled, or another's", RECALLED)
 
     def _put_down(self, state: str) -> None:
         assert self.order is not None

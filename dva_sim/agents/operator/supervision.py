@@ -197,7 +197,8 @@ class Supervision(Work):
             if status.mission_state in ("done", "failed"):
                 self.end("gave up", f"the robot: {status.reason or status.mission_state}")
                 return
-            self._note(status)
+            if self.waits_since is None and status.reason.endswith(IN_VIEW):
+                self.waits_since = self.log.waits_from = self._clock.now
             self._ask_later()
 
         body = m.GetMissionStatus()
@@ -205,8 +206,3 @@ class Supervision(Work):
 
     def _ask_later(self) -> None:
         self._clock.call_after(self._seat.person.habits.asking.mission_every_s, self._ask)
-
-    def _note(self, status: m.MissionStatus) -> None:
-        """A robot that says what is in view is there, and waits for the judgement."""
-        if self.waits_since is None and status.reason.endswith(IN_VIEW):
-            self.waits_since = self.log.waits_from = self._clock.now

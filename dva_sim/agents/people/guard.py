@@ -109,7 +109,10 @@ class GuardAgent(OnFoot):
             self.device.tell("is told that the order is over", "order")
             return
         if errand.order is not None:
-            self.device.tell(_in_words(errand.order), "order")
+            purpose = {"contain": " to contain it", "stand_by": " to stand by"}.get(
+                errand.order.task, ""
+            )
+            self.device.tell(f"is sent to event {errand.order.event_id}{purpose}", "order")
         if self._protocol.ready_at > self.device.clock.now:
             self.activity = "getting ready"
         self.device.clock.call_at(self._protocol.ready_at, self._depart, errand)
@@ -312,8 +315,3 @@ class GuardAgent(OnFoot):
 def _is_extinguished(kind: str) -> bool:
     """Return True for an event that an extinguisher ends, rather than a valve."""
     return KINDS[kind].contained_by == "extinguisher"
-
-
-def _in_words(order: m.Order) -> str:
-    purpose = {"contain": " to contain it", "stand_by": " to stand by"}.get(order.task, "")
-    return f"is sent to event {order.event_id}{purpose}"

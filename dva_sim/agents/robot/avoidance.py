@@ -195,7 +195,9 @@ class Avoidance:
         spokes = np.stack([np.cos(angles), np.sin(angles)], 1)
         places = (np.array(here) + rings[:, None, None] * spokes).reshape(-1, 2)
         widest = max(other.radius for other in others)
-        off = _gap_to(places, route) - self.radius - widest
+        difference = places[:, None] - route[None]
+        gaps = np.asarray(np.hypot(difference[..., 0], difference[..., 1]).min(axis=1))
+        off = gaps - self.radius - widest
         good = (off >= SPARE) & (self.room_at(places) >= self.radius + 0.02)
         for place in places[good]:  # nearest first
             if self._can_reach(np.array(here), place, others):
@@ -265,9 +267,3 @@ def _shifts(way: Floats, offset: float, sides: Floats, holds: Floats) -> Floats:
 def _keeps(others: Sequence[Nearby]) -> Floats:
     """Return the distance a lane has to keep from each, shape `(others, 1, 1)` [m]."""
     return np.array([other.keep + LANE_SPARE for other in others])[:, None, None]
-
-
-def _gap_to(places: Floats, line: Floats) -> Floats:
-    """Distance of places `(k, 2)` to the points of a line `(n, 2)` [m]."""
-    difference = places[:, None] - line[None]
-    return np.asarray(np.hypot(difference[..., 0], difference[..., 1]).min(axis=1))

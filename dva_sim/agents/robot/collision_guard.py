@@ -129,7 +129,11 @@ class CollisionGuard:
             if not speed > SLOWEST:
                 return 0.0
             reach = max(speed * TIME_TO_CONTACT, self.stopping_distance(speed)) + STEP
-            allowed = self._speed_for(self.free_way(pose, speed, turn_rate, others, reach))
+            free = self.free_way(pose, speed, turn_rate, others, reach)
+            # Both the brakes and the time to contact have to suffice.
+            late = self.deceleration * REACTION
+            braking = math.sqrt(late**2 + 2.0 * self.deceleration * free) - late
+            allowed = min(braking, free / TIME_TO_CONTACT)
             if allowed >= speed:
                 return speed
             speed = allowed
@@ -138,12 +142,6 @@ class CollisionGuard:
     def stopping_distance(self, speed: float) -> float:
         """From asking for a stop to standing [m]."""
         return speed * REACTION + speed**2 / (2.0 * self.deceleration)
-
-    def _speed_for(self, free: float) -> float:
-        """The highest speed at which both the brakes and the time to contact suffice [m/s]."""
-        late = self.deceleration * REACTION
-        braking = math.sqrt(late**2 + 2.0 * self.deceleration * free) - late
-        return min(braking, free / TIME_TO_CONTACT)
 
     def free_way(
         self,

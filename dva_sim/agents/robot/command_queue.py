@@ -330,8 +330,13 @@ class CommandQueue:
     def _begin(self, letters: list[Letter]) -> bool:
         """Work on letters; whether that is done already, as it takes no time."""
         self._busy = True
-        if self._paused:
-            self._take_more()
+        if (
+            self._paused
+            and self.flow is not None
+            and self._waiting.count(holders=True) <= self._limit // 2
+        ):
+            self._paused = False
+            self.flow.resume()
         duration = self.service()
         if duration > 0.0:
             if self._last is OTHER and not self._was_urgent:
@@ -384,12 +389,6 @@ class CommandQueue:
         self._waking = False
         if not self._busy:
             self._work()
-
-    def _take_more(self) -> None:
-        """Let published commands come again once half of the inbox is done."""
-        if self.flow is not None and self._waiting.count(holders=True) <= self._limit // 2:
-            self._paused = False
-            self.flow.resume()
 
     def _finish(self, letters: list[Letter]) -> None:
         """Processing is done; an emergency that came meanwhile is done with, too."""

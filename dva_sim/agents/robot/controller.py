@@ -146,15 +146,12 @@ class RobotController:
         """
         decision = self._handle(message, arrived, now, moving)
         if decision.waits and not waited:
-            self._ask_about(message)
+            # The sender may have been given a permission that is not known here yet.
+            if isinstance(message.body, m.DevSub):
+                self.inquiry.about_reader(message.source)
+            elif not isinstance(message.body, m.Reply):
+                self.inquiry.about_holder(message.source)
         return decision
-
-    def _ask_about(self, message: m.Message) -> None:
-        """A sender has no permission that is known here: it may have been given one since."""
-        if isinstance(message.body, m.DevSub):
-            self.inquiry.about_reader(message.source)
-        elif not isinstance(message.body, m.Reply):
-            self.inquiry.about_holder(message.source)
 
     def _handle(self, message: m.Message, arrived: float, now: float, moving: bool) -> Decision:
         body = message.body
@@ -419,7 +416,9 @@ class RobotController:
         """Decide on a subscription to a sensor: each one is permitted by name (S5)."""
         held = self._grants_of(message.source)
         if body.sensor not in {sensor.name for sensor in self.sensors}:
-            return Decision(m.UNKNOWN_SENSOR, f"no sensor of that name; {self._what_there_is()}")
+            names: Iterable[str] = (sensor.name for sensor in self.sensors)
+            offer = f"there are {', '.join(names) or 'none'}"
+            return Decision(m.UNKNOWN_SENSOR, f"no sensor of that name; {offer}")
         if not any(body.sensor in grant.sensors for grant in held):
             text = f"{message.source} may not subscribe to {body.sensor}"
             return self._full(message.source) or Decision(m.NOT_PERMITTED, text, waits=True)
@@ -456,10 +455,6 @@ class RobotController:
     def _grants_of(self, device: str) -> list[m.PermissionGrant]:
         grants = (self.grant, self.observers.get(device))
         return [grant for grant in grants if grant is not None and grant.holder == device]
-
-    def _what_there_is(self) -> str:
-        names: Iterable[str] = (sensor.name for sensor in self.sensors)
-        return f"there are {', '.join(names) or 'none'}"
 
     def _refusal(self, message: m.Message, level: str) -> Decision | None:
         """Return why a source may not act now, or None (S5)."""

@@ -67,7 +67,16 @@ class DecisionLog:
         """A message was decided on; arguments as of `RobotController.handle`."""
         values = {"arrived": arrived, "now": now, "moving": moving}
         values |= {"waited": True} if waited else {}
-        self._write({"message": encode(message).decode(), **values, **_as_data(decision)})
+        point = decision.set_point
+        self._write(
+            {
+                "message": encode(message).decode(),
+                **values,
+                "code": decision.code,
+                "text": decision.text,
+                "set_point": None if point is None else list(point),
+            }
+        )
 
     def happened(self, what: str, now: float) -> None:
         """Time, the world or a hand at the robot changed what it does: one of the words above."""
@@ -84,15 +93,6 @@ class DecisionLog:
 
     def _write(self, data: dict[str, Any]) -> None:
         self._take(json.dumps(data))
-
-
-def _as_data(decision: Decision) -> dict[str, Any]:
-    point = decision.set_point
-    return {
-        "code": decision.code,
-        "text": decision.text,
-        "set_point": None if point is None else list(point),
-    }
 
 
 def replay(
@@ -119,7 +119,16 @@ def replay(
         try:
             entry = json.loads(line)
             if controller is None:
-                controller = _controller(entry)
+                controller = RobotController(
+                    entry["robot"],
+                    entry["dva"],
+                    Limits(**entry["limits"]),
+                    camera_url=entry["camera_url"],
+                    sensors=tuple(m.Sensor(**sensor) for sensor in entry["sensors"]),
+                    clock_offset=entry["clock_offset"],
+                    # absent before there was a latch
+                    latch=EmergencyLatch(entry.get("release", DRIVE)),
+                )
                 asked = None
             else:
                 asked = _again(controller, entry)
@@ -137,18 +146,6 @@ def _in_words(error: Exception) -> str:
     if isinstance(error, KeyError):
         return f"{error} is missing"
     return error.msg if isinstance(error, json.JSONDecodeError) else str(error)
-
-
-def _controller(start: dict[str, Any]) -> RobotController:
-    return RobotController(
-        start["robot"],
-        start["dva"],
-        Limits(**start["limits"]),
-        camera_url=start["camera_url"],
-        sensors=tuple(m.Sensor(**sensor) for sensor in start["sensors"]),
-        clock_offset=start["clock_offset"],
-        latch=EmergencyLatch(start.get("release", DRIVE)),  # absent before there was a latch
-    )
 
 
 def _again(

@@ -14,7 +14,7 @@ from dva_sim.agents.robot.controller import (
     TimedSetPoint,
 )
 from dva_sim.agents.robot.manoeuvres import Sensed
-from dva_sim.agents.robot.missions import PERIOD, MissionGoal, Pilot, PilotStep
+from dva_sim.agents.robot.missions import PERIOD, MissionGoal, Pilot
 from dva_sim.agents.route_following import Reach
 from dva_sim.kernel.clock import Clock
 from dva_sim.worlds.bodies import RobotBody
@@ -133,7 +133,10 @@ class MissionLoop:
         def step() -> bool:
             if self._controller.mode is not Mode.MISSION or number != self._number:
                 return False  # stopped, or another mission has begun since
-            self._obey(pilot.step(self._look()))
+            step = pilot.step(self._look())
+            self._around.body.drive(*step.intent, self._around.clock.now + 2 * PERIOD)
+            if self._controller.mission_changed(step.state, step.left, step.reason):
+                self._on_news()
             return True
 
         around.clock.every(PERIOD, step)
@@ -142,8 +145,3 @@ class MissionLoop:
         view = self._observe()
         around = self._around
         return Sensed(around.clock.now, view, around.nearby(), around.body.jammed, self._charge())
-
-    def _obey(self, step: PilotStep) -> None:
-        self._around.body.drive(*step.intent, self._around.clock.now + 2 * PERIOD)
-        if self._controller.mission_changed(step.state, step.left, step.reason):
-            self._on_news()

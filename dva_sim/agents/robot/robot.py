@@ -524,14 +524,11 @@ class RobotAgent:
 
     def _announce_emergency(self) -> None:
         """Publish the latch, and ask the DVA for a release."""
-        self._publish_emergency()
-        self._ask_for_release()
-
-    def _publish_emergency(self) -> None:
         network = self.device.network
         me = self.device.id_tag
         if network.ready(me, EMERGENCY, WHATEVER_WAITS):
             self.device.publish(EMERGENCY, self.controller.latch.message(self.device.clock.now))
+        self._ask_for_release()
 
     def _ask_for_release(self) -> None:
         """Ask the DVA whether somebody has released the robot; one request is under way at most."""

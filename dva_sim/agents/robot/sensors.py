@@ -305,7 +305,10 @@ class RobotSensor:
         shown = self._follow(np.array(self._source(now)), now)
         if self.kind.noise > 0.0:
             shown = shown + self.kind.noise * self._normals(sample, len(shown))
-        self._shown = self._as_shown(shown)
+        kind = self.kind
+        digits = max(0, math.ceil(-math.log10(kind.resolution)))
+        stepped = np.round(np.clip(shown, kind.low, kind.high) / kind.resolution)
+        self._shown = tuple((stepped * kind.resolution).round(digits).tolist())
         return self._shown
 
     def _follow(self, truth: Floats, now: float) -> Floats:
@@ -325,12 +328,6 @@ class RobotSensor:
         if self._noise[0] != block or self._noise[1].shape[1] != count:
             self._noise = block, self._streams(f"noise {block}").normal(size=(BLOCK, count))
         return np.asarray(self._noise[1][place])
-
-    def _as_shown(self, values: Floats) -> Values:
-        kind = self.kind
-        digits = max(0, math.ceil(-math.log10(kind.resolution)))
-        stepped = np.round(np.clip(values, kind.low, kind.high) / kind.resolution)
-        return tuple((stepped * kind.resolution).round(digits).tolist())
 
 
 class Around(Protocol):

@@ -195,8 +195,9 @@ class OnePole(Filter):
         return self._speed, self._turn
 
     @property
+    @override
     def age(self) -> float:
-        """See `Filter`: the sum of k keep^k (1 - keep) over all k from 0 on."""
+        # The sum of k keep^k (1 - keep) over all k from 0 on.
         return self._keep / (1.0 - self._keep)
 
 

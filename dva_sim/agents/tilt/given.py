@@ -36,8 +36,9 @@ class GivenTilt(TiltApp):
         self._pose = calibrated(profile, profile.reference_mps2).pose
         self.pick_up(0.0)
 
+    @override
     def pick_up(self, now: float) -> None:
-        """See `TiltApp`: it is asked to stand."""
+        # It is asked to stand.
         super().pick_up(now)
         self._wanted = 0.0, 0.0
         self._tilt = self._tilted()
@@ -58,8 +59,8 @@ class GivenTilt(TiltApp):
             self._captured = self._trail.asked
         return super().look(now)
 
+    @override
     def _advance(self, now: float) -> None:
-        """The samples that were due by now."""
         while not self._ideal and (at := self._next_sample) <= now + TIE:
             if self._watches:
                 self._tilt = self._tilted()

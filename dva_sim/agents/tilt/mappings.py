@@ -154,8 +154,9 @@ class LeakyMapping(DifferentialMapping):
         level, self._turn = limited(self._speed_gain * outside(level, self._dead_level), grown)
         return level, self._turn
 
+    @override
     def tilt_for(self, wanted: Reading, shown: Reading, within: float) -> Reading:
-        """See `Mapping`: what closes the gap, and what holds the shown rate against the leak."""
+        # What closes the gap, and what holds the shown rate against the leak.
         held = within * shown[1] / self._leak
         return super().tilt_for((wanted[0], wanted[1] + held), shown, within)
 

@@ -118,7 +118,8 @@ class Submovements:
                 self.waited += passed
             self._gap += 0.2 * (min(now - self._last, 0.5) - self._gap)
         self._last = now
-        counted = self._counted(delay)
+        new = max(delay - self._usual, 0.0)
+        counted = min(delay, self._usual) + self._person.compensates * new
         tx, target_vx = foreseen(seen.target_x, seen.target_vx, counted, seen.edge)
         ty, target_vy = foreseen(seen.target_y, seen.target_vy, counted, seen.edge)
         x, y = self._predicted(now, seen, counted)
@@ -156,11 +157,6 @@ class Submovements:
             return False
         self._pressed = now
         return True
-
-    def _counted(self, delay: float) -> float:
-        """For how long what was asked for is taken not to be seen yet [s]."""
-        new = max(delay - self._usual, 0.0)
-        return min(delay, self._usual) + self._person.compensates * new
 
     def _rests_until(self, delay: float) -> float:
         """Return when it may act again [s]: at once, or once the last result is visible."""
