@@ -65,7 +65,8 @@ def exact_values(
         if parameter.default is parameter.empty and key not in given:
             raise ConfigError(f"formula {name!r} needs the parameter {key!r}")
     try:
-        return formula(**given), _references(formula)
+        _, _, text = (inspect.getdoc(formula) or "").partition("References:")
+        return formula(**given), " ".join(text.split())
     except (ArithmeticError, LookupError, TypeError) as error:
         problem = f"formula {name!r} does not hold for these parameters: {error}"
         raise ConfigError(problem) from error
@@ -160,12 +161,6 @@ def _preferences(lists: dict[str, Any], scenario: TimedScenario) -> list[list[in
         names = lists[next(iter(stream.zones))]
         orders.append([scenario.names.index(name) + 1 for name in names])
     return orders
-
-
-def _references(formula: Any) -> str:
-    """The sources that a formula's docstring names, in one line."""
-    _, _, text = (inspect.getdoc(formula) or "").partition("References:")
-    return " ".join(text.split())
 
 
 FOLDER = "experiments/validation"

@@ -181,7 +181,9 @@ def erlang_a(
     """
     rate = 1 / mean_service_s
     impatience = 1 / mean_patience_s
-    most = _longest_queue(arrival_rate, rate * servers, impatience)
+    # Beyond so long a queue, leaving is likelier by far.
+    balance = max(0.0, (arrival_rate - rate * servers) / impatience)
+    most = int(balance + 40 * math.sqrt(arrival_rate / impatience + 1) + 100)
     inside = np.arange(servers + most + 1)
     busy = np.minimum(inside, servers)
     deaths = busy * rate + (inside - busy) * impatience
@@ -225,12 +227,6 @@ def birth_death(births: Floats, deaths: Floats) -> Floats:
     logs = np.concatenate([[0.0], np.cumsum(np.log(births) - np.log(deaths))])
     weights = np.exp(logs - logs.max())
     return np.asarray(weights / weights.sum())
-
-
-def _longest_queue(arrival_rate: float, drain: float, impatience: float) -> int:
-    """A queue so long that longer ones do not count: beyond it, leaving is likelier by far."""
-    balance = max(0.0, (arrival_rate - drain) / impatience)
-    return int(balance + 40 * math.sqrt(arrival_rate / impatience + 1) + 100)
 
 
 def require_stable(load: float, who: str = "servers") -> None:

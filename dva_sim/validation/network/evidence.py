@@ -20,7 +20,6 @@ from dva_sim.validation.network.verdicts import (
     BY_NAME,
     KINDS,
     MIN_INSIDE,
-    CellVerdict,
     ComparedCell,
     ConditionGroup,
     ConditionKind,
@@ -68,7 +67,17 @@ def evidence(
 
 def lines_of(comparison: NetworkComparison, causes: Mapping[str, str]) -> list[Evidence]:
     """Every measure of every condition by its kind, misses that count with their causes."""
-    lines = [_of_band(verdict) for verdict in comparison.verdicts]
+    lines = [
+        replace(
+            _of_cell(verdict.cell),
+            low=_finite(verdict.low),
+            high=_finite(verdict.high),
+            holds_measured=verdict.cell.group.kind == "single",
+            verdict=_WORDS[verdict.word],
+            note=verdict.why,
+        )
+        for verdict in comparison.verdicts
+    ]
     outside = comparison.outside
     lines += [_of_score(s, id(s.cell) in outside) for s in comparison.pooled.scored]
     lines += [replace(_of_cell(cell), note="tells too little") for cell in comparison.rarely]
@@ -110,17 +119,6 @@ def _of_cell(cell: ComparedCell) -> Evidence:
 def _source(group: ConditionGroup) -> str:
     """The table of measurements."""
     return f"real sockets, {' and '.join(sorted({run.source for run in group.runs}))} runs"
-
-
-def _of_band(verdict: CellVerdict) -> Evidence:
-    return replace(
-        _of_cell(verdict.cell),
-        low=_finite(verdict.low),
-        high=_finite(verdict.high),
-        holds_measured=verdict.cell.group.kind == "single",
-        verdict=_WORDS[verdict.word],
-        note=verdict.why,
-    )
 
 
 def _of_score(scored: Scored, is_significant: bool) -> Evidence:

@@ -13,7 +13,6 @@ from functools import partial
 from dva_sim.agents.operator.published import LineKind, RuleConfig, TargetLine
 from dva_sim.validation.evidence import RULE, Evidence, share_rule
 from dva_sim.validation.evidence_page import ResultSheet, ValidationResult
-from dva_sim.validation.frame import Row
 from dva_sim.validation.operators.experiments import TRIED
 from dva_sim.validation.operators.people_figures import draw_curves
 from dva_sim.validation.operators.trials import Cells, Found, certain, mean
@@ -73,7 +72,13 @@ def evidence(
         sheets=[
             ResultSheet("How they steered", ("experiment", "share"), steered(played), STEERING)
         ],
-        tables={"steered": _shares(played)},
+        tables={
+            "steered": [
+                {"experiment": name, "cell": cell, STEERED: mean(trials, STEERED)}
+                for name, cells in _steering(played).items()
+                for cell, trials in cells.items()
+            ]
+        },
         draw=partial(draw_curves, played),
     )
 
@@ -167,11 +172,3 @@ def _steering(played: Mapping[str, Cells]) -> dict[str, Cells]:
         for name, cells in played.items()
         if all(STEERED in trials.columns for trials in cells.values())
     }
-
-
-def _shares(played: Mapping[str, Cells]) -> list[Row]:
-    return [
-        {"experiment": name, "cell": cell, STEERED: mean(trials, STEERED)}
-        for name, cells in _steering(played).items()
-        for cell, trials in cells.items()
-    ]

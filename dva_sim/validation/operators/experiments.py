@@ -412,20 +412,16 @@ def walker_values(cells: Cells) -> Values:
 LATE = "link.down.delay_s"
 
 
-def _tilt_cells() -> dict[str, dict[str, Any]]:
-    return {
-        tilt_cell(gain, name): {"device.gain": scale, "task.selection": selection}
-        for gain, scale in GAINS.items()
-        for name, selection in SELECTIONS.items()
-    }
-
-
-def _frame_cells() -> dict[str, dict[str, Any]]:
-    return {
-        frame_cell(rate, delay): {"frames.rate_hz": rate, LATE: delay}
-        for rate in FRAME_RATES
-        for delay in FRAME_DELAYS_S
-    }
+_TILT_CELLS: dict[str, dict[str, Any]] = {
+    tilt_cell(gain, name): {"device.gain": scale, "task.selection": selection}
+    for gain, scale in GAINS.items()
+    for name, selection in SELECTIONS.items()
+}
+_FRAME_CELLS: dict[str, dict[str, Any]] = {
+    frame_cell(rate, delay): {"frames.rate_hz": rate, LATE: delay}
+    for rate in FRAME_RATES
+    for delay in FRAME_DELAYS_S
+}
 
 
 def _both_ways(delay: float) -> dict[str, Any]:
@@ -450,7 +446,7 @@ _FEW = {"trials": 3, "practice": 1}
 
 EXPERIMENTS: tuple[Experiment, ...] = (
     Experiment("lag", "fitts-lag", {lag: {LATE: s} for lag, s in LAGS_S.items()}, lag_values, _ONE),
-    Experiment("tilt", "fitts-tilt", _tilt_cells(), tilt_values, _TWO),
+    Experiment("tilt", "fitts-tilt", _TILT_CELLS, tilt_values, _TWO),
     Experiment("steering", "steering-law", {"tunnel": {}}, steering_values, _TWO),
     Experiment(
         "latency",
@@ -474,7 +470,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         _ONE,
     ),
     Experiment("tracking", "tracking", {"tracking": {}}, tracking_values),
-    Experiment("frames", "frame-rate", _frame_cells(), frame_values, _ONE),
+    Experiment("frames", "frame-rate", _FRAME_CELLS, frame_values, _ONE),
     Experiment("moving", "moving-target", _moving_cells(), moving_values, _QUICK),
     Experiment(
         "click",

@@ -15,14 +15,14 @@ from typing_extensions import override
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.emulator.forwarder import links_of
 from dva_sim.network.link import Link, PartedLink
-from dva_sim.network.middleware import CommandTransport, load_transport
+from dva_sim.network.middleware import load_transport
 from dva_sim.network.pattern_runs import RunLog
 from dva_sim.network.workload import Note, NoteKind, OperatorWorkload
 from dva_sim.simulation.measures.commands import Row
 from dva_sim.simulation.measures.middleware import command_row
 from dva_sim.simulation.middleware import MiddlewareScenario
 from dva_sim.simulation.middleware.run import LINGER_S, Window
-from dva_sim.validation.network.beside.carriers import Act, BetweenPrograms, Carrier, carrier_of
+from dva_sim.validation.network.beside.carriers import Act, BetweenPrograms, carrier_of
 
 PROGRAM_S = 0.0005
 """From the arrival of a command's last packet to its application: assumed. It also decides what
@@ -84,21 +84,21 @@ class VirtualRun:
         self._up = CountedLink(up)
         self._down = CountedLink(down)
         pictures = scenario.pictures
-        self._carrier = self._carried_by(
-            load_transport(scenario.transport.name, scenario.transport.options)(),
+        between = BetweenPrograms(
+            self._clock,
+            self._up,
+            self._down,
             0 if pictures is None else pictures.bytes,
+            self._hear,
+            lambda number: None,
         )
+        transport = load_transport(scenario.transport.name, scenario.transport.options)()
+        self._carrier = carrier_of(transport, between)
         self._operator = OperatorWorkload(
             self._clock, self._carrier, self._note, scenario.command_rate_hz
         )
         self._notes: list[Note] = []
         self._pictures = 0
-
-    def _carried_by(self, transport: CommandTransport, picture_bytes: int) -> Carrier:
-        between = BetweenPrograms(
-            self._clock, self._up, self._down, picture_bytes, self._hear, lambda number: None
-        )
-        return carrier_of(transport, between)
 
     def play(self) -> Row:
         """The measures of the run, by the columns of a real one."""

@@ -121,7 +121,11 @@ def measure(condition: Condition, seed: int, link: str = PACKETS) -> Row:
     results = measure_log(log, condition.warm_s, condition.dur_s) | outcome.link
     if condition.pattern != "req-rep":
         results |= {"timeouts": math.nan, "alerts": math.nan}
-    row = condition.to_row() | _written(results) | {"realtime": str(int(outcome.realtime))}
+    written = {
+        name: "" if math.isnan(value) else f"{round(value, _DECIMALS):.10g}"
+        for name, value in results.items()
+    }
+    row = condition.to_row() | written | {"realtime": str(int(outcome.realtime))}
     return {name: row[name] for name in COLUMNS}
 
 
@@ -137,13 +141,6 @@ def job_of(condition: Condition, seed: int, link: str = PACKETS) -> EmulatedJob:
         congestion=condition.cc,
         link=link,
     )
-
-
-def _written(results: Mapping[str, float]) -> Row:
-    return {
-        name: "" if math.isnan(value) else f"{round(value, _DECIMALS):.10g}"
-        for name, value in results.items()
-    }
 
 
 class Table(AbstractContextManager["Table"]):
