@@ -210,7 +210,13 @@ class Roadmap:
 
     def _node_at(self, point: Point) -> int | None:
         """The nearest node in sight of a point."""
-        rows, columns = self._cells_around(point)
+        # Planning cells whose nodes may be within `SNAP` of the point.
+        reach = math.ceil(SNAP / (self._block * self._grid.resolution)) + 1
+        here = (at // self._block for at in self._grid.to_cell(*point))
+        rows, columns = (
+            slice(max(0, min(at - reach, most)), max(0, min(at + reach + 1, most)))
+            for at, most in zip(here, self._room.shape, strict=True)
+        )
         spots = self._at[rows, columns].reshape(-1, 2)
         gaps = np.hypot(*(spots - point).T)
         free = self._room[rows, columns].ravel() >= self._clearance
@@ -220,16 +226,6 @@ class Roadmap:
                 row, column = divmod(int(index), columns.stop - columns.start)
                 return int((rows.start + row) * self._room.shape[1] + columns.start + column)
         return None
-
-    def _cells_around(self, point: Point) -> tuple[slice, slice]:
-        """Rows and columns of the planning cells whose nodes may be within `SNAP` of a point."""
-        reach = math.ceil(SNAP / (self._block * self._grid.resolution)) + 1
-        here = (at // self._block for at in self._grid.to_cell(*point))
-        first, second = (
-            slice(max(0, min(at - reach, most)), max(0, min(at + reach + 1, most)))
-            for at, most in zip(here, self._room.shape, strict=True)
-        )
-        return first, second
 
     def room_at(self, points: Floats) -> Floats:
         """Room at many points `(n, 2)` [m]."""

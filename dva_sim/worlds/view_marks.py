@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.site import Site
-from dva_sim.worlds.site_parts import BaseStation, FixedCamera, Room
+from dva_sim.worlds.site_parts import BaseStation, FixedCamera
 
 Floats = NDArray[np.float64]
 
@@ -69,18 +69,14 @@ def draw_equipment(ax: Axes, site: Site, small_marks: bool = True) -> None:
     _draw_bases(ax, site)
     _draw_desks(ax, site)
     if small_marks:
-        _draw_small_marks(ax, site)
-
-
-def _draw_small_marks(ax: Axes, site: Site) -> None:
-    _draw_detectors(ax, site)
-    for post in site.guard_posts:
-        _mark(ax, post, "P", 4.5, mfc=INK, mec="white", mew=0.5, zorder=3.5)
-    for camera in site.cameras:
-        look = (3, 0, math.degrees(camera.heading) - 90)
-        _mark(ax, camera, look, 4.5, color=CAMERA, mew=0, zorder=3.6)
-    for station in site.base_stations:
-        _mark(ax, station, mast(), 7, mfc="none", mec=STATION, mew=0.7, zorder=3.6)
+        _draw_detectors(ax, site)
+        for post in site.guard_posts:
+            _mark(ax, post, "P", 4.5, mfc=INK, mec="white", mew=0.5, zorder=3.5)
+        for camera in site.cameras:
+            look = (3, 0, math.degrees(camera.heading) - 90)
+            _mark(ax, camera, look, 4.5, color=CAMERA, mew=0, zorder=3.6)
+        for station in site.base_stations:
+            _mark(ax, station, mast(), 7, mfc="none", mec=STATION, mew=0.7, zorder=3.6)
 
 
 def _mark(
@@ -185,7 +181,19 @@ def write_names(ax: Axes, site: Site, least: float = 0.0) -> None:
         found = _best(area, room.name, things, metre, least)
         if found is not None:
             setting, x, y = found
-            _write(ax, room, setting, x, y)
+            ax.text(
+                x,
+                y,
+                setting.text,
+                ha="center",
+                va="center",
+                rotation=90 if setting.turned else 0,
+                fontsize=setting.size,
+                linespacing=LINE,
+                color=FAINT_INK if room.outdoor and not room.paved else INK,
+                zorder=4,
+                clip_on=True,
+            )
 
 
 def _things(site: Site) -> list[Any]:
@@ -293,22 +301,6 @@ def _spots(area: Any, width: float, height: float) -> NDArray[np.float64]:
         *((spots - ((xmin + xmax) / 2, (ymin + ymax) / 2)) / (xmax - xmin, ymax - ymin)).T
     )
     return np.asarray(spots[np.argsort(away, kind="stable")])
-
-
-def _write(ax: Axes, room: Room, setting: NameLayout, x: float, y: float) -> None:
-    ax.text(
-        x,
-        y,
-        setting.text,
-        ha="center",
-        va="center",
-        rotation=90 if setting.turned else 0,
-        fontsize=setting.size,
-        linespacing=LINE,
-        color=FAINT_INK if room.outdoor and not room.paved else INK,
-        zorder=4,
-        clip_on=True,
-    )
 
 
 # --- scale and direction ---------------------------------------------------------------

@@ -163,7 +163,10 @@ class Camera:
     def _looks(self, hits: Hits) -> tuple[Floats, Floats]:
         """Depth and light of each hit."""
         surfaces = self._surfaces
-        light = surfaces.light[hits.surface] * _corners(hits, surfaces.dark_ends)
+        # Darker towards the corners of a room, so that they show.
+        gap = np.abs(hits.along[:, None] - surfaces.dark_ends[hits.surface]).min(axis=1)
+        corners = np.asarray(1.0 - 0.22 * np.exp(gap * -3.5), dtype=np.float32)
+        light = surfaces.light[hits.surface] * corners
         return hits.depth, light * _dim(hits.depth)
 
     def _texels(self, fall: Floats) -> Any:
@@ -287,9 +290,3 @@ def _pixels(start: float, size: float, count: int, texels: int) -> tuple[slice, 
 def _dim(depth: Floats) -> Floats:
     """Light that is left at a depth."""
     return np.asarray(1.0 / (1.0 + depth * (1.0 / DUSK)), dtype=np.float32)
-
-
-def _corners(layer: Hits, corners: Floats) -> Floats:
-    """Darker towards the corners of a room, so that they show."""
-    gap = np.abs(layer.along[:, None] - corners[layer.surface]).min(axis=1)
-    return np.asarray(1.0 - 0.22 * np.exp(gap * -3.5), dtype=np.float32)

@@ -48,7 +48,9 @@ class RoomGrid:
         self.origin = xmin - BORDER, ymin - BORDER
         rows, columns = (BLOCK * int(np.ceil(side / self.cell / BLOCK)) for side in sides)
         self.numbers = _room_numbers(site, self.origin, self.cell, (rows, columns))
-        self.palette = _palette(FACADE if site.rooms else PLAIN)
+        hues = (0.58 + GOLDEN * np.arange(ACCENTS)) % 1.0
+        accents = [colorsys.hls_to_rgb(float(hue), 0.56, 0.42) for hue in hues]
+        self.palette = np.array([FACADE if site.rooms else PLAIN, *accents, (0.78, 0.78, 0.80)])
         self.accent = _accents(site)
         self.outdoor = np.array([True, *(room.outdoor for room in site.rooms)])
 
@@ -64,13 +66,6 @@ class RoomGrid:
         index *= columns
         index += column.astype(np.int32)
         return np.asarray(self.numbers.take(index))
-
-
-def _palette(outside: tuple[float, float, float]) -> NDArray[np.float64]:
-    """Colours of rooms, 0 to 1, `(ACCENTS + 2, 3)`: none, then the accents, then corridors."""
-    hues = (0.58 + GOLDEN * np.arange(ACCENTS)) % 1.0
-    accents = [colorsys.hls_to_rgb(float(hue), 0.56, 0.42) for hue in hues]
-    return np.array([outside, *accents, (0.78, 0.78, 0.80)])
 
 
 def _accents(site: Site) -> Ints:

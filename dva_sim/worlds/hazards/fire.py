@@ -134,8 +134,9 @@ class Fire(Hazard):
         radiated = RADIATIVE_FRACTION * self.heat_release(time)
         return _radiant(radiated, math.dist(self.position, point), self.radius(time))
 
+    @override
     def radius(self, time: float) -> float:
-        """See `Hazard`: radius of the burning floor."""
+        # Radius of the burning floor.
         return math.sqrt(self.heat_release(time) / HEAT_PER_AREA / math.pi)
 
     def danger_radius(self, time: float) -> float:
@@ -149,8 +150,9 @@ class Fire(Hazard):
         radiated = RADIATIVE_FRACTION * self.heat_release(time)
         return max(LEAST_DANGER, math.sqrt(radiated / (4.0 * math.pi * TENABLE_HEAT)))
 
+    @override
     def severity(self, time: float) -> float:
-        """See `Hazard`: heat release, of the 1055 kW that define the growth classes."""
+        # Heat release, of the 1055 kW that define the growth classes.
         return min(1.0, self.heat_release(time) / FULL_GROWTH_KW)
 
     @override
@@ -321,7 +323,8 @@ class FireField(SolvedField):
         if layer is None:
             return Conditions(AMBIENT, heat)
         heat += _glow(layer.temperature, layer.extinction * layer.depth)
-        share = _within(layer.bottom)
+        # How far breathing height lies within the layer, 0 to 1.
+        share = min(1.0, max(0.0, (BREATHING_HEIGHT - layer.bottom) / BLUR + 0.5))
         return make_conditions(
             temperature=AMBIENT + share * (layer.temperature - AMBIENT),
             heat_flux=heat,
@@ -411,8 +414,9 @@ class FireField(SolvedField):
     def haze(self, places: SitePoints, time: float) -> Floats:
         return np.asarray(self.extinctions(time)[places.spaces])
 
+    @override
     def alarm(self, detector: str, x: float, y: float) -> DetectorAlarm:
-        """See `HazardField`: under a ceiling, where the jet arrives and smoke gathers."""
+        # Under a ceiling, where the jet arrives and smoke gathers.
         space = self.building.space_at(x, y)
 
         def air(age: float) -> Conditions:
@@ -461,11 +465,6 @@ def _radiant(radiated: float, distance: float, radius: float) -> float:
     """Radiant heat so far from the middle of flames that have a radius [m], in [kW/m^2]."""
     distance = max(distance, radius, 0.1)
     return float(radiated / (4.0 * math.pi * distance * distance))
-
-
-def _within(bottom: float) -> float:
-    """Return how far breathing height lies within a layer with this lower face [m], 0 to 1."""
-    return min(1.0, max(0.0, (BREATHING_HEIGHT - bottom) / BLUR + 0.5))
 
 
 def _glow(temperature: float, optical_depth: float) -> float:

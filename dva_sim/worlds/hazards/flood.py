@@ -57,8 +57,9 @@ class Flood(Hazard):
         """Water that has come until `time` [s], in [m^3]."""
         return self.inflow * max(0.0, time - self.start)
 
+    @override
     def radius(self, time: float) -> float:
-        """See `Hazard`: of a film on an open floor."""
+        # Of a film on an open floor.
         return min(LARGEST, math.sqrt(self.volume(time) / (math.pi * FILM)))
 
     def danger_radius(self, time: float) -> float:
@@ -75,8 +76,9 @@ class Flood(Hazard):
         deep = min(self.volume(time) / BASIN, balance) > DEEP
         return math.sqrt(BASIN / math.pi) if deep else LEAST_DANGER
 
+    @override
     def severity(self, time: float) -> float:
-        """See `Hazard`: the water that has come."""
+        # The water that has come.
         return min(1.0, self.volume(time) / FULL_VOLUME)
 
     @override

@@ -137,8 +137,9 @@ class GasLeak(Hazard):
         ages, radii = _reach(self.release, self.kind_of_gas.danger, self.diffusivity, loss)
         return max(LEAST_DANGER, float(np.interp(time - self.start, ages, radii)))
 
+    @override
     def severity(self, time: float) -> float:
-        """See `Hazard`: how much air the gas can bring to its danger level."""
+        # How much air the gas can bring to its danger level.
         cloud = self.release * max(0.0, time - self.start) / self.kind_of_gas.danger
         return min(1.0, cloud / FULL_CLOUD)
 
@@ -146,16 +147,18 @@ class GasLeak(Hazard):
     def field(self, site: Site) -> LeakField:
         return LeakField(self, site)
 
+    @override
     def noticed_by(self) -> tuple[str, ...]:
-        """See `Hazard`: carbon monoxide has detectors of its own."""
+        # Carbon monoxide has detectors of its own.
         return ("co",) if self.gas == "carbon_monoxide" else self.detectors
 
     @override
     def explodes_at(self) -> float:
         return self.kind_of_gas.lower
 
+    @override
     def sprite(self, time: float, ceiling: float) -> Sprite | None:
-        """See `Hazard`: a bottle."""
+        # A bottle.
         from dva_sim.worlds.camera.sprites import bottle  # late: start-up
 
         return bottle()
@@ -250,8 +253,9 @@ class LeakField(SolvedField):
 
         return share
 
+    @override
     def alarm(self, detector: str, x: float, y: float) -> DetectorAlarm:
-        """See `HazardField`: of the leak as it is seen from there."""
+        # Of the leak as it is seen from there.
         share = self.seen_from(x, y)
         return alarm_in(detector, lambda age: self._air_with(share(age)))
 
@@ -292,16 +296,13 @@ class LeakField(SolvedField):
         if time <= self._leak.start:
             return np.zeros(places.spaces.shape)
         if not self._indoors:
-            return self._plume_picture(places, time)
+            shares = [self._outdoors(x, y, time) for x, y in places.points.reshape(-1, 2).tolist()]
+            return np.array(shares).reshape(places.spaces.shape)
         share = self.state(time)
         share[-1] = 0.0  # what was carried out is nowhere
         if self._nodes is None or self._nodes[0] is not places:
             self._nodes = places, places.of(mesh_in(self.building).nodes)
         return np.minimum(1.0, share[self._nodes[1]])
-
-    def _plume_picture(self, places: SitePoints, time: float) -> Floats:
-        shares = [self._outdoors(x, y, time) for x, y in places.points.reshape(-1, 2).tolist()]
-        return np.array(shares).reshape(places.spaces.shape)
 
     @override
     def solve(self) -> tuple[March, Step]:

@@ -99,7 +99,11 @@ class SmokeLayers:
         bottom, kelvin = self.layers(state)
         new = state + self._spilt(state, bottom, kelvin, dt)
         new[self._room] += dt * self._risen(heat, float(bottom[self._room]))
-        self._cool(new, bottom, dt)
+        # Heat is lost to the ceiling and to the walls within the layer.
+        depth = self._spaces.ceiling - bottom[:-1]
+        surface = self._spaces.area + self._around * depth
+        rate = WALL_LOSS * surface / (HEAT_CAPACITY * np.maximum(new[:-1, MASS], 1e-9))
+        new[:-1, HEAT] /= 1.0 + rate * dt
         self._overflow(new)
         return new
 
@@ -169,13 +173,6 @@ class SmokeLayers:
         flow *= share * np.sqrt(np.abs(over)) * inside
         out = flow.sum(axis=2)
         return out, (flow * heights).sum(axis=2) / np.maximum(out, 1e-12)
-
-    def _cool(self, state: Floats, bottom: Floats, dt: float) -> None:
-        """Heat lost to the ceiling and to the walls within the layer."""
-        depth = self._spaces.ceiling - bottom[:-1]
-        surface = self._spaces.area + self._around * depth
-        rate = WALL_LOSS * surface / (HEAT_CAPACITY * np.maximum(state[:-1, MASS], 1e-9))
-        state[:-1, HEAT] /= 1.0 + rate * dt
 
     def _overflow(self, state: Floats) -> None:
         """Push what a space cannot hold to where there is room, or out through cracks."""
