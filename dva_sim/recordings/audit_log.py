@@ -127,7 +127,12 @@ class AuditLog:
         self.head = NOTHING_BEFORE
         is_new = not path.exists() or _holds_nothing(path)
         if not is_new:
-            self._refuse_what_is_broken()
+            found = verify(self.path)
+            if found.problem is not None:
+                text = f"row {found.problem.number} {found.problem.text}"
+                raise ConfigError(f"is not an audit log that can be appended to: {text}", self.path)
+            self.number = found.rows
+            self.head = found.head
         try:
             self._file = sqlite3.connect(
                 path, isolation_level=None, timeout=OPEN_WITHIN, check_same_thread=False
@@ -138,14 +143,6 @@ class AuditLog:
                 self._file.executescript(_TABLES)
         except sqlite3.Error as error:
             raise ConfigError(f"cannot be used as an audit log: {error}", path) from None
-
-    def _refuse_what_is_broken(self) -> None:
-        found = verify(self.path)
-        if found.problem is not None:
-            text = f"row {found.problem.number} {found.problem.text}"
-            raise ConfigError(f"is not an audit log that can be appended to: {text}", self.path)
-        self.number = found.rows
-        self.head = found.head
 
     def append(self, entries: Sequence[AuditEntry]) -> list[AuditRow]:
         """Add rows, all or none; when this returns they are on the disk.

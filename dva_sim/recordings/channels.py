@@ -51,7 +51,16 @@ def placed(time: float, moved: Sequence[tuple[str, TrackPoint]]) -> Iterator[Cha
     """Yield the poses of the agents that moved at a moment, by name."""
     for name, p in moved:
         yield _pose(name, POSE, p)
-    transforms = [_transform(name, p) for name, p in moved]
+    transforms = [
+        {
+            "timestamp": messages.stamp(p.time),
+            "parent_frame_id": FRAME,
+            "child_frame_id": name,
+            "translation": messages.point(p.x, p.y),
+            "rotation": messages.turned(p.heading),
+        }
+        for name, p in moved
+    ]
     yield ChannelMessage(time, "/tf", "foxglove.FrameTransforms", {"transforms": transforms})
 
 
@@ -112,16 +121,6 @@ def fixes(playback: Playback) -> Iterator[ChannelMessage]:
 def _pose(name: str, what: str, p: TrackPoint) -> ChannelMessage:
     pose = messages.pose(p.x, p.y, p.heading)
     return stamped(p.time, f"/{name}/{what}", "foxglove.PoseInFrame", frame_id=FRAME, pose=pose)
-
-
-def _transform(name: str, p: TrackPoint) -> dict[str, Any]:
-    return {
-        "timestamp": messages.stamp(p.time),
-        "parent_frame_id": FRAME,
-        "child_frame_id": name,
-        "translation": messages.point(p.x, p.y),
-        "rotation": messages.turned(p.heading),
-    }
 
 
 GRIDS = "/fields/"
@@ -433,7 +432,25 @@ def network_messages(playback: Playback) -> Iterator[ChannelMessage]:
 def sent_message(sent: Sent, names: Mapping[str, str]) -> ChannelMessage:
     """A message as it went onto the network; of a frame, what it stands for."""
     if isinstance(sent.payload, CameraFrame):
-        return _frame(sent, names)
+        frame = sent.payload
+        seen = frame.observation
+        hazards = [
+            {"kind": h.kind, "x_m": round(h.x, 2), "y_m": round(h.y, 2)} for h in seen.hazards
+        ]
+        return stamped(
+            sent.time,
+            f"/{names[sent.source]}/{CAMERA}",
+            "dva_sim.Frame",
+            to=names[sent.destination],
+            size_bytes=sent.size,
+            captured_s=frame.captured,
+            tick_ms=seen.tick,
+            x_m=round(seen.x, messages.PLACES),
+            y_m=round(seen.y, messages.PLACES),
+            heading_rad=round(seen.heading, messages.PLACES),
+            visibility_m=round(seen.visibility, 2),
+            hazards=hazards,
+        )
     topic = f"{MESSAGES}/{names[sent.source]}/{names[sent.destination]}"
     return ChannelMessage(sent.time, topic, XML, sent.payload)
 
@@ -547,23 +564,3 @@ def picture(time: float, name: str, jpeg: bytes) -> ChannelMessage:
     data = base64.b64encode(jpeg).decode()
     schema = "foxglove.CompressedImage"
     return stamped(time, f"/{name}/{IMAGE}", schema, frame_id=name, format="jpeg", data=data)
-
-
-def _frame(sent: Sent, names: Mapping[str, str]) -> ChannelMessage:
-    frame: CameraFrame = sent.payload
-    seen = frame.observation
-    hazards = [{"kind": h.kind, "x_m": round(h.x, 2), "y_m": round(h.y, 2)} for h in seen.hazards]
-    return stamped(
-        sent.time,
-        f"/{names[sent.source]}/{CAMERA}",
-        "dva_sim.Frame",
-        to=names[sent.destination],
-        size_bytes=sent.size,
-        captured_s=frame.captured,
-        tick_ms=seen.tick,
-        x_m=round(seen.x, messages.PLACES),
-        y_m=round(seen.y, messages.PLACES),
-        heading_rad=round(seen.heading, messages.PLACES),
-        visibility_m=round(seen.visibility, 2),
-        hazards=hazards,
-    )

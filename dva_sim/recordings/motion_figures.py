@@ -58,6 +58,7 @@ def figures_of(motion: PhoneMotion, path: Path) -> MotionFigures:
     steps = [b.stamp - a.stamp for a, b in pairwise(samples) if b.stamp > a.stamp]
     usual = median(steps)
     even = [step for step in steps if step <= GAP * usual]
+    late = [sample.came - sample.at for sample in samples if not math.isnan(sample.came)]
     return MotionFigures(
         samples=len(samples),
         duration_s=samples[-1].stamp - samples[0].stamp,
@@ -65,16 +66,11 @@ def figures_of(motion: PhoneMotion, path: Path) -> MotionFigures:
         jitter=pstdev(even) / usual,
         gaps=len(steps) - len(even),
         longest_gap_s=max(steps),
-        late_ms=_late_ms(samples),
+        late_ms=1000.0 * median(late) if late else None,
         noise_mg=1000.0 * min(map(_noise, _stretches(samples, usual))) / GRAVITY,
         resolution_mg=1000.0 * _resolution(samples) / GRAVITY,
         largest_g=max(abs(part) for sample in samples for part in sample.xyz) / GRAVITY,
     )
-
-
-def _late_ms(samples: list[MotionSample]) -> float | None:
-    late = [sample.came - sample.at for sample in samples if not math.isnan(sample.came)]
-    return 1000.0 * median(late) if late else None
 
 
 def _stretches(samples: list[MotionSample], step: float) -> list[list[MotionSample]]:

@@ -113,8 +113,10 @@ class RecordedSurroundings(Surroundings):
         super().__init__(site, hazards)
         self._grids = grids
 
+    @override
     def contain(self, number: int, time: float) -> None:
-        """See `Surroundings`: it was, and the file shows what came of it."""
+        # It was, and the file shows what came of it.
+        return
 
     @override
     def raster(self, what: str, time: float, cell: float = 0.25) -> Raster:

@@ -260,7 +260,12 @@ def _write(
     # What stands here at the beginning is there even if the end of the file is not.
     writer.add_metadata(ABOUT, _about(playback) | about | {DIGEST: digest(attached)})
     for name, data in attached.items():
-        writer.add_attachment(0, 0, name, _media_type(name), data)
+        kinds = {
+            ".json": "application/json",
+            ".geojson": "application/geo+json",
+            ".png": "image/png",
+        }
+        writer.add_attachment(0, 0, name, kinds.get(Path(name).suffix, "application/yaml"), data)
     _add_messages(writer, playback, files, decided)
     writer.finish()
 
@@ -402,8 +407,3 @@ def _plain(value: Any) -> Any:
 
 def _json(data: Any) -> bytes:
     return json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
-
-
-def _media_type(name: str) -> str:
-    kinds = {".json": "application/json", ".geojson": "application/geo+json", ".png": "image/png"}
-    return kinds.get(Path(name).suffix, "application/yaml")

@@ -76,8 +76,10 @@ class DrawnBody:
             return [self._trail]
         here = self._moments.at(self.name, time)
         self._mark.set_data([here.x], [here.y])
+        outline = style.OUTLINES[self.kind]
+        pointed: Any = MarkerStyle(Path([*outline, outline[0]], closed=True))
         self._mark.set(
-            marker=_pointed(style.OUTLINES[self.kind]).rotated(rad=here.heading),
+            marker=pointed.rotated(rad=here.heading),
             markersize=self.size() * style.LENGTHS[self.kind],
             markerfacecolor=style.colour_of(self.kind, here.mode),
         )
@@ -93,7 +95,10 @@ class DrawnBody:
         moved = np.hypot(*np.diff(places, axis=0).T) > 1e-3
         self._trail.set_segments(np.stack([places[:-1], places[1:]], axis=1)[moved])
         colours = [
-            to_rgba(style.colour_of(self.kind, p.mode), _fading(time - p.time))
+            to_rgba(
+                style.colour_of(self.kind, p.mode),
+                0.1 + 0.75 * math.exp(-(time - p.time) / style.TRAIL_S),
+            )
             for p, here in zip(past[1:], moved, strict=True)
             if here
         ]
@@ -127,13 +132,3 @@ class _Ghost:
         self._cone.set_theta1(heading - self._half)
         self._cone.set_theta2(heading + self._half)
         return [self._cone, self._ring]
-
-
-def _pointed(outline: tuple[tuple[float, float], ...]) -> Any:
-    """A marker from the outline of a body that heads east."""
-    return MarkerStyle(Path([*outline, outline[0]], closed=True))
-
-
-def _fading(age: float) -> float:
-    """Return the opacity of a trail of some age [s]."""
-    return 0.1 + 0.75 * math.exp(-age / style.TRAIL_S)

@@ -42,7 +42,9 @@ class DrawnFields:
         self._moments = moments
         west, south, east, north = moments.recording.site.extent
         self._cell = max(CELL, ((east - west) * (north - south) / MOST_CELLS) ** 0.5)
-        lower = _lower_limit(moments)
+        # Of several gases the one that explodes first counts.
+        limits = [incident.hazard.explodes_at() for incident in moments.recording.incidents]
+        lower = min(1.0, *limits)
         paints: dict[str, Callable[[NDArray[Any]], NDArray[Any]]] = {
             "water": _water,
             "heat": _heat,
@@ -126,12 +128,6 @@ class _Source:
             return []
         self._marks.set_data(*zip(*places, strict=True))
         return [self._marks]
-
-
-def _lower_limit(moments: Moments) -> float:
-    """Lower explosive limit of what leaks; of several gases, of the one that explodes first."""
-    limits = [incident.hazard.explodes_at() for incident in moments.recording.incidents]
-    return min(1.0, *limits)
 
 
 def _over(upper: NDArray[Any], under: NDArray[Any]) -> NDArray[Any]:

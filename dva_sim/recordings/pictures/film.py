@@ -46,7 +46,8 @@ class Film:
         runs = [Moments(recording) for recording in recordings]
         self.duration = max(r.duration for r in recordings)
         self.speed = max(1.0, round(self.duration / LENGTH_S))
-        heading = f"{heading_of(recordings)}{_shown_at(self.speed)}"
+        pace = f"; shown {self.speed:g} times as fast" if self.speed > 1 else ""
+        heading = f"{heading_of(recordings)}{pace}"
         sheet = Sheet(runs, len(runs), len(runs), heading, EYE if inset else TRAFFIC, DPI)
         self.figure = sheet.figure
         self._parts: list[Any] = []
@@ -84,10 +85,6 @@ class Film:
             for artist in part.show(time):
                 artist.draw(renderer)
         return np.asarray(self._canvas.buffer_rgba())[:, :, :3].copy()
-
-
-def _shown_at(speed: float) -> str:
-    return f"; shown {speed:g} times as fast" if speed > 1 else ""
 
 
 class _Eye:

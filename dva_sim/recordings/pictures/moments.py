@@ -135,19 +135,15 @@ class Moments:
         smoke = None
         if "smoke" in self.shown:
             smoke = SmokeView(raster("smoke", time), raster("layer", time))
+        others = (name for name in self.tracks if name != robot)
         return self._cameras[size].picture(
             Pose(here.x, here.y, here.heading),
-            self._others(robot, time),
+            [self._figure(name, time) for name in others if self.is_there(name, time)],
             [incident.hazard for incident in self.going_on(time)],
             smoke,
             raster("water", time) if "water" in self.shown else None,
             time,
         )
-
-    def _others(self, robot: str, time: float) -> list[Figure]:
-        """Everybody else who is still on the site."""
-        others = (name for name in self.tracks if name != robot)
-        return [self._figure(name, time) for name in others if self.is_there(name, time)]
 
     def _figure(self, name: str, time: float) -> Figure:
         here = self.at(name, time)

@@ -71,7 +71,9 @@ class Scene:
         draw_site(ax, site, small_marks=points_per_metre(ax) > style.ROOMY, least=style.LEAST)
         # What hazards must not cover is drawn after them.
         self._upper: list[Any] = [
-            artist for artist in ax.get_children() if _is_above_hazards(artist)
+            artist
+            for artist in ax.get_children()
+            if artist.get_zorder() > LAYER and not isinstance(artist, Axis | Spine)
         ]
         for artist in self._upper:
             artist.set_animated(True)
@@ -106,7 +108,8 @@ class Scene:
             return ended
         timeline = self._moments.recording.recorder.timeline
         text = _newest_line(timeline, time) if self._outlook is None else self._outlook
-        self._story_line.set_text(_shortened(text, int(self._across() / (PLAIN * style.FONT))))
+        most = int(self._across() / (PLAIN * style.FONT))
+        self._story_line.set_text(text if len(text) <= most else f"{text[: most - 1].rstrip()}…")
         line: Artist = self._story_line
         return line
 
@@ -146,11 +149,6 @@ class _Sheet:
         renderer.draw_image(renderer.new_gc(), 0, 0, self._pixels)
 
 
-def _is_above_hazards(artist: Artist) -> bool:
-    """Return True if a part of the site is drawn above hazards: walls, doors, names."""
-    return artist.get_zorder() > LAYER and not isinstance(artist, Axis | Spine)
-
-
 def _colour_of(verdict: RunVerdict) -> str:
     """Return the colour of the box with a run's outcome."""
     if not verdict.good:
@@ -162,8 +160,3 @@ def _newest_line(timeline: Sequence[Moment], time: float) -> str:
     """The newest line of the story."""
     reports = [m for m in timeline if m.time <= time and m.kind != "link"]
     return f"{reports[-1].who} {reports[-1].what}".replace("_", " ") if reports else ""
-
-
-def _shortened(text: str, most: int) -> str:
-    """The text, or as many letters of it as there is room for."""
-    return text if len(text) <= most else f"{text[: most - 1].rstrip()}…"
