@@ -258,7 +258,9 @@ class AnswerWatch:
         self._silently[node].extend([self._now()] * (refused - answers))
         if node in self._excused or refused or answers:
             return
-        if _is_for_somebody(passing.payload) and not is_message(passing.payload):
+        # Late replies are dropped with their request; a picture is no message.
+        is_for_somebody = isinstance(passing.payload, bytes) and b"<reply>" not in passing.payload
+        if is_for_somebody and not is_message(passing.payload):
             self._breach(node, "neither answers nor counts what is no message")
 
     def tap(self, node: str) -> _Tap:
@@ -327,11 +329,6 @@ class _Tap:
 
     def heard(self, publisher: str, payload: Any) -> None:
         """Ignore publications."""
-
-
-def _is_for_somebody(payload: Any) -> bool:
-    """Return True unless it is a picture, or a reply: late ones are dropped with their request."""
-    return isinstance(payload, bytes) and b"<reply>" not in payload
 
 
 def is_message(data: bytes) -> bool:

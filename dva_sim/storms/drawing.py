@@ -52,21 +52,9 @@ def draw(seed: int, profile: str = "all") -> StormPlan:
     if profile not in PROFILES:
         raise ConfigError(unknown("profile", profile, PROFILES))
     chance = random.Random(f"storm {seed}")
-    scenario = _scenario(chance)
-    if scenario["link"]["delay_s"] >= SLOW_LINK:
-        scenario["request"]["timeout_s"] = SLOW_TIMEOUT
-    counts = {kind: scenario[kind]["count"] for kind in ("robot", "guard", "operator")}
-    counts["driver"] = drivers = chance.randint(1, min(3, counts["robot"]))
-    kinds = PROFILES[profile]
-    count = round(chance.uniform(10, 60)) if kinds else 0
-    faults = sorted((_fault(chance, kinds, counts) for _ in range(count)), key=lambda f: f.at_s)
-    return StormPlan(seed, scenario, tuple(faults), STORM, drivers)
-
-
-def _scenario(chance: random.Random) -> dict[str, Any]:
     robots = chance.choice((2, 2, 3, 4, 6))
     guards = chance.choice((0, 0, 1, 2))
-    return {
+    scenario: dict[str, Any] = {
         "site": _site(chance),
         "robot": {
             "count": robots,
@@ -103,6 +91,14 @@ def _scenario(chance: random.Random) -> dict[str, Any]:
         },
         "events": [_event(chance, number) for number in range(chance.randint(5, 16))],
     }
+    if scenario["link"]["delay_s"] >= SLOW_LINK:
+        scenario["request"]["timeout_s"] = SLOW_TIMEOUT
+    counts = {kind: scenario[kind]["count"] for kind in ("robot", "guard", "operator")}
+    counts["driver"] = drivers = chance.randint(1, min(3, counts["robot"]))
+    kinds = PROFILES[profile]
+    count = round(chance.uniform(10, 60)) if kinds else 0
+    faults = sorted((_fault(chance, kinds, counts) for _ in range(count)), key=lambda f: f.at_s)
+    return StormPlan(seed, scenario, tuple(faults), STORM, drivers)
 
 
 def _site(chance: random.Random) -> dict[str, Any]:
@@ -140,7 +136,7 @@ def _fault(chance: random.Random, kinds: tuple[str, ...], counts: dict[str, int]
     (name,) = chance.choices(there, [FAULTS[name].weight for name in there])
     kind = FAULTS[name]
     target = _device(chance, kind.strikes, counts)
-    source = _device(chance, _SOURCES, counts) if _passes(name) else ""
+    source = _device(chance, _SOURCES, counts) if name.startswith(("messages", "partition")) else ""
     lasts = _duration(chance, kind)
     at = round(chance.uniform(FIRST, STORM - lasts - 45.0), 3)
     on = chance.choice(kind.on) if kind.on and chance.random() < 0.6 else ""
@@ -155,10 +151,6 @@ def _fault(chance: random.Random, kinds: tuple[str, ...], counts: dict[str, int]
         on=on,
         value=round(chance.uniform(*kind.value), 3),
     )
-
-
-def _passes(name: str) -> bool:
-    return name.startswith(("messages", "partition"))
 
 
 def _duration(chance: random.Random, kind: FaultKind) -> float:

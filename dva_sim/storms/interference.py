@@ -186,7 +186,8 @@ def holds_tilt(speed: float, chance: random.Random) -> Meddling:
     turn = chance.uniform(-0.5, 0.5)
 
     def rule(interference: Interference, passing: PassingMessage) -> bool:
-        message = _read(passing.payload) if b"<SetTeleOp" in _bytes(passing.payload) else None
+        data = passing.payload if isinstance(passing.payload, bytes) else b""
+        message = _read(passing.payload) if b"<SetTeleOp" in data else None
         if message is None or not isinstance(message.body, m.SetTeleOp):
             return False
         body = message.body._replace(speed=speed, turn_rate=turn)
@@ -211,10 +212,6 @@ def freezes_pictures(_: float, __: random.Random) -> Meddling:
         return True
 
     return rule
-
-
-def _bytes(payload: Any) -> bytes:
-    return payload if isinstance(payload, bytes) else b""
 
 
 def _read(data: bytes) -> m.Message | None:

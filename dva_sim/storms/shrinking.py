@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any, Final
 
@@ -104,7 +104,8 @@ class Shrinker:
         while len(self.plan.scenario["events"]) > 1:
             before = self.plan
             for number in range(len(before.scenario["events"])):
-                yield self._with("events", _all_but(self.plan.scenario["events"], number))
+                events = self.plan.scenario["events"]
+                yield self._with("events", events[:number] + events[number + 1 :])
                 if self.plan is not before:
                     break
             else:
@@ -131,7 +132,3 @@ def _without(plan: StormPlan, size: int) -> Iterator[tuple[Fault, ...]]:
     """Yield the faults without so many neighbours, from each place."""
     for first in range(0, len(plan.faults), size):
         yield plan.faults[:first] + plan.faults[first + size :]
-
-
-def _all_but(items: Sequence[Any], number: int) -> list[Any]:
-    return [item for place, item in enumerate(items) if place != number]
