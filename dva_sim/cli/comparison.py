@@ -77,7 +77,9 @@ def tell(
         ConfigError: no such measure or factor.
     """
     for name, side in zip("AB", comparison.sides, strict=True):
-        console.print(escape(f"{name}: {side.folder}: {program(side)}{_set(side)}"), soft_wrap=True)
+        changed = ", ".join(map(str, side.manifest.get("set", ())))
+        line = f"{name}: {side.folder}: {program(side)}" + (changed and f", --set {changed}")
+        console.print(escape(line), soft_wrap=True)
         if side.failures:
             failed = f"{len(side.failures)} runs of {name} failed and take no part"
             console.print(failed, style="yellow", soft_wrap=True)
@@ -108,11 +110,6 @@ def _verdict(verdict: GateVerdict) -> str:
     if here == there:
         return f"{where}: {values}"
     return f"{where}: {values}; without a value: A {100 * here:.3g} %, B {100 * there:.3g} %"
-
-
-def _set(side: Results) -> str:
-    changed = ", ".join(map(str, side.manifest.get("set", ())))
-    return f", --set {changed}" if changed else ""
 
 
 def _questions(comparison: Comparison) -> list[str]:

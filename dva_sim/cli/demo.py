@@ -59,7 +59,9 @@ def demo(out: Path, jobs: int | None) -> ExitCode:
     with _film_under_way(out / FILM):
         code = study_runs.run(RunOptions(STUDY, out, quick=True, jobs=jobs))
     if code in (ExitCode.OK, ExitCode.RUNS_FAILED):
-        _tell(out, time.monotonic() - began)
+        say(f"Took {time.monotonic() - began:.0f} s, and {sum(os.times()[:4]):.0f} s of CPU time.")
+        say(f"In the terminal: dva-sim show {out}")
+        say(f"The study at its published size takes ten minutes: dva-sim run {STUDY}")
     return code
 
 
@@ -94,10 +96,3 @@ def _say_when_done(maker: subprocess.Popen[bytes], part: Path, path: Path) -> No
     if maker.wait() == 0:
         part.replace(path)
         say(f"Film: {path}")
-
-
-def _tell(out: Path, took_s: float) -> None:
-    """Print what it took, and what to do next."""
-    say(f"Took {took_s:.0f} s, and {sum(os.times()[:4]):.0f} s of CPU time.")
-    say(f"In the terminal: dva-sim show {out}")
-    say(f"The study at its published size takes ten minutes: dva-sim run {STUDY}")

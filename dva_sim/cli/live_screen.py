@@ -94,15 +94,6 @@ class Board:
             table.add_row(*(Text(cell) for cell in _cells(label, row)))
         return table
 
-    def lines_of_story(self) -> Text:
-        """The last lines of the story."""
-        return Text("\n".join(story_line(line) for line in self.story[-STORY_LINES:]))
-
-    def state_of_events(self) -> str:
-        """Summarise the events in a line."""
-        lines = [f"event {e['number']} ({e['kind']}) is {e['state']}" for e in self.events]
-        return "; ".join(lines) or "no event was reported"
-
 
 def story_line(line: list[Any]) -> str:
     """A line of the timeline."""
@@ -171,7 +162,8 @@ def _watched(
         def hear(_: str, report: Report) -> None:
             _say_where(screen.console, board, report)
             board.hear(report)
-            screen.update(Group(board.table(), board.lines_of_story()))
+            story = "\n".join(story_line(line) for line in board.story[-STORY_LINES:])
+            screen.update(Group(board.table(), Text(story)))
 
         summary = make(hear, door, viewer).run()
     for line in board.story:
@@ -260,7 +252,9 @@ class InOrder:
 
 def _conclude(console: Console, board: Board, summary: Summary, options: LiveOptions) -> None:
     console.print(board.table())
-    _print(console, f"The run ended ({summary.why}): {board.state_of_events()}.")
+    events = [f"event {e['number']} ({e['kind']}) is {e['state']}" for e in board.events]
+    how = "; ".join(events) or "no event was reported"
+    _print(console, f"The run ended ({summary.why}): {how}.")
     counters: dict[str, int] = {}
     for part, report in summary.latest.items():
         detail(f"  {part}: at most {1000 * report.lateness:.1f} ms late")

@@ -72,7 +72,9 @@ def _options_of(options: type) -> list[Parameter]:
 
 def _option(name: str, of: Any, form: OptionForm, default: Any) -> Parameter:
     """Return an option as a parameter that Typer understands."""
-    kind, is_optional = _kind(of)
+    kinds = get_args(of) if isinstance(of, UnionType) else (of,)
+    kind = get_args(kinds[0])[0] if get_origin(kinds[0]) in (tuple, Mapping) else kinds[0]
+    is_optional = NoneType in kinds
     about: dict[str, Any] = {"help": form.help, "metavar": form.metavar or _METAVARS.get(kind)}
     if form.words or form.folders:
         about["autocompletion"] = _completer(form)
@@ -92,16 +94,6 @@ def _option(name: str, of: Any, form: OptionForm, default: Any) -> Parameter:
 
 
 _METAVARS: dict[Any, str] = {str: "NAME", int: "N", float: "SECONDS", Path: "FILE"}
-
-
-def _kind(of: Any) -> tuple[Any, bool]:
-    """Return the type of one value on a command line, and whether the value may be missing.
-
-    Where several types are allowed it is the first.
-    """
-    kinds = get_args(of) if isinstance(of, UnionType) else (of,)
-    first = get_args(kinds[0])[0] if get_origin(kinds[0]) in (tuple, Mapping) else kinds[0]
-    return first, NoneType in kinds
 
 
 def _completer(form: OptionForm) -> Callable[[str], list[str]]:

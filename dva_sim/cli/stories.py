@@ -107,12 +107,6 @@ def tell_story(playback: Playback, console: Console) -> None:
     console.print(table)
 
 
-def tell_side_by_side(runs: Sequence[Playback], console: Console) -> None:
-    """Print the outcomes of runs under several patterns, side by side."""
-    console.rule("side by side")
-    print_lines(story(runs), console)
-
-
 def tell_outcome(tables: Tables, how: str, console: Console, found: Sequence[Verdict] = ()) -> None:
     """Print the outcome of a run.
 
@@ -403,7 +397,8 @@ def episode(request: EpisodeRequest, where: Console = console) -> None:
         runs.append(request.play(scenario))
         tell(runs[-1], where)
     if len(runs) > 1:
-        tell_side_by_side([run.kept for run in runs if isinstance(run.kept, Recording)], where)
+        where.rule("side by side")
+        print_lines(story([run.kept for run in runs if isinstance(run.kept, Recording)]), where)
     _say_written(request.write(runs), request.pictures, where)
 
 

@@ -77,7 +77,8 @@ def storm(
             _tell_failure(outcome, profile)
             failed.append(outcome)
         if not quiet and not is_known:
-            _progress(tally, hours)
+            of = f" of {hours:g}" if hours else ""
+            typer.echo(f"{tally.storms} storms, {tally.hours:.1f}{of} fleet-hours", err=True)
         if hours and tally.hours >= hours:
             break
     _tell(tally, known)
@@ -143,11 +144,6 @@ def _keep_failure(plan: StormPlan, outcome: StormOutcome, folder: Path, profile:
     file.with_suffix(".txt").write_text("".join(story) + again.error, encoding="utf-8")
     file.write_text(small.text(), encoding="utf-8")
     typer.echo(f"  {len(plan.faults)} faults cut to {len(small.faults)}: dva-sim storm {file}")
-
-
-def _progress(tally: StormTally, hours: float | None) -> None:
-    of = f" of {hours:g}" if hours else ""
-    typer.echo(f"{tally.storms} storms, {tally.hours:.1f}{of} fleet-hours", err=True)
 
 
 def _tell(tally: StormTally, known: int) -> None:

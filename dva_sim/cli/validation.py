@@ -124,7 +124,10 @@ def _tell(sheet: ResultSheet) -> None:
     table = _table(sheet.heads, with_heads=True)
     for row in sheet.rows:
         if len(row) > 1:
-            table.add_row(*map(escape, row[:-1]), _coloured(row[-1]))
+            verdict = row[-1]
+            style = _STYLES.get(verdict.partition(":")[0])
+            coloured = f"[{style}]{escape(verdict)}[/]" if style else escape(verdict)
+            table.add_row(*map(escape, row[:-1]), coloured)
             continue
         if table.row_count:
             where.print(table)
@@ -140,11 +143,6 @@ def _table(heads: Sequence[str], with_heads: bool) -> Table:
     for head in heads:
         table.add_column(escape(head), ratio=_WIDTHS.get(head, 3), overflow="fold")
     return table
-
-
-def _coloured(verdict: str) -> str:
-    style = _STYLES.get(verdict.partition(":")[0])
-    return f"[{style}]{escape(verdict)}[/]" if style else escape(verdict)
 
 
 def _bar() -> bars.Progress:
