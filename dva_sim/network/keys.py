@@ -177,7 +177,10 @@ def create_keys(folder: str | Path, ids: Iterable[str]) -> list[str]:
     ids = list(ids)
     _require_curve()
     for device in ids:
-        _check_id(device)
+        if not _ID.fullmatch(device):
+            raise ConfigError(
+                f"{device!r} cannot be the id of a device: letters, digits and :._- make one"
+            )
     try:
         (folder / "public").mkdir(parents=True, exist_ok=True)
         (folder / "secret").mkdir(mode=0o700, exist_ok=True)
@@ -188,7 +191,7 @@ def create_keys(folder: str | Path, ids: Iterable[str]) -> list[str]:
 
 def _create(folder: Path, device: str) -> bool:
     """Make what is missing; whether a new pair was needed."""
-    public_file = _public_file(folder, device)
+    public_file = folder / "public" / f"{_stem(device)}.key"
     secret_file = _secret_file(folder, device)
     if public_file.exists():
         _check_owner(public_file, device, _read_public(public_file)[0])
@@ -282,20 +285,9 @@ def _check_owner(file: Path, device: str, owner: str) -> None:
         raise ConfigError(f"belongs to {owner}; {device} would have the same file", file)
 
 
-def _check_id(device: str) -> None:
-    if not _ID.fullmatch(device):
-        raise ConfigError(
-            f"{device!r} cannot be the id of a device: letters, digits and :._- make one"
-        )
-
-
 def _stem(device: str) -> str:
     """The id as a file name: not every file system takes a colon."""
     return device.replace(":", "-")
-
-
-def _public_file(folder: Path, device: str) -> Path:
-    return folder / "public" / f"{_stem(device)}.key"
 
 
 def _secret_file(folder: Path, device: str) -> Path:

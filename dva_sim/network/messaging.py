@@ -243,7 +243,9 @@ class Requester:
         """Send a request, over a new connection if there is none."""
         asked.attempts += 1
         if len(self._deadlines) > MOST_ANSWERED + 2 * len(self._open):
-            self._forget_answered()
+            # The first stays, as its event is on its way.
+            first, *others = self._deadlines
+            self._deadlines = deque([first, *(each for each in others if each[1] in self._open)])
         self._deadlines.append((self._clock.now + self.timeout, asked.tag, asked.attempts))
         if len(self._deadlines) == 1:
             self._clock.call_at(self._deadlines[0][0], self._look_at_deadlines)
@@ -276,11 +278,6 @@ class Requester:
             self._deadlines.popleft()
         if self._deadlines:
             self._clock.call_at(self._deadlines[0][0], self._look_at_deadlines)
-
-    def _forget_answered(self) -> None:
-        """Drop deadlines of what was answered; the first stays, as its event is on its way."""
-        first, *others = self._deadlines
-        self._deadlines = deque([first, *(each for each in others if each[1] in self._open)])
 
     def _expire(self, tag: int, attempt: int) -> None:
         asked = self._open.get(tag)

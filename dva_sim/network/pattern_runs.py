@@ -381,7 +381,12 @@ def measure_log(log: RunLog, warm_s: float, dur_s: float) -> Measures:
     found["skip_frac"] = _skipped(np.flatnonzero(sent), numbers[inside])
     found["first_seq"] = float(numbers.min()) if len(numbers) else math.nan
     found |= summary("age", applied[inside] - issued[numbers[inside]])
-    found |= summary("rtt", _round_trips(log, issued, sent, end))
+    trips = [
+        when - log.start - issued[number]
+        for number, when in log.replied
+        if sent[number] and when - log.start < end
+    ]
+    found |= summary("rtt", np.array(trips))
     looks = np.asarray(warm_s + STALE_STEP_S * np.arange(round(dur_s / STALE_STEP_S)))
     found |= summary("stale", AgeInForce(issued[numbers], applied, 0.0).at(looks))
     gaps = np.diff(np.concatenate([[warm_s], applied[inside], [end]])) * MS
@@ -410,12 +415,3 @@ def _skipped(sent: NDArray[np.intp], applied: NDArray[np.intp]) -> float:
         return math.nan
     due = sent[sent <= applied.max()]
     return float(1 - np.isin(due, applied).mean()) if len(due) else math.nan
-
-
-def _round_trips(log: RunLog, issued: Floats, sent: NDArray[np.bool_], end: float) -> Floats:
-    trips = [
-        when - log.start - issued[number]
-        for number, when in log.replied
-        if sent[number] and when - log.start < end
-    ]
-    return np.array(trips)

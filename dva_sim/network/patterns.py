@@ -236,8 +236,9 @@ class PubSub(Pattern):
     when_slow = "commands queue without bound"
     published = True
 
+    @override
     def offer(self, command: Command) -> None:
-        """See `Pattern`: send and forget."""
+        # Send and forget.
         self.line.publish(command)
 
 

@@ -282,8 +282,9 @@ class PartedLink(Link):
             return None
         return self._whole.carry(now, size)
 
+    @override
     def carry_train(self, now: float, packets: int, size: int) -> float | None:
-        """See `Link`: packets that are kept back are looked at one by one."""
+        # Packets that are kept back are looked at one by one.
         if any(gap.covers(now) for gap in self._gaps):
             return None
         return self._whole.carry_train(now, packets, size)
@@ -385,8 +386,9 @@ class RadioLink(Link):
         if self._law is not None:
             self._wobble = self._noted
 
+    @override
     def is_ideal(self) -> bool:
-        """See `Link`: the next place may have no reception."""
+        # The next place may have no reception.
         return False
 
     @override
@@ -403,14 +405,17 @@ class RadioLink(Link):
             if here.loss and self._uniforms.draw(now) < here.loss:
                 self.lost += 1
                 return None
-            arrival = max(arrival, self._air.depart(now, size) + self._lag()) + here.extra_delay_s
+            # The last packet's lag by the law of the link; uniform jitter counts by its mean.
+            lag = self.delay if self._law is None else self._base + self._deviation
+            arrival = max(arrival, self._air.depart(now, size) + lag) + here.extra_delay_s
         if self._may_overtake:
             return arrival
         self._newest = max(self._newest, arrival)
         return self._newest
 
+    @override
     def carry_train(self, now: float, packets: int, size: int) -> float | None:
-        """See `Link`: in the air each packet has a fate of its own."""
+        # In the air each packet has a fate of its own.
         return None
 
     @override
@@ -421,14 +426,6 @@ class RadioLink(Link):
         assert self._law is not None
         self._deviation = self._law(now)
         return self._deviation
-
-    def _lag(self) -> float:
-        """From leaving the air to arriving [s]: what the link's own law gave the last packet.
-
-        Uniform jitter is the exception, a packet that the air holds up takes its mean: what was
-        found out with it stays as it was.
-        """
-        return self.delay if self._law is None else self._base + self._deviation
 
     def _full(self, now: float, size: int, rate_bps: float) -> bool:
         """Return True if the queue before the radio is full; the radio has its place's rate."""

@@ -72,8 +72,9 @@ class ConstantRate(Serialiser):
         self._free_at = start + size * self._seconds_per_byte
         return self._free_at
 
+    @override
     def offer(self, now: float, size: int, room: int) -> float | None:
-        """See `Serialiser`: both steps in one, because every packet comes here."""
+        # Both steps in one, because every packet comes here.
         start = self._free_at
         seconds_per_byte = self._seconds_per_byte
         if start > now:
@@ -126,8 +127,9 @@ class TraceRate(Serialiser):
             self._backlog -= queued.popleft()[1]
         return float(self._backlog)
 
+    @override
     def last_departure(self) -> float:
-        """See `Serialiser`: at the opportunity that was used last."""
+        # At the opportunity that was used last.
         return self._time_of(self._index)
 
     @override
@@ -176,8 +178,9 @@ class PacketQueue(Serialiser):
         self._leaving.append(left_at)
         return left_at
 
+    @override
     def has_room(self, now: float, size: int, room: int) -> bool:
-        """See `Serialiser`: packets are counted instead of bytes."""
+        # Packets are counted instead of bytes.
         leaving = self._leaving
         while leaving and leaving[0] <= now:
             leaving.popleft()

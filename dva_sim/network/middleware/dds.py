@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from html import escape
-from typing import Any, Final
+from typing import Final
 
 from typing_extensions import override
 
@@ -84,13 +84,13 @@ class _DdsEnd(TransportEnd):
 
     def await_robot(self, ready_by: float) -> None:
         """Wait until each end has found the other."""
-        while not (self._writer.get_matched_subscriptions() and self._matched()):
+        while not (
+            self._writer.get_matched_subscriptions()
+            and list(self._reader.get_matched_publications())
+        ):
             if time.monotonic() > ready_by:
                 raise TransportError("the robot does not answer")
             time.sleep(_STEP)
-
-    def _matched(self) -> list[Any]:
-        return list(self._reader.get_matched_publications())
 
     @override
     def send(self, data: bytes) -> bool:

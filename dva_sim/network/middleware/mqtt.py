@@ -184,10 +184,12 @@ class _Broker:
     def __init__(self, address: str, port: int, nodelay: bool) -> None:
         self._place = address, port
         self._refuse_taken_port()
-        configuration = _nameless(
-            "configuration",
+        configuration = os.memfd_create("configuration")
+        os.fchmod(configuration, 0o600)
+        os.write(
+            configuration,
             f"listener {port} {address}\nallow_anonymous true\nuser root\nlog_dest stderr\n"
-            f"log_type error\nset_tcp_nodelay {str(nodelay).lower()}\n",
+            f"log_type error\nset_tcp_nodelay {str(nodelay).lower()}\n".encode(),
         )
         me = os.getpid()
         try:
@@ -216,11 +218,3 @@ class _Broker:
     def close(self) -> None:
         """End it."""
         end_all([self._process], 0.0)
-
-
-def _nameless(name: str, text: str) -> int:
-    """Return the open file, of this process alone, with a text."""
-    file = os.memfd_create(name)
-    os.fchmod(file, 0o600)
-    os.write(file, text.encode())
-    return file

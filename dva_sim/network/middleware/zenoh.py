@@ -93,14 +93,11 @@ class _ZenohEnd(TransportEnd):
             express=options.express,
         )
         if is_near:
-            self._await_robot(place.ready_by)
-
-    def _await_robot(self, ready_by: float) -> None:
-        while not self._publisher.matching_status.matching:
-            if time.monotonic() > ready_by:
-                self.close()
-                raise TransportError("the robot does not answer")
-            time.sleep(_AGAIN)
+            while not self._publisher.matching_status.matching:
+                if time.monotonic() > place.ready_by:
+                    self.close()
+                    raise TransportError("the robot does not answer")
+                time.sleep(_AGAIN)
 
     @override
     def send(self, data: bytes) -> bool:

@@ -89,7 +89,14 @@ class Receiver:
                 self._keep(start, end)
             return False
         self._note_rhythm(now)
-        self._note_size(end - start, pushes)
+        # A full segment without PSH is the first part of more, so its acknowledgement waits for the
+        # next one even if the program reads at once.
+        size = end - start
+        if size < self._largest:
+            self._pushed += 1
+        else:
+            self._largest = min(size, self._options.mss)
+            self._pushed = max(self._pushed, int(pushes))
         self.duplicate = self.duplicate or start < self.next
         self.next = end
         self.pending += 1
@@ -165,18 +172,6 @@ class Receiver:
     def _has_full_one(self) -> bool:
         """Return True if more than a full segment is unacknowledged."""
         return self.next - self.acknowledged > self._largest
-
-    def _note_size(self, size: int, pushes: bool) -> None:
-        """Note the size of segments, and whether one ends a write of its program.
-
-        A full segment without PSH is the first part of more, so its acknowledgement waits for the
-        next one even if the program reads at once.
-        """
-        if size < self._largest:
-            self._pushed += 1
-        else:
-            self._largest = min(size, self._options.mss)
-            self._pushed = max(self._pushed, int(pushes))
 
     def _note_rhythm(self, now: float) -> None:
         """Note how soon the next data can be expected."""

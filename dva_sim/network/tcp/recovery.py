@@ -239,7 +239,8 @@ class Recovery:
             return
         if self._probe_repeats and not duplicate:
             if acknowledged > self.probe_end:
-                self._mended(now)
+                if self.state == OPEN and self._limited:
+                    self._window.window = min(self._window.window, self._window.reduce(now))
             elif news:
                 return  # either sending of it may have arrived
         self.probe_end = -1
@@ -308,7 +309,3 @@ class Recovery:
         board = self._board
         if not (board.resent or board.queue[0].repeated):
             self._first_repeat = inf  # otherwise the one of the recovery before still counts
-
-    def _mended(self, now: float) -> None:
-        if self.state == OPEN and self._limited:
-            self._window.window = min(self._window.window, self._window.reduce(now))

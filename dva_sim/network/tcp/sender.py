@@ -190,18 +190,15 @@ class Sender:
             self.times.sample(first, self.first, self.next)
             self.times.shortest(last)
             if self.window.window < self.window.threshold:
-                self._look_for_queue(last)
-
-    def _look_for_queue(self, round_trip: float) -> None:
-        ends = self._hystart.ends(
-            self.window.window,
-            round_trip,
-            self.times.minimum,
-            acknowledged=self.first,
-            sent=self.next,
-        )
-        if ends and self._options.hystart:
-            self.window.threshold = self.window.window
+                ends = self._hystart.ends(
+                    self.window.window,
+                    last,
+                    self.times.minimum,
+                    acknowledged=self.first,
+                    sent=self.next,
+                )
+                if ends and self._options.hystart:
+                    self.window.threshold = self.window.window
 
     def _grow(self, delivered: int, now: float) -> None:
         """Open the congestion window, if it was used."""
@@ -236,22 +233,20 @@ class Sender:
                 break
             self._send(end, now)
             room -= 1
-        self._note_use(room <= 0)
-
-    def _gathers(self, end: int) -> bool:
-        """Return True if a small segment waits for more, as without TCP_NODELAY; not the last."""
-        if self._nodelay or end - self.next >= self._options.mss or end >= self.end_mark:
-            return False
-        return self._small_end > self.first
-
-    def _note_use(self, used: bool) -> None:
-        """Note whether the congestion window was filled within the last round trip."""
+        # Whether the congestion window was filled within the last round trip.
+        used = room <= 0
         out = len(self.board.queue)
         fuller = not self._window_used and out > self._most_out
         if used or fuller or self.first >= self._use_round:
             self._window_used = used
             self._most_out = out
             self._use_round = self.next
+
+    def _gathers(self, end: int) -> bool:
+        """Return True if a small segment waits for more, as without TCP_NODELAY; not the last."""
+        if self._nodelay or end - self.next >= self._options.mss or end >= self.end_mark:
+            return False
+        return self._small_end > self.first
 
     def _send(self, end: int, now: float) -> None:
         start = self.next
@@ -294,21 +289,22 @@ class Sender:
 
     def _watch(self, now: float, advanced: bool, fresh: bool) -> None:
         if self.board.queue:
-            self._alarm.watch(now, self.board, advanced, fresh, self._may_probe())
+            quiet = self.recovery.state == OPEN and not self.board.sacked
+            self._alarm.watch(now, self.board, advanced, fresh, quiet and self._options.tail_probe)
         elif self.next < self.total:
             self._alarm.watch_window(now)
         else:
             self._alarm.stop()
 
-    def _may_probe(self) -> bool:
-        quiet = self.recovery.state == OPEN and not self.board.sacked
-        return quiet and self._options.tail_probe
-
     def _ring(self) -> None:
         now = self._clock.now
         kind = self._alarm.kind
         if kind == REORDER:
-            self._doubt_over(now)
+            self._alarm.doubt = self.recovery.find(now, self.next)
+            self.recovery.hold(0, False)
+            before = self.next
+            self._transmit(now)
+            self._watch(now, False, self.next > before)
         elif kind == PROBE:
             self._probe(now)
         elif self._unanswered >= self._options.retries:
@@ -317,13 +313,6 @@ class Sender:
             self._unanswered += 1
             self._alarm.back_off += 1
             self._probe_window(now) if kind == WINDOW else self._time_out(now)
-
-    def _doubt_over(self, now: float) -> None:
-        self._alarm.doubt = self.recovery.find(now, self.next)
-        self.recovery.hold(0, False)
-        before = self.next
-        self._transmit(now)
-        self._watch(now, False, self.next > before)
 
     def _probe(self, now: float) -> None:
         """Send something new, or the last segment again, to provoke an acknowledgement."""

@@ -103,15 +103,12 @@ class Feedback:
                 self._heard = now
                 self.samples.append(now - sent - held)
                 self.round_trips.add(self.samples[-1])
-                gone += self._passed(number)
+                # Earlier datagrams count as lost once enough later ones were acknowledged.
+                earlier = [n for n in self._pending if n < number]
+                for n in earlier:
+                    self._passed_by[n] = self._passed_by.get(n, 0) + 1
+                gone += self._drop(n for n in earlier if self._passed_by[n] >= REORDERED)
         return gone
-
-    def _passed(self, number: int) -> list[int]:
-        """A later datagram than some was acknowledged: those that this shows to be lost."""
-        earlier = [n for n in self._pending if n < number]
-        for n in earlier:
-            self._passed_by[n] = self._passed_by.get(n, 0) + 1
-        return self._drop(n for n in earlier if self._passed_by[n] >= REORDERED)
 
     def give_up(self) -> list[int]:
         """The time-out has passed: everything pending is lost."""

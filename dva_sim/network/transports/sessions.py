@@ -102,7 +102,9 @@ class DatagramSender:
             ready = self._sent_at + self._pace.gap
             if now < ready - SLACK:
                 self._pace.held = True
-                self._wake(ready)
+                if ready < self._wake_at - SLACK:
+                    self._wake_at = ready
+                    self._clock.call_at(ready, self._woken, ready)
                 return
             if not self._parts and self._waiting is not None:
                 self._parts += parts_of(self._waiting, self._header)
@@ -110,11 +112,6 @@ class DatagramSender:
             self._send(now, self._parts.popleft())
             self._pace.sent()
             self._sent_at = now
-
-    def _wake(self, at: float) -> None:
-        if at < self._wake_at - SLACK:
-            self._wake_at = at
-            self._clock.call_at(at, self._woken, at)
 
     def _woken(self, at: float) -> None:
         if at == self._wake_at:
