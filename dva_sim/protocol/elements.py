@@ -137,7 +137,8 @@ class Form:
                 self._absent[name] = None if usual is Parameter.empty else usual
                 self._add("%s", [(name, _optional(tag, inner.write, self._absent[name]))])
             elif isinstance(inner, Form):
-                self._add(f"<{tag}>{inner._text}</{tag}>", inner._below(name))
+                below = [(f"{name}.{path}", write) for path, write in inner._leaves]
+                self._add(f"<{tag}>{inner._text}</{tag}>", below)
             else:
                 self._add(f"<{tag}>%s</{tag}>", [(name, inner.write)])
             self._fields[tag] = _Field(name, inner.read, most > 1)
@@ -149,10 +150,6 @@ class Form:
     def _add(self, text: str, leaves: list[tuple[str, Write]]) -> None:
         self._text += text
         self._leaves += leaves
-
-    def _below(self, name: str) -> list[tuple[str, Write]]:
-        """Return the leaves as seen from a message of which this is an attribute."""
-        return [(f"{name}.{path}", write) for path, write in self._leaves]
 
     def write(self, body: Any) -> str:
         """Return a message as the elements around its fields, and these.
@@ -296,19 +293,15 @@ def write(message: m.Message) -> str:
         raise bad(f"a value of the wrong type: {error}") from error
 
 
-def _read_reply(element: _Element) -> m.Reply:
-    answers, code, text, *content = element
-    return m.Reply(
-        int(_str(answers)),
-        int(_str(code)),
-        _str(text),
-        _CONTENTS[content[0].tag].read(content[0]) if content else None,
-    )
-
-
 def _read_simple(payload: _Element) -> m.Body:
     if payload.tag == "reply":
-        return _read_reply(payload)
+        answers, code, text, *content = payload
+        return m.Reply(
+            int(_str(answers)),
+            int(_str(code)),
+            _str(text),
+            _CONTENTS[content[0].tag].read(content[0]) if content else None,
+        )
     element = payload if payload.tag in _BODIES else payload[0]
     body: m.Body = _BODIES[element.tag].read(element)
     return body

@@ -155,18 +155,14 @@ def _by_schema(data: bytes) -> list[Problem]:
     schema.validate(tree)
     places = dict(zip(tree.iter("*"), _walk(data)[0], strict=True))
     found: dict[int, Problem] = {}
-    for entry in _entries(schema):
+    log: Any = schema.error_log  # known to be iterable by lxml, not by its stubs
+    for entry in list(log):
         element = _element_at(tree, entry.path)
         place = places[element]
         stray = place.text if "haracter content" in entry.message else None
         offset = place.start if stray is None else stray
         found.setdefault(offset, at(data, offset, _explain(element, entry)))
     return list(found.values())
-
-
-def _entries(schema: etree.XMLSchema) -> list[Any]:
-    log: Any = schema.error_log  # known to be iterable by lxml, not by its stubs
-    return list(log)
 
 
 def _element_at(tree: etree._ElementTree, path: str | None) -> etree._Element:
@@ -193,11 +189,9 @@ def _explain(element: etree._Element, entry: Any) -> str:
         what = "text" if "haracter content" in entry.message else "an element"
         return f"{what} should not stand in {name}; leave it out"
     form = form_of(name) or "as protocol/dva.xsd says"
-    return f"{name} {_short(element.text or '')} is not valid; should be {form}"
-
-
-def _short(value: str) -> str:
-    return repr(value if len(value) <= _SHOWN else value[:_SHOWN] + "...")
+    value = element.text or ""
+    short = repr(value if len(value) <= _SHOWN else value[:_SHOWN] + "...")
+    return f"{name} {short} is not valid; should be {form}"
 
 
 def _walk(data: bytes) -> tuple[list[_Place], int | None]:

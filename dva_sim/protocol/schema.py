@@ -40,7 +40,10 @@ def read_validated(data: bytes) -> Message:
         # libxml2 never forgets a run of blanks that it saw between elements.
         root = etree.fromstring(_BLANK_LINES.sub(b">\n<", data), _parser())
     except etree.XMLSyntaxError as error:
-        raise ProtocolError(BAD_MESSAGE, _one_line(error)) from None
+        # lxml spells some messages as the repr of their bytes.
+        problem = re.sub(r"""^line \d+: b(["'])(.*)\1$""", r"not well-formed: \2", str(error.msg))
+        text = "".join(c if c.isprintable() else " " for c in problem)[:200]
+        raise ProtocolError(BAD_MESSAGE, text) from None
     return read(root)
 
 
@@ -102,10 +105,3 @@ def _parser() -> etree.XMLParser:
         remove_comments=True,
         remove_pis=True,
     )
-
-
-def _one_line(error: etree.XMLSyntaxError) -> str:
-    """Return libxml2's message as text that fits into a reply."""
-    # lxml spells some messages as the repr of their bytes.
-    problem = re.sub(r"""^line \d+: b(["'])(.*)\1$""", r"not well-formed: \2", str(error.msg))
-    return "".join(c if c.isprintable() else " " for c in problem)[:200]
