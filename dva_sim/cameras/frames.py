@@ -84,7 +84,7 @@ class Unpacker:
         end = 4 + size + length
         if not 0 <= length <= MOST_PICTURE:
             return None, self._skip()
-        if self._broken_off(4 + size, end):
+        if self._rest.find(MAGIC, 4 + size, end) >= 0:
             return None, self._skip()
         if len(self._rest) < end:
             return None
@@ -92,10 +92,6 @@ class Unpacker:
         if jpeg and not jpeg.endswith(JPEG_END):
             return None, self._skip()
         return Picture(robot, number, captured, arrived, jpeg), end
-
-    def _broken_off(self, start: int, end: int) -> bool:
-        """Return True if another record begins where the picture should continue."""
-        return self._rest.find(MAGIC, start, end) >= 0
 
     def _skip(self) -> int:
         """Return how many bytes to skip to where a record may begin."""

@@ -89,7 +89,10 @@ def meant(path: KeyPath, value: Any, *models: Any) -> str:
     """
     keys = keys_meant(path, value, *models)
     if keys:
-        return _ask(str(path[-1]), keys)
+        unit = keys[0].rpartition("_")[2]
+        other = str(path[-1]).rpartition("_")[2]
+        text = f" (in {_UNITS[unit]})" if unit in _UNITS and other != unit else ""
+        return f"did you mean {either(map(repr, keys))}?{text}"
     here = fields_at(models[0], path[:-1])
     return f"known here: {listed(sorted(here), most=24)}" if here else ""
 
@@ -160,14 +163,6 @@ def _dotted(path: KeyPath) -> str:
     return ".".join(map(str, path))
 
 
-def _ask(given: str, keys: list[str]) -> str:
-    """The keys that may be meant, with their unit where another one was given."""
-    unit = keys[0].rpartition("_")[2]
-    other = given.rpartition("_")[2]
-    text = f" (in {_UNITS[unit]})" if unit in _UNITS and other != unit else ""
-    return f"did you mean {either(map(repr, keys))}?{text}"
-
-
 def fields_below(model: Any, above: str = "", depth: int = _DEPTH) -> Iterator[tuple[str, Any]]:
     """Every field of a model, by its dotted key, each followed by the fields of its own model."""
     for name, info in _fields(model).items():
@@ -232,14 +227,11 @@ def first_mistake(
             for each, path in zip(found, paths, strict=True)
             if each["type"] == "missing" and each["loc"][:-1] == found[0]["loc"][:-1]
         ]
-        return _missing(beside), paths[0]
+        *others, last = map(repr, beside)
+        text = f"missing keys {', '.join(others)} and {last}" if others else f"missing key {last}"
+        return text, paths[0]
     reports = [e for e, path in zip(found, paths, strict=True) if path == paths[0]]
     return _explain(model, reports, paths[0]), paths[0]
-
-
-def _missing(keys: Sequence[str]) -> str:
-    *others, last = map(repr, keys)
-    return f"missing keys {', '.join(others)} and {last}" if others else f"missing key {last}"
 
 
 def _path(problem: Any, data: Mapping[str, Any]) -> KeyPath:

@@ -290,7 +290,11 @@ class OperatorPart:
         now = self._stage.clock.now
         agent = self._agent
         row: Row = {"label": agent.device.label, "doing": agent.activity}
-        sent = agent.asked if isinstance(agent, ScriptedOperator) else self._commands_sent()
+        sent = (
+            agent.asked
+            if isinstance(agent, ScriptedOperator)
+            else sum(drive.sent for drive in self._stage.recorder.drives)
+        )
         row["commands_hz"] = self._sent.of(sent, now)
         trips = agent.device.round_trips
         row["round_trip_s"] = statistics.median(trips) if trips else None
@@ -299,9 +303,6 @@ class OperatorPart:
     def keep(self, recorder: LiveRecorder) -> None:
         """See `LivePart`: how the drives stand."""
         recorder.catch_up()
-
-    def _commands_sent(self) -> int:
-        return sum(drive.sent for drive in self._stage.recorder.drives)
 
     def settled(self) -> bool:
         """Implement `LivePart`."""

@@ -106,13 +106,10 @@ class RunningChannels:
             yield from self.standing()
         if when - self._looked_at >= HAZARD_S:
             self._looked_at = when
-            yield from self._hazards(when)
-
-    def _hazards(self, when: float) -> Iterator[ChannelMessage]:
-        for number, incident in self._real.items():
-            if incident.start <= when and number not in self._contained:
-                yield channels.disc(when, number + 1, incident.hazard)
-                yield channels.state(when, number + 1, incident)
+            for number, incident in self._real.items():
+                if incident.start <= when and number not in self._contained:
+                    yield channels.disc(when, number + 1, incident.hazard)
+                    yield channels.state(when, number + 1, incident)
 
     def _contains(self, number: int, when: float) -> Iterator[ChannelMessage]:
         self._contained.add(number)

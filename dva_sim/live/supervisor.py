@@ -125,7 +125,10 @@ class Supervisor:
                 return self._watch(limit)
             finally:
                 self._end_all()
-                self._end_link()
+                if self._link is not None:
+                    with suppress(LinkEnded):
+                        self._packets = self._link.report()
+                    self._link.close()
 
     def _start_all(self, scenario: Scenario) -> None:
         """Start all parts, each of which needs the address of the one before: the DVA's."""
@@ -287,12 +290,6 @@ class Supervisor:
         self._selector.close()
         for part in self._parts:
             part.reports.close()
-
-    def _end_link(self) -> None:
-        if self._link is not None:
-            with suppress(LinkEnded):
-                self._packets = self._link.report()
-            self._link.close()
 
 
 def _end_of(part: str) -> str:

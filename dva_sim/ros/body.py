@@ -66,11 +66,6 @@ class RosBody(RobotBody):
         speed, turn_rate, until = self._set_point
         return speed, turn_rate, until if speed or turn_rate else 0.0
 
-    @property
-    def is_asked_to_move(self) -> bool:
-        """True if a command to move is in force."""
-        return self._is_asked_to_move and self._clock.now < self._set_point[2]
-
     def place(self, motion: RosMotion) -> None:
         """Be where odometry says, and move so."""
         body = self.body

@@ -256,7 +256,8 @@ def _studentised(
         Efron & Tibshirani, An Introduction to the Bootstrap (1993), chapters 11 and 12.
     """
     n = len(first)
-    rows = _rows(first, second)
+    one, two, off = (x - x.mean() for x in (first, second, first - second))
+    rows = np.stack([np.ones(len(first)), one, two, one**2, two**2, off**2])
     shift = float((first - second).mean())
     whole, drawn = (
         _Drawn(weights, rows, shift) for weights in (np.ones((1, n)), draws(n, resamples))
@@ -302,12 +303,6 @@ def _interval(statistic: Statistic, whole: _Drawn, drawn: _Drawn, n: int) -> Int
     ratio = ratio[np.isfinite(ratio), np.newaxis]
     (down,), (up,) = reach(ratio, np.array([n]), LEVEL)
     return Interval(estimate, float(estimate - down * error), float(estimate + up * error), n)
-
-
-def _rows(first: Floats, second: Floats) -> Floats:
-    """Return each person's contribution to the sums `(6, n)`, centred to keep precision."""
-    one, two, off = (x - x.mean() for x in (first, second, first - second))
-    return np.stack([np.ones(len(first)), one, two, one**2, two**2, off**2])
 
 
 def _pairs(sums: Floats, shift: float) -> Pairs:

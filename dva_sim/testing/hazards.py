@@ -205,7 +205,10 @@ class _Trial:
     def _pictures(self) -> Iterator[Case]:
         """A raster for what it shows, of numbers, empty before it begins."""
         field = self._field()
-        places = self._places()
+        west, south, east, north = self._site.extent
+        x = np.arange(west, east, CELL)
+        y = np.arange(south, north, CELL)
+        places = SitePoints(building_of(self._site), np.stack(np.meshgrid(x, y), axis=2))
         for what in (*QUANTITIES, "layer"):
             shown = ("smoke" if what == "layer" else what) in self._hazard().shows
             for when in (START, START + 20.0, START + 601.0):
@@ -222,12 +225,6 @@ class _Trial:
                     yield "has a picture with values that are none", f"{what}, {when:g} s"
                 elif when <= START and values.max() > 0.0:
                     yield "shows something before it begins", what
-
-    def _places(self) -> SitePoints:
-        west, south, east, north = self._site.extent
-        x = np.arange(west, east, CELL)
-        y = np.arange(south, north, CELL)
-        return SitePoints(building_of(self._site), np.stack(np.meshgrid(x, y), axis=2))
 
     def _detectors(self) -> Iterator[Case]:
         """Detectors of kinds that there are, which notice it whenever it begins."""

@@ -258,16 +258,14 @@ class _Trial:
                     tick, x, y, heading, speed=wanted.speed, turn_rate=wanted.turn_rate, hazards=()
                 )
             )
-            if self._rests(track):
+            long = track[-round(2 * REST / FRAME) :]
+            rests = (
+                len(track) > len(long) and long[0][1:] == long[-1][1:] and not any(long[-1].wanted)
+            )
+            if rests:
                 break
         self.took.append(spent / len(track))
         return track
-
-    @staticmethod
-    def _rests(track: Sequence[_Step]) -> bool:
-        """True if the robot has stood still for so long that nothing new will come."""
-        long = track[-round(2 * REST / FRAME) :]
-        return len(track) > len(long) and long[0][1:] == long[-1][1:] and not any(long[-1].wanted)
 
 
 PUSHED_AT: Final = 6.0  # in drives in which the robot is pushed aside [s]

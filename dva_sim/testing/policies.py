@@ -373,9 +373,10 @@ def _forbidden(policy: Policy, situation: Situation, advice: Sequence[Any]) -> I
         task = situation.tasks[piece.task]
         if isinstance(piece, Announcement):
             if task.stage == "contain" or not task.due or task.auction or task.engaged is not None:
+                due = "" if task.due else ", not due"
                 yield (
                     "announces a task that is not to be announced",
-                    f"{_task_text(piece.task, task)} ",
+                    f"task {piece.task} ({task.stage}{due}, auction {task.auction or 'none'}) ",
                 )
             continue
         who = situation.responders[piece.responder]
@@ -399,11 +400,6 @@ def _bad_move(situation: Situation, move: Relocation) -> Iterator[Case]:
         yield "relocates somebody who is under way", case
     elif not np.isfinite(situation.cover.eta[move.responder, move.station]):
         yield "relocates somebody who would never arrive", case
-
-
-def _task_text(place: int, task: Any) -> str:
-    due = "" if task.due else ", not due"
-    return f"task {place} ({task.stage}{due}, auction {task.auction or 'none'})"
 
 
 def _contents(situation: Situation) -> bytes:

@@ -89,7 +89,9 @@ class _Trial:
                 yield (CONNECTS if not self.count else LEAVES), robot.problem
             yield from self._commands(near, robot)
             if self._make().carries_pictures:
-                yield from self._pictures(near, robot, seen)
+                sent = [bytes([number]) * size for number, size in enumerate(PICTURES, 1)]
+                robot.pictures.extend(sent)
+                yield from self._arrived(SHOWS, sent, seen, near)
             near.close()
 
     def _commands(self, near: TransportEnd, robot: _Robot) -> Iterator[Case]:
@@ -103,11 +105,6 @@ class _Trial:
         if not taken:
             yield CARRIES, f"none of {COMMANDS} was taken"
         yield from self._arrived(CARRIES, taken, robot.heard, near)
-
-    def _pictures(self, near: TransportEnd, robot: _Robot, seen: list[bytes]) -> Iterator[Case]:
-        sent = [bytes([number]) * size for number, size in enumerate(PICTURES, 1)]
-        robot.pictures.extend(sent)
-        yield from self._arrived(SHOWS, sent, seen, near)
 
     def _arrived(
         self, promise: str, sent: list[bytes], found: list[bytes], near: TransportEnd
