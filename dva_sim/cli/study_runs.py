@@ -38,7 +38,6 @@ _MANY = 500  # configurations, which take some seconds to check
 _MANY_RUNS = 100_000  # whose list takes seconds, too
 _LINE_S = 30.0  # between two lines of progress in a file
 _MINUTE_S = 60
-_HOUR_S = 3600
 _SURE_AFTER_S = 10.0  # before this and the share, the first runs say little of the others
 _SURE_SHARE = 0.05
 

@@ -16,8 +16,8 @@ from dva_sim.agents.people.evacuation import (
     UNTENABLE,
     choose_escape,
     clean_air,
-    is_untenable,
     refuges_of,
+    strain,
 )
 from dva_sim.agents.people.profiles import BystanderProfile, Occupant
 from dva_sim.agents.population import Trait
@@ -330,10 +330,10 @@ def test_who_stands_in_smoke_may_go_through_it_to_clean_air():
 
 @pytest.mark.parametrize("what", sorted(set(CLEAR._fields) - {"gas"}))
 def test_each_of_the_conditions_alone_can_be_too_much(what):
-    assert not is_untenable(CLEAR)
+    assert strain(CLEAR, UNTENABLE) < 1.0
     most = getattr(UNTENABLE, what)
-    assert is_untenable(CLEAR._replace(**{what: most}))
-    assert not is_untenable(CLEAR._replace(**{what: 0.99 * most}))
+    assert strain(CLEAR._replace(**{what: most}), UNTENABLE) >= 1.0
+    assert strain(CLEAR._replace(**{what: 0.99 * most}), UNTENABLE) < 1.0
 
 
 @pytest.mark.parametrize(("gas", "limit"), [("methane", 0.044), ("propane", 0.017)])
@@ -344,7 +344,7 @@ def test_nobody_stays_where_the_gas_that_leaks_could_explode(gas, limit):
     for time in range(10, 1200, 10):
         air = around.at(5.0, 12.0, time)
         assert air.explosive == pytest.approx(air.gas / limit)
-        assert is_untenable(air) == (air.gas / limit >= 1.0)
+        assert (strain(air, UNTENABLE) >= 1.0) == (air.gas / limit >= 1.0)
     assert air.gas > 0.005
 
 

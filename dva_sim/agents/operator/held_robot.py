@@ -98,7 +98,6 @@ class HeldRobot:
         # of the newest status [s], [ms]
         self._heard = -math.inf
         self._tick = -math.inf
-        self._stopped_at = -math.inf
         self.on_frame: Callable[[HeldRobot, CameraFrame], object] = lambda *_: None
 
     @property

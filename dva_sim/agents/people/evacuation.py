@@ -76,11 +76,6 @@ def strain(conditions: Conditions, most: Conditions) -> float:
     return max(is_ / limit for is_, limit in zip(conditions, most, strict=True))
 
 
-def is_untenable(conditions: Conditions) -> bool:
-    """Return True if nobody goes there, or stays."""
-    return strain(conditions, UNTENABLE) >= 1.0
-
-
 def is_deadly(conditions: Conditions) -> bool:
     """Return True if not even people who are in smoke already go there."""
     return strain(conditions, DEADLY) >= 1.0

@@ -50,7 +50,6 @@ class Wandering:
         self.axis = (math.cos(angle), math.sin(angle))
         self._task = task
         self._rng = rng
-        self._angle = angle
         self.edge = self.LIMIT * amplitude
         self._time = 0.0
         self._place = (amplitude * self.axis[0], amplitude * self.axis[1])
