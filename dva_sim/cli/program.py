@@ -186,17 +186,13 @@ def call(words: Sequence[str] | None = None) -> int:
     except DvaSimError as error:
         return _report(error, error.exit_code)
     except typer.TyperException as error:
-        return _report_usage_error(error)
+        if type(error).__name__ != "NoArgsIsHelpError":
+            return _report(in_a_line(error), ExitCode.MISTAKE)
+        typer.echo(error)
+        return ExitCode.OK
     except OSError as error:
         where = f"{error.filename}: " if error.filename is not None else ""
         return _report(f"{where}{error.strerror or error}", ExitCode.MISTAKE)
-
-
-def _report_usage_error(error: Exception) -> int:
-    if type(error).__name__ != "NoArgsIsHelpError":
-        return _report(in_a_line(error), ExitCode.MISTAKE)
-    typer.echo(error)
-    return ExitCode.OK
 
 
 def _report(problem: object, code: int) -> int:

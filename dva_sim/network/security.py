@@ -159,7 +159,16 @@ def at_client(has_keys: bool, device: str, peer: str, event: int, code: int) -> 
     if event == zmq.EVENT_HANDSHAKE_FAILED_AUTH:
         return Reason.UNKNOWN_KEY, f"{peer} does not know the key of {device}"
     if event == zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL:
-        return _at_hang_up(has_keys, peer, code)
+        # A server does not say that it cannot read a greeting: it hangs up.
+        if code == errno.EAGAIN:
+            limit = HANDSHAKE_LIMIT // 1000
+            return Reason.SILENT, f"no answer within {limit} s: is it {peer} who listens there?"
+        if not has_keys:
+            return Reason.CLOSED, f"it hung up: is it {peer} who listens there?"
+        return (
+            Reason.WRONG_SERVER_KEY,
+            f"it hung up, most likely because the public key of {peer} here is not the one it has",
+        )
     if code == zmq.PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH:
         return at_mismatch(has_keys, peer)
     if code == zmq.PROTOCOL_ERROR_ZMTP_CRYPTOGRAPHIC:
@@ -172,19 +181,6 @@ def at_mismatch(has_keys: bool, peer: str) -> tuple[Reason, str]:
     if not has_keys:
         return Reason.PLAIN_CLIENT, f"{peer} wants keys, this end has none"
     return Reason.PLAIN_SERVER, f"{peer} has no keys switched on, this end has"
-
-
-def _at_hang_up(has_keys: bool, peer: str, code: int) -> tuple[Reason, str]:
-    """A server does not say that it cannot read a greeting: it hangs up."""
-    if code == errno.EAGAIN:
-        limit = HANDSHAKE_LIMIT // 1000
-        return Reason.SILENT, f"no answer within {limit} s: is it {peer} who listens there?"
-    if not has_keys:
-        return Reason.CLOSED, f"it hung up: is it {peer} who listens there?"
-    return (
-        Reason.WRONG_SERVER_KEY,
-        f"it hung up, most likely because the public key of {peer} here is not the one it has",
-    )
 
 
 # Pause before connecting again, up to twice as long by chance. It doubles while nobody listens,
@@ -444,19 +440,16 @@ class Security:
         if event == zmq.EVENT_MONITOR_STOPPED:
             self._drop(monitor)
         elif watch.peer is None:
-            self._note_server(watch.device, endpoint, event, value)
+            # A bad key is reported with the request; a peer that just leaves is not a refusal.
+            if event == zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL:
+                reason, why = at_server(self._has_keys, watch.device, value)
+                refusal = Refusal(watch.device, None, endpoint, reason, why)
+                self.refused[watch.device, reason] += 1
+                if refusal not in self._reported:  # few: there are few endpoints and few reasons
+                    self._reported.add(refusal)
+                    self._tell(refusal)
         else:
             self._note_client(watch.device, watch.peer, endpoint, event, value)
-
-    def _note_server(self, device: str, endpoint: str, event: int, value: int) -> None:
-        """Note a bad key, reported with the request; a peer that just leaves is not a refusal."""
-        if event == zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL:
-            reason, why = at_server(self._has_keys, device, value)
-            refusal = Refusal(device, None, endpoint, reason, why)
-            self.refused[device, reason] += 1
-            if refusal not in self._reported:  # few: there are few endpoints and few reasons
-                self._reported.add(refusal)
-                self._tell(refusal)
 
     def _note_client(self, device: str, peer: str, endpoint: str, event: int, value: int) -> None:
         way = device, peer, endpoint

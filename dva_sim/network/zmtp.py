@@ -220,17 +220,6 @@ class ZmtpEnd:
         self._batch += count
         self._flush()
 
-    def _greet(self) -> None:
-        """Answer what has been heard of the other end's greeting so far."""
-        while not self.ready and self._heard >= self._next[0]:
-            if self._next[1]:
-                self._say(self._next[1])
-                self._next = next(self._greeting)
-            else:
-                self.ready = True
-                self.on_ready()
-                self._flush()
-
     # --- encoder and decoder ---------------------------------------------------------------
 
     def _flush(self) -> None:
@@ -277,8 +266,14 @@ class ZmtpEnd:
             if not count:
                 return
             self._heard += count
-            if not self.ready:
-                self._greet()
+            while not self.ready and self._heard >= self._next[0]:
+                if self._next[1]:
+                    self._say(self._next[1])
+                    self._next = next(self._greeting)
+                else:
+                    self.ready = True
+                    self.on_ready()
+                    self._flush()
 
     # --- the end ---------------------------------------------------------------------------
 

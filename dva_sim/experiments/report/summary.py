@@ -167,7 +167,11 @@ class Reading(ResultsReading):
     @property
     def broken(self) -> str:
         """The number of runs that broke a safety rule, by part; empty if none did."""
-        return _broken(self.runs)
+        if "violations" not in self.runs:
+            return ""
+        parts = np.asarray(self.runs["part"])[as_floats(self.runs["violations"]) > 0].tolist()
+        counts = {part: parts.count(part) for part in dict.fromkeys(parts)}
+        return listing([f"{n} run{'s' * (n > 1)} of part {part}" for part, n in counts.items()])
 
     @property
     def warnings(self) -> list[str]:
@@ -193,15 +197,6 @@ class Reading(ResultsReading):
         if self.manifest.get("versions", {}).get("dirty"):
             found.append("The program that made the runs had changes that were not committed.")
         return found
-
-
-def _broken(runs: Table) -> str:
-    """`2 runs of part drive and 1 run of part story`; empty where all rules were kept."""
-    if "violations" not in runs:
-        return ""
-    parts = np.asarray(runs["part"])[as_floats(runs["violations"]) > 0].tolist()
-    counts = {part: parts.count(part) for part in dict.fromkeys(parts)}
-    return listing([f"{n} run{'s' * (n > 1)} of part {part}" for part, n in counts.items()])
 
 
 def few_that_weigh(finding: Finding, view: StudyView) -> str:

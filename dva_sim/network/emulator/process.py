@@ -77,7 +77,15 @@ class LinkProcess:
         try:
             job = {"link": config.model_dump(mode="json"), "seed": seed, "rootless": rootless}
             self._channel.send(json.dumps(job).encode())
-            self._take_spaces()
+            try:
+                data, self._spaces, *_ = socket.recv_fds(self._channel, 1 << 16, _SPACES)
+            except OSError:
+                data = b""
+            if not data:
+                raise EmulatorError(self._process.why())
+            problem = json.loads(data).get("problem")
+            if problem is not None:
+                raise EmulatorError(f"the emulated link {NEEDS}; here {problem}")
         except BaseException:
             self.close()
             raise
@@ -156,14 +164,3 @@ class LinkProcess:
     def _send(self, word: bytes) -> None:
         with suppress(OSError):  # it has ended, which the next look at it shows
             self._channel.send(word)
-
-    def _take_spaces(self) -> None:
-        try:
-            data, self._spaces, *_ = socket.recv_fds(self._channel, 1 << 16, _SPACES)
-        except OSError:
-            data = b""
-        if not data:
-            raise EmulatorError(self._process.why())
-        problem = json.loads(data).get("problem")
-        if problem is not None:
-            raise EmulatorError(f"the emulated link {NEEDS}; here {problem}")

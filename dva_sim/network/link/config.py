@@ -106,24 +106,21 @@ class LinkConfig(Config):
     @model_validator(mode="after")
     def _causal(self) -> LinkConfig:
         for way in (self.toward("up"), self.toward("down")) if self.up or self.down else (self,):
-            way._check()
+            if way.jitter_s > way.delay_s:
+                raise ValueError(f"jitter_s {way.jitter_s:g} is above delay_s {way.delay_s:g}")
+            spread = {
+                "jitter_s": way.jitter_s > 0,
+                "delay_law": way.law is not None,
+                "delay_log": way.delay_log is not None,
+            }
+            given = [key for key, is_given in spread.items() if is_given]
+            if len(given) > 1:
+                raise ValueError(f"{given[0]} and {given[1]} exclude each other")
+            if way.law is not None:
+                way.law.check(way.delay_s)
+            if way.bursts is not None:
+                way.bursts.check(way.loss)
         return self
-
-    def _check(self) -> None:
-        if self.jitter_s > self.delay_s:
-            raise ValueError(f"jitter_s {self.jitter_s:g} is above delay_s {self.delay_s:g}")
-        spread = {
-            "jitter_s": self.jitter_s > 0,
-            "delay_law": self.law is not None,
-            "delay_log": self.delay_log is not None,
-        }
-        given = [key for key, is_given in spread.items() if is_given]
-        if len(given) > 1:
-            raise ValueError(f"{given[0]} and {given[1]} exclude each other")
-        if self.law is not None:
-            self.law.check(self.delay_s)
-        if self.bursts is not None:
-            self.bursts.check(self.loss)
 
     @property
     def law(self) -> DelayLaw | None:

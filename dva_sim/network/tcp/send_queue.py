@@ -219,7 +219,14 @@ class Scoreboard:
             if sent.end > acknowledged:
                 break
             count += 1
-            self._remove(sent, gain)
+            gain.released += sent.charge
+            gain.ambiguous = gain.ambiguous or sent.repeated
+            if sent.sacked:
+                self.sacked -= 1
+            else:
+                gain.delivered.append(sent)
+            self.lost -= sent.lost
+            self.resent -= sent.resent
         if count:
             del queue[:count]
         if queue and queue[0].start < acknowledged:
@@ -270,16 +277,6 @@ class Scoreboard:
             free += PACKET_COST
             del self.queue[index + 1]
         return free
-
-    def _remove(self, sent: SentSegment, gain: Gain) -> None:
-        gain.released += sent.charge
-        gain.ambiguous = gain.ambiguous or sent.repeated
-        if sent.sacked:
-            self.sacked -= 1
-        else:
-            gain.delivered.append(sent)
-        self.lost -= sent.lost
-        self.resent -= sent.resent
 
     def _trim(self, sent: SentSegment, acknowledged: int, gain: Gain) -> None:
         cut = acknowledged - sent.start

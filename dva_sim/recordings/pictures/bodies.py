@@ -71,23 +71,6 @@ class DrawnBody:
 
     def show(self, time: float) -> list[Artist]:
         """The body at a moment [s]."""
-        self._draw_trail(time)
-        if not self.is_there(time):
-            return [self._trail]
-        here = self._moments.at(self.name, time)
-        self._mark.set_data([here.x], [here.y])
-        outline = style.OUTLINES[self.kind]
-        pointed: Any = MarkerStyle(Path([*outline, outline[0]], closed=True))
-        self._mark.set(
-            marker=pointed.rotated(rad=here.heading),
-            markersize=self.size() * style.LENGTHS[self.kind],
-            markerfacecolor=style.colour_of(self.kind, here.mode),
-        )
-        ghost = self._ghost.show(time) if self._ghost else []
-        return [self._trail, *ghost, self._mark]
-
-    def _draw_trail(self, time: float) -> None:
-        """Draw its trail, fading with age, in the colours of its activities."""
         past = self._moments.past(self.name, time)
         step = max(1, round(STEP / max(1e-3, (past[-1].time - past[0].time) / len(past))))
         past = [*past[:-1:step], past[-1]]
@@ -103,6 +86,19 @@ class DrawnBody:
             if here
         ]
         self._trail.set_color(colours)
+        if not self.is_there(time):
+            return [self._trail]
+        here = self._moments.at(self.name, time)
+        self._mark.set_data([here.x], [here.y])
+        outline = style.OUTLINES[self.kind]
+        pointed: Any = MarkerStyle(Path([*outline, outline[0]], closed=True))
+        self._mark.set(
+            marker=pointed.rotated(rad=here.heading),
+            markersize=self.size() * style.LENGTHS[self.kind],
+            markerfacecolor=style.colour_of(self.kind, here.mode),
+        )
+        ghost = self._ghost.show(time) if self._ghost else []
+        return [self._trail, *ghost, self._mark]
 
 
 class _Ghost:

@@ -155,13 +155,7 @@ class TeamBuilder:
         body = robot.body
         self._world.advance_to(now)
         robot.power(robot.charge > 0.0)
-        self._look_at_drive(robot)
-        if self._around.may_be_wet:
-            wet = self._around.at(body.x, body.y, now).water > WET
-            body.grip = WET_GRIP if wet else GRIP
-
-    def _look_at_drive(self, robot: RobotAgent) -> None:
-        """Count what motors of a user got wrong, and tell of the first time."""
+        # What motors of a user got wrong is counted, and the first time told.
         device = robot.device
         failures = robot.body.motors.failures
         known = self._failures.get(device.label, 0)
@@ -172,6 +166,9 @@ class TeamBuilder:
                 device.tell(
                     f"is held back, as its drive fails: {robot.body.motors.first_failure}", "mode"
                 )
+        if self._around.may_be_wet:
+            wet = self._around.at(body.x, body.y, now).water > WET
+            body.grip = WET_GRIP if wet else GRIP
 
     def add_guard(self, number: int) -> GuardAgent | PersonGuard:
         """The `number`-th guard, at its post; it registers and is on duty.

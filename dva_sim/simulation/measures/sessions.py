@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,7 +116,18 @@ def contest_row(config: ContestConfig, contest: Contest) -> Row:
     trips = round_trips(commands[0], commands[1], pictures[0], pictures[1])
     row |= {"round_trip_mean_s": mean(trips), "round_trip_p95_s": percentile(trips, 95)}
     for way in WAYS:
-        row |= _way_row(config, contest, way)
+        per_byte = 8.0 / (contest.until - contest.since)
+        line = config.bottleneck.rate_bps
+        session = contest.session_bytes[way] * per_byte
+        bulk = [took * per_byte for took in contest.bulk_bytes[way]]
+        fair = line / (1 + len(bulk))
+        row |= {
+            f"session_{way}_bps": session,
+            f"bulk_{way}_bps": mean(bulk),
+            f"bulk_use_{way}": sum(bulk) / line if bulk else math.nan,
+            f"jain_{way}": jain([session, *bulk]) if bulk else math.nan,
+            f"share_of_fair_{way}": session / fair if bulk else math.nan,
+        }
     return row
 
 
@@ -176,19 +186,3 @@ def jain(rates: Sequence[float]) -> float:
     """Jain's index of fairness; nan if there is nothing to share."""
     squares = sum(rate * rate for rate in rates)
     return sum(rates) ** 2 / (len(rates) * squares) if squares else math.nan
-
-
-def _way_row(config: ContestConfig, contest: Contest, way: Any) -> Row:
-    """Rates and fairness in one direction; nan without competitors."""
-    per_byte = 8.0 / (contest.until - contest.since)
-    line = config.bottleneck.rate_bps
-    session = contest.session_bytes[way] * per_byte
-    bulk = [took * per_byte for took in contest.bulk_bytes[way]]
-    fair = line / (1 + len(bulk))
-    return {
-        f"session_{way}_bps": session,
-        f"bulk_{way}_bps": mean(bulk),
-        f"bulk_use_{way}": sum(bulk) / line if bulk else math.nan,
-        f"jain_{way}": jain([session, *bulk]) if bulk else math.nan,
-        f"share_of_fair_{way}": session / fair if bulk else math.nan,
-    }

@@ -108,7 +108,10 @@ def _attempt(scenario: MiddlewareScenario, seed: int, attempt: int) -> Middlewar
         plan = plan_of(scenario, Path(folder), window)
         far = _started(link, "far", plan)
         near = _started(link, "near", plan)
-        _await_end(near, window.until + PATIENCE_S)
+        try:
+            near.wait(window.until + PATIENCE_S - time.monotonic())
+        except subprocess.TimeoutExpired:
+            near.kill()
         time.sleep(LINGER_S)
         problem = _problem(near) or _problem(far)
         end_all([near, far], 0.0)
@@ -147,14 +150,6 @@ def plan_of(scenario: MiddlewareScenario, folder: Path, window: Window) -> Plan:
 def _started(link: LinkProcess, side: Side, plan: Plan) -> Child:
     words = [sys.executable, "-P", "-m", programs.__name__, side, plan.model_dump_json()]
     return link.start(side, words, keeps_errors=True)
-
-
-def _await_end(near: Child, limit: float) -> None:
-    """Wait for the operator's program, and end it if it does not end by itself."""
-    try:
-        near.wait(limit - time.monotonic())
-    except subprocess.TimeoutExpired:
-        near.kill()
 
 
 def _problem(program: Child) -> str:

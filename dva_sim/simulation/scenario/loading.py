@@ -206,7 +206,11 @@ def _complete(scenario: Scenario, error: Fail) -> Scenario:
     if (table := table_of(scenario)) is not None:
         scenario = with_events(scenario, table, error)
     check_names(scenario, error)
-    _check_options(scenario, error)
+    if scenario.site.options and scenario.site.map is None:
+        try:
+            load_site(scenario.site.name, scenario.site.options)
+        except ConfigError as problem:
+            raise error(problem.problem, ("site", "options")) from None
     check_phone(phone_profile(scenario, error), error)
     _check_draughts(scenario, error)
     processing = {profile.processing_s for profile in robot_profiles(scenario)}
@@ -220,15 +224,6 @@ def _complete(scenario: Scenario, error: Fail) -> Scenario:
             for key, timeout in waits.items()
         }
     )
-
-
-def _check_options(scenario: Scenario, error: Fail) -> None:
-    """Options of a site say what it becomes, so it has to be made to judge them."""
-    if scenario.site.options and scenario.site.map is None:
-        try:
-            load_site(scenario.site.name, scenario.site.options)
-        except ConfigError as problem:
-            raise error(problem.problem, ("site", "options")) from None
 
 
 def _check_draughts(scenario: Scenario, error: Fail) -> None:

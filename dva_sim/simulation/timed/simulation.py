@@ -166,14 +166,11 @@ class Shift:
             if self.demand.exhausted and not self.events and not self.unnoticed:
                 break
         if scenario.drain:
-            self._drain()
+            # What is open is closed, as far as anybody will still do anything.
+            while (self.events or self.unnoticed) and self.clock.env.peek() < math.inf:
+                self.clock.step()
+            check(self)
         return self._close()
-
-    def _drain(self) -> None:
-        """Let what is open be closed, as far as anybody will still do anything."""
-        while (self.events or self.unnoticed) and self.clock.env.peek() < math.inf:
-            self.clock.step()
-        check(self)
 
     def _close(self) -> TimedRecording:
         now = self.clock.now

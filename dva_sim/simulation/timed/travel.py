@@ -445,22 +445,19 @@ class Rooms(Terrain):
             return self._ways.length(a.fixed.point, b.fixed.point)
         if b.fixed is None:
             a, b = b, a
-        return self._from_half_way(a.point, b)
-
-    def _from_half_way(self, start: Point, goal: Place) -> float:
         planner = self._ways.planner
         sees = self._ways.planner.line_of_sight
-        if sees(start, goal.point):
-            return math.dist(start, goal.point)
-        end = goal.fixed.point if goal.fixed is not None else goal.point
-        if goal.zone >= 0 and self.site.rooms[goal.zone].contains(*start):
-            return planner.distance(start, end)  # behind a shelf
+        if sees(a.point, b.point):
+            return math.dist(a.point, b.point)
+        end = b.fixed.point if b.fixed is not None else b.point
+        if b.zone >= 0 and self.site.rooms[b.zone].contains(*a.point):
+            return planner.distance(a.point, end)  # behind a shelf
         ways = [
-            math.dist(start, passage) + self._ways.length(passage, end)
+            math.dist(a.point, passage) + self._ways.length(passage, end)
             for passage in self._passages
-            if sees(start, passage)
+            if sees(a.point, passage)
         ]
-        return min(ways) if ways else planner.distance(start, end)
+        return min(ways) if ways else planner.distance(a.point, end)
 
     @override
     def along(self, a: Place, b: Place, gone: float) -> Place:

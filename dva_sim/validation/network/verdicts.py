@@ -293,16 +293,11 @@ def reason_against(cell: ComparedCell) -> str:
     if group.kind in ("lossless", "overload"):
         return "" if measure in JUDGED_EXACTLY else "has no band without loss"
     if group.kind == "single":
-        return _against_single(cell)
-    return ""
-
-
-def _against_single(cell: ComparedCell) -> str:
-    condition = cell.group.condition
-    if cell.group.runs[0].values["n_applied"] < MIN_APPLIED:
-        return f"fewer than {MIN_APPLIED} commands applied"
-    if may_livelock(condition) and cell.measure.name.endswith("_p50"):
-        return "a single median where one loss can end all control"
+        condition = cell.group.condition
+        if cell.group.runs[0].values["n_applied"] < MIN_APPLIED:
+            return f"fewer than {MIN_APPLIED} commands applied"
+        if may_livelock(condition) and cell.measure.name.endswith("_p50"):
+            return "a single median where one loss can end all control"
     return ""
 
 
