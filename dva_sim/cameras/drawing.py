@@ -15,7 +15,7 @@ from PIL import Image
 
 from dva_sim.agents.people.bystander import DOWN
 from dva_sim.kernel.streams import Streams
-from dva_sim.simulation.full.hazards import RunHazard, draw_incidents
+from dva_sim.simulation.full.hazards import draw_incidents
 from dva_sim.simulation.scenario import Scenario, site_of
 from dva_sim.worlds.camera import Camera, Figure, SmokeView
 from dva_sim.worlds.geo import Pose
@@ -69,22 +69,20 @@ class Eyes:
     def jpeg(self, frame: Line) -> bytes:
         """The picture of a frame."""
         time = frame["captured_ms"] / 1000
+        hazards = [
+            incident.hazard
+            for number, incident in enumerate(self._incidents)
+            if incident.is_there(time) and time < self._contained.get(number, math.inf)
+        ]
         pixels = self._camera.picture(
             Pose(*frame["pose"]),
             [figure_of(*row) for row in frame["figures"]],
-            [incident.hazard for incident in self._going_on(time)],
+            hazards,
             self._smoke(time),
             self._seen("water", time),
             time,
         )
         return self._encoder.encode(Image.fromarray(pixels))
-
-    def _going_on(self, time: float) -> list[RunHazard]:
-        return [
-            incident
-            for number, incident in enumerate(self._incidents)
-            if incident.is_there(time) and time < self._contained.get(number, math.inf)
-        ]
 
     def _smoke(self, time: float) -> SmokeView | None:
         mean = self._seen("smoke", time)

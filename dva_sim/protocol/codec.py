@@ -224,3 +224,11 @@ def decode(data: bytes) -> Message:
         ProtocolError: not a message by the specification; the reason fits into a reply.
     """
     return read_canonical(data) or read_validated(data)
+
+
+def decode_if_valid(data: bytes) -> Message | None:
+    """Decode a message; None if it is not valid."""
+    try:
+        return decode(data)
+    except ProtocolError:
+        return None

@@ -21,8 +21,7 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.messaging import Request, Service
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.codec import decode
-from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.codec import decode_if_valid
 from dva_sim.storms.interference import PassingMessage
 
 # --- S5 ----------------------------------------------------------------------------------
@@ -88,10 +87,8 @@ class RefusedDrivers:
 
 def _refuses(data: bytes, to: str) -> bool | None:
     """Return True if a robot refuses a driver, False if it obeys it, None if that is not told."""
-    try:
-        body = decode(data).body
-    except ProtocolError:
-        return None
+    message = decode_if_valid(data)
+    body = None if message is None else message.body
     if isinstance(body, m.RobotHolder):
         return body.holder != to or body.code in m.OBEYS_NO_MORE
     if isinstance(body, m.Reply) and body.content is None:
@@ -333,8 +330,4 @@ class _Tap:
 
 def is_message(data: bytes) -> bool:
     """Return True for a valid message."""
-    try:
-        decode(data)
-    except ProtocolError:
-        return False
-    return True
+    return decode_if_valid(data) is not None

@@ -11,8 +11,7 @@ from dva_sim.agents.observation import CameraFrame
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.virtual_network import Take
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.codec import decode, encode
-from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.codec import decode_if_valid, encode
 
 REMEMBERED = 64  # messages to a node that may be replayed: of those by the dozen, and of others
 BY_THE_DOZEN = b"<SetTeleOp", b"<HBMsg>", b"<RobotStatus>"
@@ -187,7 +186,7 @@ def holds_tilt(speed: float, chance: random.Random) -> Meddling:
 
     def rule(interference: Interference, passing: PassingMessage) -> bool:
         data = passing.payload if isinstance(passing.payload, bytes) else b""
-        message = _read(passing.payload) if b"<SetTeleOp" in data else None
+        message = decode_if_valid(passing.payload) if b"<SetTeleOp" in data else None
         if message is None or not isinstance(message.body, m.SetTeleOp):
             return False
         body = message.body._replace(speed=speed, turn_rate=turn)
@@ -212,10 +211,3 @@ def freezes_pictures(_: float, __: random.Random) -> Meddling:
         return True
 
     return rule
-
-
-def _read(data: bytes) -> m.Message | None:
-    try:
-        return decode(data)
-    except ProtocolError:
-        return None

@@ -21,8 +21,7 @@ from dva_sim.network.messaging import Requester, Subscription, Transport
 from dva_sim.network.patterns import Pattern, load_pattern
 from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.codec import decode, encode
-from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.codec import decode, decode_if_valid, encode
 from dva_sim.protocol.exchange import Outbox
 from dva_sim.testing.promises import Case, Outcome, broken_in, is_slow, kept, part_by_part
 
@@ -241,10 +240,8 @@ class TriedDrive:
 
     def code_of(self, reply: bytes) -> int | None:
         """Implement `Line`."""
-        try:
-            body = decode(reply).body
-        except ProtocolError:
-            return None
+        message = decode_if_valid(reply)
+        body = None if message is None else message.body
         return body.code if isinstance(body, m.Reply) else None
 
     def lost(self, why: str = "") -> None:

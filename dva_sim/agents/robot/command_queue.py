@@ -24,8 +24,7 @@ from dva_sim.kernel.config import Config
 from dva_sim.kernel.makers import maker
 from dva_sim.network.messaging import Answer, Request
 from dva_sim.network.zmtp import Flow
-from dva_sim.protocol.codec import decode
-from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.codec import decode_if_valid
 from dva_sim.protocol.messages import Emergency, Message, SetTeleOp
 
 LIMIT = 1000  # ZeroMQ's default high-water mark, in messages
@@ -403,10 +402,8 @@ class CommandQueue:
 
 
 def _is_emergency(data: bytes) -> bool:
-    try:
-        return isinstance(decode(data).body, Emergency)
-    except ProtocolError:
-        return False
+    message = decode_if_valid(data)
+    return message is not None and isinstance(message.body, Emergency)
 
 
 BLOCK = 256  # draws made at once

@@ -38,8 +38,7 @@ from dva_sim.network.workload import (
     OperatorWorkload,
     RobotWorkload,
 )
-from dva_sim.protocol.codec import decode, encode
-from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.codec import decode_if_valid, encode
 from dva_sim.protocol.messages import OK, Reply, SetTeleOp, make_message, make_set_tele_op
 
 OPERATOR_ID: Final = "02:00:00:00:00:01"
@@ -110,11 +109,10 @@ class TeleOpMessages(MessageForm):
 
     @override
     def number_in(self, data: bytes) -> int | None:
-        try:
-            message = decode(data)
-        except ProtocolError:
+        message = decode_if_valid(data)
+        if message is None or not isinstance(message.body, SetTeleOp):
             return None
-        return message.message_id if isinstance(message.body, SetTeleOp) else None
+        return message.message_id
 
 
 TELE_OP: Final = TeleOpMessages()

@@ -26,9 +26,8 @@ from dva_sim.core.sessions import Send
 from dva_sim.core.store import Store
 from dva_sim.network.messaging import Request, Subscription
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.codec import decode
+from dva_sim.protocol.codec import decode, decode_if_valid
 from dva_sim.protocol.devices import CONTROL_ROOM, DETECTOR, GUARD, ROBOT
-from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.facts import Fact
 
 MOST_REPORTED = 20_000  # events whose last word is remembered, so that none is said twice
@@ -405,7 +404,5 @@ class DvaAgent:
 def _reads_log(data: bytes) -> bool:
     if b"<GetRequestLog" not in data:
         return False
-    try:
-        return isinstance(decode(data).body, m.GetRequestLog)
-    except ProtocolError:
-        return False
+    message = decode_if_valid(data)
+    return message is not None and isinstance(message.body, m.GetRequestLog)

@@ -21,8 +21,7 @@ from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.emergency_latch import DRIVE, PERSON
 from dva_sim.kernel.recorder import Accepted, ByHand, Recorder
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.codec import decode
-from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.codec import decode_if_valid
 from dva_sim.simulation.full.event_ledger import (
     PENDING_SLACK,
     SILENT_AFTER,
@@ -437,7 +436,7 @@ class SafetyAudit:
             if to not in self._deaf:
                 self._reaches_robot(now, source, to, payload)
         elif to == self._dva and isinstance(payload, bytes):
-            message = _read(payload)
+            message = decode_if_valid(payload)
             self._hears_dva = True
             self._ledger.hears(source, message, now)
             if message is not None and message.source == source:
@@ -461,7 +460,7 @@ class SafetyAudit:
 
     def _reaches_robot(self, now: float, source: str, robot: str, data: bytes) -> None:
         witness = self.witness(robot)
-        message = _read(data)
+        message = decode_if_valid(data)
         if message is None or isinstance(message.body, m.Heartbeat):
             return
         if isinstance(message.body, m.Reply):
@@ -504,7 +503,7 @@ class SafetyAudit:
         """Yield an order for a robot that has just told the DVA that an emergency holds it."""
         is_new = hash(data) not in self._orders_sent
         self._orders_sent.append(hash(data))
-        order = _read(data) if is_new else None
+        order = decode_if_valid(data) if is_new else None
         if order is None:
             return
         robot = order.body.device if isinstance(order.body, m.Order) else to
@@ -527,9 +526,9 @@ class SafetyAudit:
             if isinstance(payload, bytes) and _ORDERS_ROBOT.search(payload) is not None:
                 self._report([*self._sends_stopped(to, payload, now)], now, source)
             if isinstance(payload, bytes) and self._ledger.waits_for(payload):
-                self._ledger.says(_read(payload))
+                self._ledger.says(decode_if_valid(payload))
             if self._takeovers.waits and isinstance(payload, bytes) and b"<reply>" in payload:
-                answer = _read(payload)
+                answer = decode_if_valid(payload)
                 if answer is not None and isinstance(answer.body, m.Reply):
                     self._takeovers.says(answer.destination, answer.body, now)
             return
@@ -539,19 +538,19 @@ class SafetyAudit:
         if not isinstance(payload, bytes):
             witness.offset = offset_of(payload) or witness.offset
             return
-        if b"<RegMsg>" in payload and (message := _read(payload)) is not None:
+        if b"<RegMsg>" in payload and (message := decode_if_valid(payload)) is not None:
             witness.registers((message.message_id, message.timestamp), now)
-        if b"<GetGrant" in payload and (question := _read(payload)) is not None:
+        if b"<GetGrant" in payload and (question := decode_if_valid(payload)) is not None:
             witness.asks(question.message_id, now)
-        if b"<RobotEmergency>" in payload and (report := _read(payload)) is not None:
+        if b"<RobotEmergency>" in payload and (report := decode_if_valid(payload)) is not None:
             witness.reports_emergency(report, now, self._release)
         if b"<RobotStatus>" in payload:
-            _learn_from_status(witness, _read(payload), now)
-        if b"<SensorValue>" in payload and (value := _read(payload)) is not None:
+            _learn_from_status(witness, decode_if_valid(payload), now)
+        if b"<SensorValue>" in payload and (value := decode_if_valid(payload)) is not None:
             self._report([*_shown_to(witness, to, value.body, now)], now, source)
         if not witness.unanswered:
             return
-        reply = _read(payload) if b"<reply>" in payload else None
+        reply = decode_if_valid(payload) if b"<reply>" in payload else None
         if reply is None or not isinstance(reply.body, m.Reply):
             return
         asked = witness.unanswered.pop((reply.destination, reply.body.answers), None)
@@ -940,11 +939,3 @@ def _pushed(motion: RobotMotion, limits: MotorLimits, now: float) -> bool:
 
 def _end(witness: Witness, session: int, when: float) -> None:
     witness.over[session] = min(when, witness.over.get(session, when))
-
-
-def _read(data: bytes) -> m.Message | None:
-    """Decode a message; the same bytes are decoded once."""
-    try:
-        return decode(data)
-    except ProtocolError:
-        return None
