@@ -128,7 +128,9 @@ class Form:
         for (name, hint), node in zip(get_type_hints(kind).items(), declared, strict=True):
             tag = node.get("name", "")
             least, most = limits.occurs(node)
-            inner = _value_of(node, _inner(hint))
+            # A value may be absent, or be there several times.
+            kinds = [each for each in get_args(hint) if each not in (type(None), Ellipsis)]
+            inner = _value_of(node, kinds[0] if kinds else hint)
             if most > 1:
                 self._add("%s", [(name, _several(tag, inner.write, least, most))])
                 self._absent[name] = ()
@@ -175,12 +177,6 @@ def _values_of(names: list[str]) -> Callable[[Any], tuple[Any, ...]]:
     if len(names) > 1:
         return attrgetter(*names)
     return lambda body: tuple([attrgetter(name)(body) for name in names])
-
-
-def _inner(hint: Any) -> Any:
-    """Return the type of a value that may be absent, or be there several times."""
-    inner = [each for each in get_args(hint) if each not in (type(None), Ellipsis)]
-    return inner[0] if inner else hint
 
 
 def _value_of(node: _Element, kind: Any) -> Form | _Value:

@@ -208,7 +208,7 @@ class Trial(ABC, Generic[S]):
         """Play the trial to its end; `keep` its trace to be drawn."""
         step = self.STEP
         half = 0.5 * self.STEP
-        look = self._look_of()
+        look = Oracle.DELAY if self.is_oracle else 1.0 / self.scenario.frames.rate_hz
         steps = 0
         next_frame = 0.0
         next_trace = 0.0
@@ -248,10 +248,6 @@ class Trial(ABC, Generic[S]):
             self._next_reading += device.period
         arrived = self._up.take(now + 0.5 * dt)
         return device.command(arrived[-1] if arrived else None, dt)
-
-    def _look_of(self) -> float:
-        """Between two frames [s]."""
-        return Oracle.DELAY if self.is_oracle else 1.0 / self.scenario.frames.rate_hz
 
     @property
     def is_oracle(self) -> bool:

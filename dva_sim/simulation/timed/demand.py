@@ -100,12 +100,8 @@ class EventDraws:
         """From the outbreak to the first report [s]; infinite if nobody notices."""
         if self._stream.notice != "detectors":
             return self._notice[incident.index]
-        return _detected_after(incident, self._terrain)
-
-
-def _detected_after(incident: Incident, terrain: Terrain) -> float:
-    assert isinstance(terrain, Rooms)
-    return terrain.detected_after(incident.kind, incident.place)
+        assert isinstance(self._terrain, Rooms)
+        return self._terrain.detected_after(incident.kind, incident.place)
 
 
 class Demand:
