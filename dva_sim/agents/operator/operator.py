@@ -26,7 +26,9 @@ AS_SEEN = {
     "lost link": "presumes the link lost",
     REFUSED: "is refused",
 }  # what a drive's end looks like to the operator
-REDIRECTED, RECALLED = BY_DVA = "redirected", "recalled"  # how a drive ends by the DVA's word
+REDIRECTED = "redirected"
+RECALLED = "recalled"
+BY_DVA = (REDIRECTED, RECALLED)  # how a drive ends by the DVA's word
 
 
 class OperatorAgent:

@@ -98,7 +98,9 @@ class Mouse(HandDevice):
         vx, vy = self._velocity
         x, y = self._place
         keep = self._keep
-        self._velocity = vx, vy = ax + (vx - ax) * keep, ay + (vy - ay) * keep
+        vx = ax + (vx - ax) * keep
+        vy = ay + (vy - ay) * keep
+        self._velocity = vx, vy
         nx, ny = shaken(vx, vy, self._noise)
         self._place = x + nx * dt, y + ny * dt
 
@@ -127,9 +129,13 @@ class Joystick(HandDevice):
         ax, ay = self._aim
         x, y = self._hand
         keep = self._keep
-        self._hand = x, y = ax + (x - ax) * keep, ay + (y - ay) * keep
+        x = ax + (x - ax) * keep
+        y = ay + (y - ay) * keep
+        self._hand = x, y
         x, y = shaken(x, y, self._noise)
-        self._shown = x, y = clamped(x, 1.0), clamped(y, 1.0)
+        x = clamped(x, 1.0)
+        y = clamped(y, 1.0)
+        self._shown = x, y
         self._most = max(self._most, abs(x), abs(y))
 
     @override

@@ -156,7 +156,8 @@ class Level:
             if part < slices.count - 1:
                 end = min(until, slices.start + (part + 1) * slices.width)
             if end <= since:  # the border itself, by rounding
-                part, end = part + 1, min(until, slices.start + (part + 2) * slices.width)
+                part += 1
+                end = min(until, slices.start + (part + 1) * slices.width)
             self.areas[part] += self.now * (end - since)
             since = end
 

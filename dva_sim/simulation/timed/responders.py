@@ -262,7 +262,8 @@ class Unit:
             self.world.say(job.voice, m.OrderProgress(job.order.event_id, "departed"))
         if not job.inside and length > 0.0:
             outside = max(0.0, length - job.incident.danger_radius(now + seconds))
-            length, seconds = outside, seconds * outside / length
+            seconds = seconds * outside / length
+            length = outside
         self.leg = Leg(start, goal, now, length, now + seconds)
         self.world.moving(self, True)
         self._then(seconds, self._arrive, job)

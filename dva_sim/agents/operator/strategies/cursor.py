@@ -83,7 +83,8 @@ def through(path: Route, seen: Sighting, delay: float, person: Person, most: flo
         person: Caution, gain and noise.
         most: Highest speed that the person chooses [m/s].
     """
-    delay, gain = max(delay, SHORTEST), gain_at(person.pointing, person.margin, delay)
+    gain = gain_at(person.pointing, person.margin, delay)
+    delay = max(delay, SHORTEST)
     speed = fastest(seen.tolerance, delay, person, most)
     left = path.remaining(seen.x, seen.y)
     along = path.length - left
