@@ -39,7 +39,7 @@ export function callThePerson() {
 function call(alarm) {
   if (!sounds.peek()) return;
   beep(1 + RANKS.indexOf(alarm.priority));
-  if (document.hidden && Notification.permission === 'granted') {
+  if (document.hidden && window.Notification?.permission === 'granted') {
     new Notification(alarm.text, { body: `${alarm.priority}, not acknowledged`, tag: alarm.key });
   }
 }
@@ -64,7 +64,7 @@ export function SoundButton() {
     if (on) return;
     speaker ??= new AudioContext();
     speaker.resume();
-    if ('Notification' in window && Notification.permission === 'default') Notification.requestPermission();
+    if (window.Notification?.permission === 'default') Notification.requestPermission();
   };
   return html`<button type="button" class="plain" aria-pressed=${on} aria-label="Sound of alarms"
     title=${on ? 'Alarms sound; click to mute them' : 'Alarms are mute; click to hear them'} onClick=${change}>
