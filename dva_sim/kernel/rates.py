@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Final
 
-RATE_OVER: Final = 5.0  # rates are of so many last seconds [s]
+RATE_OVER: Final = 5.0  # window over which a rate is taken [s]
 
 
 class Rate:

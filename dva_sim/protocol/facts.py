@@ -15,7 +15,7 @@ from dva_sim.protocol.wire_size import sent_time
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fact:
-    """One decision.
+    """Decision of a person, the policy or the DVA, or its refusal.
 
     Attributes:
         time: Time by the DVA's clock [s].

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.bench import ServerActions
 from dva_sim.console.dva.device_rows import DeviceRows
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.dva.run_bench import RunBench
-from dva_sim.console.run.real_links import ConsoleSockets
 from dva_sim.console.wire.rows import DevicesLine
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA, address_of, id_of
@@ -20,27 +17,18 @@ class DvaPages(ServerActions):
     """The DVA of a run as people see and serve it.
 
     Args:
-        address: Address of the DVA, real or displayed.
-        sockets: Sockets of the messages, if the links are real.
-        moved: Called when the DVA listens elsewhere.
+        run: The run.
+        bench: Bench on which its DVA runs.
 
     Attributes:
-        bench: Bench on which the DVA runs.
         fakes: Devices that were added by hand, which hear nothing.
         looked: True while somebody looks at the table of devices.
     """
 
-    def __init__(
-        self,
-        run: Run,
-        address: str,
-        sockets: ConsoleSockets | None,
-        moved: Callable[[str], object],
-    ) -> None:
-        self.bench = RunBench(run, address, sockets, moved)
-        super().__init__(self.bench)
+    def __init__(self, run: Run, bench: RunBench) -> None:
+        super().__init__(bench)
+        self.bench = bench
         self._run = run
-        self._is_real = sockets is not None
         self.looked = False
         self._rows = DeviceRows(run, self.bench)
         self.fakes = FakeDevices(
@@ -80,8 +68,9 @@ class DvaPages(ServerActions):
         return device
 
     def _identity(self, number: int) -> tuple[str, str]:
-        nowhere = NOWHERE.format(number % 250 + 1)
-        return id_of("fake", number), nowhere if self._is_real else address_of("fake", number)
+        is_modelled = self.bench.is_modelled
+        address = address_of("fake", number) if is_modelled else NOWHERE.format(number % 250 + 1)
+        return id_of("fake", number), address
 
     def _dismiss(self, id_tag: str) -> None:
         stage = self._run.stage

@@ -31,6 +31,7 @@ class RunBench:
     Attributes:
         port: Port of the DVA.
         devices: Devices in the DVA's book.
+        is_modelled: True if its links are modelled, and no real sockets.
     """
 
     def __init__(
@@ -44,7 +45,7 @@ class RunBench:
         self._run = run
         self.devices = DeviceTable(lambda: run.dva)
         self.port = DvaPort(lambda: run.dva, network, address)
-        self._is_modelled = sockets is None
+        self.is_modelled = sockets is None
         self._moved = moved
 
     def server(self) -> ServerShown:
@@ -53,7 +54,7 @@ class RunBench:
             "listens": self.port.listens,
             "address": self.port.address,
             "port": self.port.number,
-            "modelled": self._is_modelled,
+            "modelled": self.is_modelled,
         }
 
     def open_server(self, port: int, on_result: OnResult) -> None:

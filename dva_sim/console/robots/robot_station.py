@@ -74,7 +74,7 @@ class OwnStation:
         self._asking = True
         self._problem = ""
         self._network.introduce(device.dva, dva)
-        device.dva_address = dva
+        device.look_for_dva_at(dva)
         device.come_back()
         device.register_once(
             lambda reply: self._answered(reply, then), lambda: self._unanswered(then)

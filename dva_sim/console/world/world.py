@@ -19,6 +19,7 @@ from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited, name_of_page
 from dva_sim.console.driving.seat_lines import SeatLines
 from dva_sim.console.dva.dva_pages import DvaPages
+from dva_sim.console.dva.run_bench import RunBench
 from dva_sim.console.events.console_alarms import ConsoleAlarms
 from dva_sim.console.events.rooms import ConsoleRooms
 from dva_sim.console.guards.played_guards import PlayedGuards
@@ -136,7 +137,8 @@ class ConsoleWorld:
         self.screens = Screens(
             self.run, id_of("console", SCREEN), self.feed.numbers, self._show_frame
         )
-        self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)
+        bench = RunBench(self.run, self.phones.address, self.sockets, self._dva_moved)
+        self.dva = DvaPages(self.run, bench)
         self.rooms = ConsoleRooms(self.run, self.dva.bench.appoint)
         self.foreign = ForeignDevices(self.run, self.feed, self.rooms.listener.device)
         self.driven = DrivenRun(

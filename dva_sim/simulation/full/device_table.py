@@ -20,7 +20,7 @@ MOST_ROWS: Final = 200  # of the table; more are read by nobody
 
 @dataclass(frozen=True, slots=True)
 class BookedDevice:
-    """One device in the book.
+    """Entry of the DVA's book of devices.
 
     Attributes:
         device: Device as in the list of devices.
@@ -59,7 +59,7 @@ class DeviceTable:
         self._beats: dict[str, Rate] = {}
 
     def rows(self) -> list[BookedDevice]:
-        """Return the first so many devices; to be asked for once a second."""
+        """Return up to `MOST_ROWS` devices, silent ones last; call it once a second."""
         entries = self._dva().core.registry.entries
         first = islice(sorted(entries, key=lambda i: entries[i].silent), MOST_ROWS)
         self._beats = {i: self._beats.get(i) or Rate() for i in first}
