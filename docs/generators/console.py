@@ -39,7 +39,7 @@ _ROLES = {
 }
 _PLACES = {
     ActionPlace.WORLD: "simulation",
-    ActionPlace.ATTACHED: "attached",
+    ActionPlace.REMOTE: "remote DVA",
     ActionPlace.ROBOT: "robot alone",
     ActionPlace.REPLAY: "recording",
 }

@@ -219,7 +219,7 @@ def run_one(part: str, options: LiveOptions) -> None:
 
         beside = None
         if options.serves_page:
-            from dva_sim.console.attached.beside import PageBeside  # late: start-up
+            from dva_sim.console.remote.beside import PageBeside  # late: start-up
 
             beside = PageBeside(options, partial(_print, screen.console))
         found = run_part(part, options, say, options.number, beside=beside)

@@ -141,8 +141,8 @@ def console(options: ConsoleOptions, quiet: Quiet = False, verbose: Verbose = Fa
     has_token = not options.no_token
     has_keys = options.keys is not None
     if options.dva is not None:
-        from dva_sim.console.attached.options import check, listening_address  # late: start-up
-        from dva_sim.console.attached.supervisor import attach  # late: start-up
+        from dva_sim.console.remote.options import check, listening_address  # late: start-up
+        from dva_sim.console.remote.supervisor import attach  # late: start-up
 
         check(options)
         exposure.warn_of_pages([options.host], has_token=has_token)

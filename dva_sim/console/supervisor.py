@@ -12,8 +12,8 @@ from dva_sim.console.audit.audit_keeper import auditing
 from dva_sim.console.driving.seating import leave_seats
 from dva_sim.console.options import kept_results, motion_folder, scenario_of, sockets
 from dva_sim.console.pages.processes import ConsoleProcesses
-from dva_sim.console.people.actions import Actions
 from dva_sim.console.world.kept_results import KeptResults
+from dva_sim.console.world.run_actions import RunActions
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live.kept_facts import keep_run
@@ -175,7 +175,7 @@ class ConsoleSupervisor:
 
     def _run(self, world: ConsoleWorld) -> None:
         with ending_when_asked(world.clock, supervised=False) as ending:
-            actions = Actions(world)
+            actions = RunActions(world)
             path = None if world.audited is None else world.audited.keeper.path
             self._processes.start(world, actions.take, audit=path)
             if world.sockets is not None:
@@ -200,7 +200,7 @@ class ConsoleSupervisor:
     def _serve_ros(self, world: ConsoleWorld, port: OpenPort) -> RosbridgeServer:
         """Serve the robots to clients of ROS."""
         stage = world.run.stage
-        gateway = RosGateway(stage, lambda: world.console)
+        gateway = RosGateway(stage, lambda: world.seating.console)
         gateway.camera_base = str(self._processes.serving["base"])
         gateway.camera_token = self._look_token
         self._say(f"rosbridge: {port.url}")

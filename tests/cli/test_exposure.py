@@ -5,7 +5,7 @@ from helpers.processes.command_line import call
 from helpers.wording import unnamed
 
 from dva_sim.cli import exposure, live_screen
-from dva_sim.console.attached import supervisor as attached
+from dva_sim.console.remote import supervisor as attached
 from dva_sim.console.simulator.robot_simulator import RobotSimulator
 from dva_sim.console.supervisor import ConsoleSupervisor
 

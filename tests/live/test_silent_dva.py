@@ -5,7 +5,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from helpers.console.attached_console import AttachedPage
+from helpers.console.remote_console import RemotePage
 from helpers.console.simulated_phone import PhonePage
 from helpers.ros.bridged_robot import BridgedRobot
 from helpers.ros.ros_machine import RosMachine
@@ -92,7 +92,7 @@ def attached(absent: bool, folder: Path, at_end: ExitStack) -> Listener:
 
     if absent:
         silence()
-    page = AttachedPage(world, folder / "audit.sqlite")
+    page = RemotePage(world, folder / "audit.sqlite")
     at_end.callback(page.keeper.close)
     page.let(5.0)
     if not absent:

@@ -19,7 +19,7 @@ class FarRobots(Patient):
         scenario = build(SOURCE, parse_changes(("link.delay_s=0.1",)))
         self.world = ConsoleWorld(scenario, "test", 1)
         self.clock = self.world.clock
-        self.gateway = RosGateway(self.world.run.stage, lambda: self.world.console)
+        self.gateway = RosGateway(self.world.run.stage, lambda: self.world.seating.console)
         self.until(lambda: "robot_1" in self.gateway.robots)
         self.robot = self.gateway.robots["robot_1"].id_tag
         self.driver = self.gateway.driver()

@@ -10,13 +10,12 @@ from dva_sim.agents.device import HEARTBEAT_PERIOD
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.dva.run_bench import RunBench
 from dva_sim.console.robots.shown_mode import EMERGENCY, shown_mode
+from dva_sim.console.system.system_state import DeviceState
 from dva_sim.console.views.published_rows import (
-    SILENT_AFTER,
     emergency_of,
     holder_named,
     sensors_of,
 )
-from dva_sim.console.views.system_state import DeviceState
 from dva_sim.console.wire.rows import DeviceRow
 from dva_sim.kernel.rates import Rate
 from dva_sim.protocol import messages as m
@@ -76,6 +75,7 @@ def listed_device_row(
     now: float,
     labels: Mapping[str, str],
     *,
+    is_lost: bool,
     is_fake: bool,
     may_revoke: bool,
 ) -> DeviceRow:
@@ -90,7 +90,7 @@ def listed_device_row(
         device,
         doing=status.activity if isinstance(status, m.PersonStatus) else doing,
         heard_s=None if device_state.heard is None else now - device_state.heard,
-        silent=now - device_state.listed > SILENT_AFTER,
+        silent=is_lost,
         beats_hz=device_state.rate.of(device_state.beats, now),
         holder=None if holder is None else holder.holder,
         holder_label=holder_named(holder, labels) or "",

@@ -13,12 +13,10 @@ from typing import Final, Unpack
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.asking.refusal import OnResult, unanswered
-from dva_sim.console.events.decisions import dispatch_shown
-from dva_sim.console.wire.events import ControlLine, RoomEntry
+from dva_sim.console.wire.events import RoomEntry
 from dva_sim.console.wire.limits import LONG
 from dva_sim.console.wire.seats import Answered
 from dva_sim.kernel.labels import with_id
-from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import FORGET_AFTER, ControlRoomRole
 from dva_sim.simulation.full.run import Run
 
@@ -75,7 +73,8 @@ class ConsoleRooms:
         appoint: Gives a control room a role; see `Bench`.
 
     Attributes:
-        listener: Control room that receives the DVA's news of events for the pages.
+        listener: Control room that receives the DVA's news of events for the pages; its
+            reader starts it.
         by_client: The rooms by their pages.
     """
 
@@ -84,18 +83,12 @@ class ConsoleRooms:
         self._appoint = appoint
         self.by_client: dict[str, ConsoleRoom] = {}
         self._used: set[int] = set()
-        self._switched = 0.0
         self.listener = self._agent(LISTENER, "console")
-        self.listener.on_dispatch = self._note_switch
-        self.listener.start()
 
     def _agent(self, number: int, label: str) -> ControlRoomAgent:
         device = self._run.stage.device("control-room", number)
         device.call(label)
         return ControlRoomAgent(device)
-
-    def _note_switch(self, _: m.DispatchStatus) -> None:
-        self._switched = self.listener.device.clock.now
 
     # --- who decides ------------------------------------------------------------------------
 
@@ -200,12 +193,10 @@ class ConsoleRooms:
         room = self.by_client.get(client)
         return "" if room is None else room.device.label
 
-    def line(self, now_ms: int) -> ControlLine:
-        """Return the dispatch mode, and who decides."""
-        rooms: list[RoomEntry] = [
+    def entries(self) -> list[RoomEntry]:
+        """Return who decides."""
+        return [
             {"label": room.device.label, "role": room.role, "client": client}
             for client, room in self.by_client.items()
             if room.registered
         ]
-        dispatch = dispatch_shown(self.listener.dispatch, self._switched)
-        return {"k": "control", "t": now_ms, "dispatch": dispatch, "rooms": rooms}

@@ -21,11 +21,11 @@ from dva_sim.console.replay.moments import (
 )
 from dva_sim.console.replay.robot_lines import RobotLines, about
 from dva_sim.console.robots.shown_mode import EMERGENCY
+from dva_sim.console.system.things import UNKNOWN_PERSON, Things, camera_shown
 from dva_sim.console.views.event_rows import event_row
 from dva_sim.console.views.feed import moment_shown
 from dva_sim.console.views.fields import HazardFeed
 from dva_sim.console.views.scene import scene_of
-from dva_sim.console.views.things import UNKNOWN_PERSON, Things, camera_shown
 from dva_sim.console.wire.events import EventsLine, HazardsLine, StorySoFarLine
 from dva_sim.console.wire.rows import (
     DeviceRow,

@@ -243,7 +243,7 @@ class RobotWorld:
         )
 
     def _tell_positions(self) -> None:
-        self._news.tell(self.feed.positions())
+        self._news.tell({"k": "pos", "t": self.feed.now_ms, "p": self.feed.positions()})
 
     def _tell_windows(self) -> None:
         def reason_of(robot: RobotAgent) -> str:

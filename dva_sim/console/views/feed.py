@@ -12,9 +12,9 @@ from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.robots.shown_mode import latch_shown, shown_mode
 from dva_sim.console.robots.stop_reasons import stop_reason
 from dva_sim.console.run.played_run import PlayedRun
-from dva_sim.console.views.things import Things, camera_shown
+from dva_sim.console.system.things import Things, camera_shown
 from dva_sim.console.wire.events import StoryLine
-from dva_sim.console.wire.rows import DoingShown, PlacesLine, RobotRow
+from dva_sim.console.wire.rows import DoingShown, RobotRow
 from dva_sim.console.wire.scenes import Happened, ThingBody
 from dva_sim.kernel.rates import Rate
 from dva_sim.kernel.recorder import Moment, Recorder
@@ -66,8 +66,8 @@ class Feed:
 
     # --- where everybody is ----------------------------------------------------------------
 
-    def positions(self) -> PlacesLine:
-        """Return the positions of everybody on the site."""
+    def positions(self) -> list[list[int]]:
+        """Return the positions of everybody on the site; see `PlacesLine`."""
         field = self._run.field
         field.world.advance_to(self._run.clock.now)
         rows = []
@@ -81,7 +81,7 @@ class Feed:
                 x, y = who.walking.place
                 speed = round(1000 * who.walking.speed) if who.walking.walks else 0
                 rows.append(self._at(name, x, y, who.heading, speed))
-        return {"k": "pos", "t": self.now_ms, "p": rows}
+        return rows
 
     def _at(self, name: str, x: float, y: float, heading: float, speed: int) -> list[int]:
         turn = math.remainder(heading, 2.0 * math.pi)

@@ -9,7 +9,7 @@ from typing import Final
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.events.console_alarms import UNHEARD
 from dva_sim.console.robots.shown_mode import EMERGENCY, EMERGENCY_LAPSES, emergency_shown
-from dva_sim.console.views.system_state import DeviceState
+from dva_sim.console.system.system_state import DeviceState
 from dva_sim.console.wire.rows import EmergencyShown, RobotRow
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.geo import GeoFrame

@@ -68,7 +68,7 @@ class ActionPlace(Flag):
     """Places in which an action can act."""
 
     WORLD = auto()
-    ATTACHED = auto()
+    REMOTE = auto()
     ROBOT = auto()
     REPLAY = auto()
 
@@ -171,9 +171,9 @@ class Action:
 
 _OFTEN = "comes many times a second; what became of it is in the recording"
 _LOOKS = "changes nothing but what a page shows"
-_RUN = ActionPlace.WORLD | ActionPlace.ATTACHED
+_RUN = ActionPlace.WORLD | ActionPlace.REMOTE
 _HANDS = ActionPlace.WORLD | ActionPlace.ROBOT
-_ALL = ActionPlace.WORLD | ActionPlace.ATTACHED | ActionPlace.ROBOT | ActionPlace.REPLAY
+_ALL = ActionPlace.WORLD | ActionPlace.REMOTE | ActionPlace.ROBOT | ActionPlace.REPLAY
 _DECIDE: Any = {"at": _RUN, "role": Role.DISPATCH, "audit": Audit.DVA, "over_link": True}
 _ALARM: Any = {"at": _RUN, "role": Role.DISPATCH}
 _ALONE: Any = {"at": ActionPlace.ROBOT, "role": Role.DRIVE}

@@ -34,8 +34,8 @@ Hearing = Literal["answers", "silent", "never"]
 class ServerShown(TypedDict):
     """Address of the DVA, and whether it listens.
 
-    An attached console adds what it knows by messages: `own` is False if it can neither start nor
-    stop the server, `role` is what the DVA lets it do, and `console` the id of its own device.
+    `own` is False if the console can neither start nor stop the server, `role` is what the DVA lets
+    it do, and `console` the id of its own device.
     """
 
     listens: bool
@@ -58,7 +58,7 @@ class EmergencyShown(TypedDict):
 
 
 class RobotRow(TypedDict):
-    """State of a robot."""
+    """State of a robot; `silent`: the DVA has lost it, and lists it no longer."""
 
     i: int
     mode: str
@@ -80,6 +80,7 @@ class RobotRow(TypedDict):
     by_hand: NotRequired[bool]
     camera: NotRequired[str | None]
     sensors: NotRequired[list[str]]
+    silent: NotRequired[bool]
 
 
 class DoingShown(TypedDict):

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers.console.attached_console import AttachedPage
 from helpers.console.foreign_device import LABEL, foreign_device
+from helpers.console.remote_console import RemotePage
 from helpers.console.simulated_phone import PhonePage
 from helpers.wording import unnamed
 
@@ -104,7 +104,7 @@ def own_run(page: PhonePage, _: Path) -> Desk:
 
 def attached(page: PhonePage, folder: Path) -> Desk:
     """A console that knows the same run by its messages alone."""
-    other = AttachedPage(page, folder / "audit.sqlite")
+    other = RemotePage(page, folder / "audit.sqlite")
     other.actions.take({"do": "here", "pages": {"c1": "supervise"}})
 
     def do(what: str, **about: Any) -> tuple[bool, str]:

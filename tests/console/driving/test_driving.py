@@ -315,7 +315,7 @@ def joined(driving):
 
     device.serve(answer)
     device.register(lambda: None)
-    driving.until(lambda: device.id_tag in driving.world.foreign.addresses())
+    driving.until(lambda: device.id_tag in driving.world.system.robots())
     return device
 
 
@@ -331,7 +331,7 @@ def test_an_emergency_reaches_a_robot_that_has_joined_from_outside(driving, join
 def test_devices_that_hear_nothing_do_not_hold_up_an_emergency(driving):
     added, _ = driving.do("fake_add", label="decoy", type="Robot")
     assert added
-    driving.until(lambda: driving.world.foreign.addresses())
+    driving.until(lambda: driving.world.system.robots())
     began = driving.world.clock.now
     assert driving.do("emergency", robots="all")[0]
     assert driving.world.clock.now < began + 2.0

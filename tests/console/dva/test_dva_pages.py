@@ -70,12 +70,9 @@ def test_a_stopped_server_answers_nobody_and_a_started_one_does(page):
     done, text = page.do("server_start", port=6000)
     assert (done, unnamed(text, "192.168.0.2:6000")) == (True, [])
     assert asked_of(page, someone(page), DVA, m.GetDeviceList()).code == m.OK
-    assert page.lines_of("rows")[-1]["server"] == {
-        "listens": True,
-        "address": "192.168.0.2:6000",
-        "port": 6000,
-        "modelled": True,
-    }
+    server = page.lines_of("rows")[-1]["server"]
+    assert (server["listens"], server["port"], server["modelled"]) == (True, 6000, True)
+    assert server["address"] == "192.168.0.2:6000"
     assert page.lines_of("scene")[-1]["dva_address"] == "192.168.0.2:6000"
 
 
@@ -154,7 +151,7 @@ def test_over_sockets_a_port_that_is_taken_is_told_and_the_server_stays_stopped(
         ok, text = real.do("server_start", port=taken.getsockname()[1])
     assert not ok
     assert "cannot listen" in text
-    assert real.world.dva.bench.port.listens is False
+    assert real.world.bench.port.listens is False
 
 
 # --- fake devices ------------------------------------------------------------------------------

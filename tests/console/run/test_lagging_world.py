@@ -7,7 +7,7 @@ from helpers.console.declared_lines import checked
 from helpers.processes.patience import becomes
 
 from dva_sim.agents.robot.controller import Mode
-from dva_sim.console.people.actions import Actions
+from dva_sim.console.world.run_actions import RunActions
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.network.realtime import Poller
 from dva_sim.simulation.scenario import build, load
@@ -20,7 +20,7 @@ def world():
     made = ConsoleWorld(build(load("hands-on")), "hands-on", 1)
     made.lines = []
     made.tell = lambda line, key="": made.lines.append(checked(line))
-    made.actions = Actions(made)
+    made.actions = RunActions(made)
     made.begin()
     made.clock.go()
     return made

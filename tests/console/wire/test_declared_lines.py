@@ -1,8 +1,8 @@
 """Each line as it is declared: what a checker of them finds."""
 
 import pytest
-from helpers.console.attached_console import attached
 from helpers.console.declared_lines import at_page, checked
+from helpers.console.remote_console import attached
 from helpers.console.simulated_phone import FIRE, PhonePage
 from pydantic import ValidationError
 

@@ -75,7 +75,7 @@ class RosClient:
 
     def __init__(self, page):
         self._page = page
-        self._gateway = RosGateway(page.world.run.stage, lambda: page.world.console)
+        self._gateway = RosGateway(page.world.run.stage, lambda: page.world.seating.console)
         page.let(5.0)
         self._driver = self._gateway.driver()
 

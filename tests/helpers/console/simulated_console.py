@@ -8,7 +8,7 @@ import time
 from helpers.console.declared_lines import checked
 
 from dva_sim.cameras.lines import PaintersLine
-from dva_sim.console.people.actions import Actions
+from dva_sim.console.world.run_actions import RunActions
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.kernel.clock import US
 from dva_sim.network.realtime import PacedClock
@@ -62,7 +62,7 @@ class Page:
         self.lines, self.frames, self.client = [], [], client
         self.world.tell = lambda line, key="": self.lines.append(checked(line))
         self.world.show = lambda line, key="": self.frames.append(checked(line, PaintersLine))
-        self.actions = Actions(self.world)
+        self.actions = RunActions(self.world)
         self.world.begin()
         self.are_open(client)
         self.wanted, self._count = None, 0

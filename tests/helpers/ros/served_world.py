@@ -41,7 +41,7 @@ class ServedWorld(Patient):
         door = open_port("127.0.0.1", 0, "--rosbridge", token)
         self.url, self.lines = door.url, []
         stage = self.world.run.stage
-        self.gateway = RosGateway(stage, lambda: self.world.console)
+        self.gateway = RosGateway(stage, lambda: self.world.seating.console)
         self.server = RosbridgeServer(self.clock, door, self.gateway, stage.site, self.lines.append)
         self.until(lambda: len(self.gateway.robots) == 2)
 

@@ -98,13 +98,13 @@
  * @typedef {{at_ms: number, by: string, released_by: string}} Emergency
  */
 /**
- * State of a robot.
+ * State of a robot; `silent`: the DVA has lost it, and lists it no longer.
  * @typedef {{i: number, mode: string, stop_reason: string, pattern: string | null, battery: number
  *   | null, holder: string | null, holder_label: string | null, session_age_s: number | null,
  *   watchdog_left_s: number | null, set_speed_mps: number | null, set_turn_rate_radps: number |
  *   null, queue: number | null, lost: number | null, commands_hz: number | null, refused: number |
  *   null, timeouts: number | null, emergency: Emergency | null, by_hand?: boolean, camera?: string
- *   | null, sensors?: string[]}} RobotRow
+ *   | null, sensors?: string[], silent?: boolean}} RobotRow
  */
 /**
  * Activity of somebody on foot.

@@ -1,0 +1,319 @@
+"""Lines about a system for pages: each on change, and no more often.
+
+While the DVA does not answer, what it last said stays shown, with a word that says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Final, Protocol
+
+from dva_sim.cameras.lines import Show
+from dva_sim.console.audit.audited import Audited, name_of_page
+from dva_sim.console.driving.decision_actions import DecidingRooms
+from dva_sim.console.driving.driven_system import DrivenSystem
+from dva_sim.console.driving.seat_lines import SeatLines
+from dva_sim.console.dva.device_rows import listed_device_row
+from dva_sim.console.dva.fake_devices import FakeDevices
+from dva_sim.console.events.console_alarms import ConsoleAlarms
+from dva_sim.console.events.decisions import dispatch_shown
+from dva_sim.console.phones.phone_seat import PhoneSeat
+from dva_sim.console.run.lag import LagRule
+from dva_sim.console.system.known_system import KnownSystem
+from dva_sim.console.system.sensing import WatchedSensors
+from dva_sim.console.views.event_rows import event_rows
+from dva_sim.console.views.feed import story_of
+from dva_sim.console.views.news import News, clock_shown
+from dva_sim.console.views.published_rows import positions, robot_row
+from dva_sim.console.wire.arguments import LogsLooked
+from dva_sim.console.wire.events import RoomEntry, SiteEventShown
+from dva_sim.console.wire.lines import Tell
+from dva_sim.console.wire.rows import DeviceRow, DoingShown, Hearing, RobotRow, ServerShown
+from dva_sim.console.wire.scenes import LinkShown, SceneLine
+from dva_sim.kernel.recorder import Breach
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import ROBOT
+
+# From one line to the next, real time [s].
+POSITIONS: Final = 0.1
+ROWS: Final = 0.5
+DEVICES: Final = 1.0
+NEWS: Final = 0.05
+HEARD: Final[Mapping[Hearing, str]] = {
+    "answers": "answers",
+    "silent": "is silent: what is shown is old",
+    "never": "has not answered since the start",
+}
+
+
+class NamedRooms(DecidingRooms, Protocol):
+    """Control rooms of a console, and who is at them."""
+
+    def label(self, client: str) -> str:
+        """Return the name of a page's person; empty if it has given none."""
+
+    def entries(self) -> list[RoomEntry]:
+        """Return who decides, and what each may."""
+
+    def leave(self, client: str) -> object:
+        """A page is gone for good."""
+
+    def attend(self, pages: Mapping[str, str]) -> None:
+        """Note which pages are open, and the role of each."""
+
+
+class ConsolePages:
+    """State of a system for pages; see `ConsoleSubject`.
+
+    Args:
+        system: System that is shown.
+        rooms: Control rooms of the console.
+        driven: Its robots, as people drive them.
+        fakes: Devices that were added by hand.
+        phones: Phones at the console, by client.
+        breaches: Function that returns the broken safety rules, as far as they are judged here.
+
+    Attributes:
+        looked: True while somebody looks at the table of devices.
+        alarms: Alarms that need action.
+        sensors: Sensors of robots from outside that somebody looks at.
+        audited: Keeps who did what; None: nobody does.
+        lag: Rule that holds drives while what runs here lags; nothing runs at a remote DVA's.
+    """
+
+    lag = LagRule()
+
+    def __init__(
+        self,
+        system: KnownSystem,
+        *,
+        rooms: NamedRooms,
+        driven: DrivenSystem,
+        fakes: FakeDevices,
+        phones: Mapping[str, PhoneSeat],
+        breaches: Callable[[], Iterable[Breach]] = tuple,
+    ) -> None:
+        self.system = system
+        self.clock = system.clock
+        self.rooms = rooms
+        self.driven = driven
+        self.fakes = fakes
+        driven.free_seat = self.free_seat
+        driven.is_fake = lambda device: device in fakes.devices
+        self.seating = driven.seating
+        self.tell: Tell = lambda *_: None
+        self.show: Show = lambda *_: None
+        self.dropped: Callable[[], int] = lambda: 0
+        self.looked = False
+        self.sensors = WatchedSensors(system.device, system.state, system.id_of)
+        self.alarms = ConsoleAlarms(system.agent, system.named, breaches)
+        self.audited: Audited | None = None
+        self.seat_lines = SeatLines(driven, phones)
+        self._news = News(lambda: self.tell)
+        self._events: list[SiteEventShown] = []
+        self._hearing: Hearing = "never"
+        self._modes: list[object] = []
+        self._is_shown = False
+        system.on_devices = self.tell_scene
+
+    # --- see `ConsoleSubject` --------------------------------------------------------------
+
+    def serve_cameras(self, base: str) -> None:
+        """Robots that run elsewhere say themselves where their pictures are."""
+
+    def show_scene(self) -> None:
+        """There is nothing to be drawn of a world that is known by messages alone."""
+
+    def note(self, text: str) -> None:
+        """Something of the console itself has gone wrong that people should know of."""
+        self.system.recorder.tell(self.clock.now, "console", text, "link")
+
+    def begin(self) -> None:
+        """Take part, tell the scene, and from then on what changes."""
+        self.system.start()
+        clock = self.clock
+        clock.pulse(POSITIONS, self._tell_positions)
+        clock.pulse(ROWS, self.tell_rows)
+        clock.pulse(NEWS, self._tell_news)
+        clock.pulse(DEVICES, self._tell_devices)
+        clock.pulse(DEVICES, self.sensors.go_on)
+
+    # --- pages and their people ------------------------------------------------------------
+
+    def look(self, line: LogsLooked) -> None:
+        """Tell what pages look at now, and nothing else."""
+        self.looked = "devices" in line["tables"]
+
+    def watch(self, robots: list[int]) -> None:
+        """Somebody looks at these robots now, and at no others."""
+        self.sensors.watch(robots)
+
+    def author(self, client: str) -> str:
+        """Return the name of a page's person."""
+        if room := self.rooms.label(client):
+            return room
+        person = self.seating.of_client(client)
+        return name_of_page(client) if person is None else person.device.label
+
+    def free_seat(self, client: str) -> None:
+        """Free a client's seat and notify the client."""
+        self.tell(self.seat_lines.free(client), client)
+        self._news.forget("seat", client)
+
+    # --- what is told ----------------------------------------------------------------------
+
+    def scene(self) -> SceneLine:
+        """Return what does not change, but for who is there and where the DVA listens."""
+        raise NotImplementedError
+
+    def link(self) -> LinkShown:
+        """Return the link of the robots."""
+        raise NotImplementedError
+
+    def server(self) -> ServerShown:
+        """Return what is known of the DVA's server."""
+        raise NotImplementedError
+
+    def tell_scene(self) -> None:
+        """Tell who is there: a new device has a number."""
+        self._is_shown = True
+        self.tell(self.scene())
+
+    def tell_now(self) -> None:
+        """Publish at once instead of in the next period."""
+        self.tell_rows()
+        self.tell_seats()
+        self._tell_audit()
+
+    def _tell_positions(self) -> None:
+        if self._is_shown:
+            self._news.tell({"k": "pos", "t": self.system.now_ms, "p": self.positions()})
+
+    def positions(self) -> list[list[int]]:
+        """Return the positions of all devices that have reported one."""
+        system = self.system
+        return positions(system.state.devices, system.numbers, system.frame)
+
+    def tell_rows(self) -> None:
+        """Tell the state of the clock, the link, the server, and of everybody."""
+        robots = self.robots()
+        self.tell(
+            {
+                "k": "rows",
+                "t": self.system.now_ms,
+                "clock": clock_shown(self.clock, self.lag),
+                "link": self.link(),
+                "dropped": self.dropped(),
+                "server": self.server(),
+                "robots": robots,
+                "people": self.people(),
+                "order": self.seat_lines.waiting_order(),
+            }
+        )
+        self._tell_alarms(robots)
+
+    def robots(self) -> list[RobotRow]:
+        """Return a row for each robot from outside, as it says itself."""
+        system = self.system
+        rows = []
+        for id_tag in system.robots():
+            if id_tag in system.numbers:
+                entry = system.state.devices[id_tag]
+                row = robot_row(
+                    entry, system.numbers[id_tag], self.clock.now, self._stopper_named(id_tag)
+                )
+                row["pattern"] = self.driven.pattern_of(id_tag)
+                row["silent"] = system.is_lost(id_tag)
+                rows.append(row)
+        return rows
+
+    def _stopper_named(self, robot: str) -> Mapping[str, str]:
+        """Return labels in which a device that stopped a robot from a page is its person."""
+        labels = self.system.labels
+        stopper = self.driven.stoppers.get(robot)
+        return labels if stopper is None else {**labels, stopper[0]: stopper[1]}
+
+    def people(self) -> list[DoingShown]:
+        """Return the activities of people from outside, as they say themselves."""
+        numbers = self.system.numbers
+        return [
+            {"i": numbers[id_tag], "doing": entry.status.activity}
+            for id_tag, entry in self.system.state.devices.items()
+            if isinstance(entry.status, m.PersonStatus) and id_tag in numbers
+        ]
+
+    def _tell_alarms(self, robots: list[RobotRow]) -> None:
+        """Tell alarms; while the state of events is unknown, alarms stay as they are."""
+        now_ms = self.system.now_ms
+        is_known = self.system.has_all_events and self.system.answers
+        known = self.alarms.look(self._events, robots, now_ms) if is_known else None
+        self._news.tell(known or self.alarms.hold(now_ms))
+
+    def _tell_news(self) -> None:
+        """Tell events, story and seats as they change, and rows when a mode or holder does."""
+        self._tell_hearing()
+        self._tell_events()
+        for line in story_of(self.system.recorder):
+            self.tell(line)
+        if (modes := self.modes()) != self._modes:
+            self._modes = modes
+            self.tell_rows()
+        self.tell_seats()
+        self._tell_audit()
+
+    def modes(self) -> list[object]:
+        """Return the modes and holders of robots, on a change of which rows are sent at once."""
+        devices = self.system.state.devices
+        robots = [entry for entry in devices.values() if entry.device.device_type == ROBOT]
+        return [(one.holder and one.holder[0].holder, _mode_of(one.status)) for one in robots]
+
+    def _tell_hearing(self) -> None:
+        hearing = self.system.hearing
+        if hearing != self._hearing:
+            self._hearing = hearing
+            self.system.recorder.tell(self.clock.now, "dva", HEARD[hearing], "link")
+            self.tell_rows()
+
+    def _tell_events(self) -> None:
+        """Tell events with what was decided on them, and who decides."""
+        system = self.system
+        now_ms = system.now_ms
+        if system.has_all_events:
+            self._events = event_rows(system.agent, system.labels, system.site, system.frame)
+            self._news.tell({"k": "events", "t": now_ms, "events": self._events})
+        dispatch = dispatch_shown(system.agent.dispatch, system.switched)
+        rooms = self.rooms.entries()
+        self._news.tell({"k": "control", "t": now_ms, "dispatch": dispatch, "rooms": rooms})
+
+    def tell_seats(self) -> None:
+        """Tell everybody in a seat about their own drives."""
+        for client, line in self.seat_lines.lines():
+            self._news.tell(line, client)
+
+    def _tell_audit(self) -> None:
+        if self.audited is not None:
+            self._news.tell(self.audited.keeper.line(self.system.now_ms))
+
+    def _tell_devices(self) -> None:
+        if self.looked:
+            rows = self.devices()
+            self.tell({"k": "devices", "t": self.system.now_ms, "devices": rows})
+
+    def devices(self) -> list[DeviceRow]:
+        """Return a row for each device that the DVA lists."""
+        system = self.system
+        return [
+            listed_device_row(
+                entry,
+                self.clock.now,
+                system.labels,
+                is_lost=system.is_lost(id_tag),
+                is_fake=id_tag in self.fakes.devices,
+                may_revoke=system.role == "supervise",
+            )
+            for id_tag, entry in system.state.devices.items()
+        ]
+
+
+def _mode_of(status: object) -> str:
+    return status.mode if isinstance(status, m.RobotStatus) else ""

@@ -1,0 +1,56 @@
+"""Devices added by hand beside a run: they register with its DVA as any other does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
+from dva_sim.console.dva.run_bench import RunBench
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import DVA, address_of, id_of
+from dva_sim.simulation.scenario import request_timeout_s
+
+
+def fakes_of(run: Run, bench: RunBench, dismissed: Callable[[str], object]) -> FakeDevices:
+    """Make room for devices beside a run.
+
+    Args:
+        run: The run.
+        bench: Bench on which its DVA runs.
+        dismissed: Callback for a device that the DVA has been made to forget, by id.
+    """
+    stage = run.stage
+
+    def make(id_tag: str, label: str, kind: str, address: str) -> AgentDevice:
+        device = AgentDevice(
+            id_tag=id_tag,
+            label=label,
+            device_type=kind,
+            address=address,
+            dva=DVA,
+            network=stage.network,
+            recorder=stage.recorder,
+            frame=stage.site.frame,
+            timeout=request_timeout_s(stage.scenario),
+            attempts=stage.scenario.request.attempts,
+            labels=stage.labels,
+            time_of_day=stage.time_of_day,
+        )
+        stage.devices.append(device)
+        return device
+
+    def identity(number: int) -> tuple[str, str]:
+        is_modelled = bench.is_modelled
+        address = address_of("fake", number) if is_modelled else NOWHERE.format(number % 250 + 1)
+        return id_of("fake", number), address
+
+    def dismiss(id_tag: str) -> None:
+        stage.devices[:] = [d for d in stage.devices if d.id_tag != id_tag]
+        stage.labels.pop(id_tag, None)
+        bench.forget(id_tag)
+        dismissed(id_tag)
+
+    return FakeDevices(
+        make, is_known=bench.is_registered, id_of=identity, dismiss=dismiss, removed="is removed"
+    )

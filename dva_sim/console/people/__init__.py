@@ -1,1 +1,0 @@
-"""Actions that people at pages ask of a console's own run."""

@@ -1,0 +1,136 @@
+"""Values of sensors of robots that somebody looks at: the DVA permits it, and the robot tells."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Final
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.operator.steps import give_back, start
+from dva_sim.agents.robot.sensors import sensor_topic
+from dva_sim.console.system.system_state import DeviceState, SystemState
+from dva_sim.network.messaging import Subscription
+from dva_sim.protocol import messages as m
+
+FREQUENCY: Final = 0.5  # of the values [Hz]
+RENEW: Final = 20.0  # a third of what a subscription lasts for [s]
+MOST: Final = 8  # robots that are listened to at once
+MOST_SENSORS: Final = 16  # of one robot
+
+
+class SensorWatch:
+    """One robot whose sensors are listened to, until nobody looks at it any more.
+
+    Args:
+        device: Device that subscribes.
+        device_state: State of the robot, which takes the values.
+    """
+
+    def __init__(self, device: AgentDevice, device_state: DeviceState) -> None:
+        self._device = device
+        self._state = device_state
+        self._robot = device_state.device.id_tag
+        self._session: int | None = None
+        self._over = False
+        self._subscriptions: dict[str, Subscription] = {}
+        self._ask()
+
+    def end(self) -> None:
+        """Nobody looks any more: the permission is given back."""
+        self._over = True
+        for name, subscription in self._subscriptions.items():
+            subscription.close()
+            if self._session is not None:
+                self._device.ask(self._robot, m.DevSub(name, 0.0), session=self._session)
+        self._subscriptions.clear()
+        self._state.values.clear()
+        if self._session is not None:
+            give_back(self._device, self._robot, self._session)
+
+    def _ask(self) -> None:
+        """Ask for the permission; if there is none, again after a while."""
+        if self._over:
+            return
+        names = tuple(sensor.name for sensor in self._state.sensors[:MOST_SENSORS])
+        wish = m.PermissionRequest(self._robot, "sensors", names)
+        self._device.ask(self._device.dva, wish, partial(self._answered, names), self._ask_later)
+
+    def _ask_later(self, *_: object) -> None:
+        self._device.clock.call_after(RENEW, self._ask)
+
+    def _answered(self, names: tuple[str, ...], reply: m.Reply) -> None:
+        permission = reply.content
+        if not isinstance(permission, m.Permission):
+            self._ask_later()
+            return
+        self._session = permission.session
+        if self._over:
+            give_back(self._device, self._robot, self._session)
+            return
+        for name in permission.sensors or names:
+            self._listen(name)
+            self._subscribe(name)
+        self._ask_later()  # which renews all of it
+
+    def _subscribe(self, name: str) -> None:
+        """The robot may not know of the permission yet."""
+        start(
+            *(self._device, self._robot, m.DevSub(name, FREQUENCY), lambda: self._session or 0),
+            wanted=lambda: not self._over,
+            begun=_nothing,
+            refused=_nothing,
+            lost=_nothing,
+        )
+
+    def _listen(self, name: str) -> None:
+        if name in self._subscriptions:
+            return
+        device = self._device
+        topic = sensor_topic(name, device.id_tag)
+        heard = device.network.subscribe(device.id_tag, self._robot, topic, self._heard)
+        self._subscriptions[name] = heard
+
+    def _heard(self, data: bytes) -> None:
+        message = self._device.read(data, self._robot)
+        if message is not None and isinstance(message.body, m.SensorValue):
+            self._state.values[message.body.sensor] = message.body, self._device.clock.now
+
+
+class WatchedSensors:
+    """All robots whose sensors are listened to.
+
+    Args:
+        device: Device that subscribes.
+        state: State of the robots.
+        id_of: The id of a device that pages know by a number; None: there is none.
+    """
+
+    def __init__(
+        self, device: AgentDevice, state: SystemState, id_of: Callable[[int], str | None]
+    ) -> None:
+        self._device = device
+        self._state = state
+        self._id_of = id_of
+        self._watches: dict[str, SensorWatch] = {}
+        self._looked: list[int] = []
+
+    def watch(self, numbers: list[int]) -> None:
+        """Somebody looks at these robots now, and at no others."""
+        self._looked = numbers[:MOST]
+        self.go_on()
+
+    def go_on(self) -> None:
+        """Begin where it has become known by now which sensors a robot has; end what is over."""
+        known = self._state.devices
+        looked = [id_tag for id_tag in map(self._id_of, self._looked) if id_tag in known]
+        wanted = [id_tag for id_tag in looked if id_tag and not known[id_tag].is_own]
+        for id_tag in [one for one in self._watches if one not in wanted]:
+            self._watches.pop(id_tag).end()
+        for id_tag in wanted:
+            if id_tag not in self._watches and known[id_tag].sensors:
+                self._watches[id_tag] = SensorWatch(self._device, known[id_tag])
+
+
+def _nothing(*_: object) -> None:
+    """Without values a sensor is shown as unknown, and it is asked again."""
