@@ -5,7 +5,7 @@ While the DVA does not answer, what it last said stays shown, with a word that s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Final, Protocol
 
 from dva_sim.cameras.lines import Show
@@ -15,6 +15,7 @@ from dva_sim.console.driving.driven_system import DrivenSystem
 from dva_sim.console.driving.seat_lines import SeatLines
 from dva_sim.console.dva.device_rows import listed_device_row
 from dva_sim.console.dva.fake_devices import FakeDevices
+from dva_sim.console.events.alarms import AlarmCondition
 from dva_sim.console.events.console_alarms import ConsoleAlarms
 from dva_sim.console.events.decisions import dispatch_shown
 from dva_sim.console.phones.phone_seat import PhoneSeat
@@ -246,8 +247,20 @@ class ConsolePages:
         """Tell alarms; while the state of events is unknown, alarms stay as they are."""
         now_ms = self.system.now_ms
         is_known = self.system.has_all_events and self.system.answers
-        known = self.alarms.look(self._events, robots, now_ms) if is_known else None
-        self._news.tell(known or self.alarms.hold(now_ms))
+        system = list(self._conditions())
+        if is_known:
+            self._news.tell(self.alarms.look(self._events, robots, now_ms, system))
+        else:
+            self._news.tell(self.alarms.hold(now_ms, system))
+
+    def _conditions(self) -> Iterator[AlarmCondition]:
+        """Yield the conditions of the system itself that need somebody to act."""
+        if self.system.is_silent:
+            text = f"The DVA at {self.system.dva} is silent"
+            yield AlarmCondition("dva silent", "DVA silent", "critical", place="", text=text)
+        if self.lag.held:
+            text = "This machine cannot keep up with real time: nobody may drive"
+            yield AlarmCondition("lag", "behind real time", "high", place="", text=text)
 
     def _tell_news(self) -> None:
         """Tell events, story and seats as they change, and rows when a mode or holder does."""

@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
-from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.events.alarms import AlarmCondition, Alarms
+from dva_sim.console.events.robot_conditions import robot_conditions
 from dva_sim.console.wire.events import AlarmsLine, SiteEventShown
 from dva_sim.console.wire.rows import RobotRow
 from dva_sim.kernel.recorder import Breach
@@ -20,7 +20,6 @@ from dva_sim.protocol.devices import GUARD, ROBOT
 
 ESCALATED_FOR: Final = 60.0  # so long an escalation counts as lasting, time of the run [s]
 OUTDOORS: Final = "outdoors"
-UNHEARD: Final = "nothing is heard of it"  # why a robot stands whose messages alone are known
 
 
 class ConsoleAlarms:
@@ -48,27 +47,43 @@ class ConsoleAlarms:
         self._breaches = breaches
         self._clock = clock or (lambda: time.monotonic())
         self.alarms = Alarms()
+        self._known: list[AlarmCondition] = []
         self._since: dict[str, int] = {}
 
     def look(
-        self, events: Sequence[SiteEventShown], robots: Sequence[RobotRow], now_ms: int
+        self,
+        events: Sequence[SiteEventShown],
+        robots: Sequence[RobotRow],
+        now_ms: int,
+        system: Iterable[AlarmCondition] = (),
     ) -> AlarmsLine:
-        """Derive the alarms from what pages are shown."""
-        found = [*_of_events(events, now_ms), *self._lost(robots), *self._nobody(events)]
-        found += self._broken()
+        """Derive the alarms from what pages are shown.
+
+        Args:
+            events: Rows of the events.
+            robots: Rows of the robots.
+            now_ms: Time of the run [ms].
+            system: Conditions of the system itself.
+        """
+        self._known = [*_of_events(events, now_ms), *robot_conditions(robots, self._named)]
+        self._known += [*self._nobody(events), *self._broken()]
+        return self.hold(now_ms, system)
+
+    def hold(self, now_ms: int, system: Iterable[AlarmCondition] = ()) -> AlarmsLine:
+        """Keep the alarms of events and robots, of which nothing new is known.
+
+        Args:
+            now_ms: Time of the run [ms].
+            system: Conditions of the system itself.
+        """
         timed = [
-            one._replace(since_ms=one.since_ms or self._from(one.key, now_ms)) for one in found
+            condition._replace(
+                since_ms=condition.since_ms or self._since.get(condition.key, now_ms)
+            )
+            for condition in (*system, *self._known)
         ]
-        self._since = {one.key: one.since_ms for one in timed}
+        self._since = {condition.key: condition.since_ms for condition in timed}
         self.alarms.update(timed, self._clock())
-        return self._line(now_ms)
-
-    def _from(self, key: str, now_ms: int) -> int:
-        return self._since.get(key, now_ms)
-
-    def hold(self, now_ms: int) -> AlarmsLine:
-        """Nothing is known of what has changed: the alarms stay as they are, but for shelves."""
-        self.alarms.go_on(self._clock())
         return self._line(now_ms)
 
     def _line(self, now_ms: int) -> AlarmsLine:
@@ -82,18 +97,6 @@ class ConsoleAlarms:
             "rate": self.alarms.rate(now),
             "left_out": self.alarms.left_out,
         }
-
-    def _lost(self, robots: Sequence[RobotRow]) -> Iterator[AlarmCondition]:
-        """Robots that are driven and hear nothing, or of which nothing is heard."""
-        for row in robots:
-            is_stopped = row["watchdog_left_s"] == 0.0 and "first command" not in row["stop_reason"]
-            is_lost = is_stopped or row["stop_reason"] == UNHEARD
-            if row["mode"] != Mode.TELEOPERATION.value or not is_lost:
-                continue
-            label = self._named(str(row["i"]))
-            why = "its watchdog stopped it" if is_stopped else UNHEARD
-            text = f"{label} is lost in drive: {why}"
-            yield AlarmCondition(f"lost {label}", "robot lost", "high", place="", text=text)
 
     def _broken(self) -> Iterator[AlarmCondition]:
         """Safety rules that are broken: for good, so that somebody has to see it."""

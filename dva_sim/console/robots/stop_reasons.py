@@ -22,7 +22,8 @@ def stop_reason(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
     point = robot.set_point
     if body.jammed:
         return "it is stuck against something"
-    if body.in_contact and STILL < abs(point.speed) > abs(body.speed) / HELD_BACK:
+    asked = abs(point.speed) if now < point.until else 0.0
+    if body.in_contact and STILL < asked > abs(body.speed) / HELD_BACK:
         return "something is in its way"
     if abs(body.speed) > STILL or abs(body.turn_rate) > STILL:
         return ""

@@ -28,6 +28,7 @@ ANSWER_WITHIN: Final = 1.0  # the DVA's answer, after which it counts as silent 
 POLL: Final = 2.0  # from one question who is there to the next [s]
 QUIET: Final = 1.0  # without a word, as half-way between two heartbeats, it is asked at once [s]
 UNHEARD: Final = 1.6  # without a word the DVA counts as silent; on slow links later [s]
+ALARM_AFTER: Final = 5.0  # without a word, two heartbeats long, its silence is an alarm [s]
 LOOK: Final = 0.1  # from one look whether it is time to ask to the next [s]
 ASK_SENSORS: Final = 10.0  # between questions about sensors and cameras [s]
 SOMEWHERE: Final = GeoFrame(0.0, 0.0)
@@ -89,6 +90,7 @@ class KnownSystem:
         self.state = SystemState(self.device, labels, own, self._number_all)
         self.has_all_events = False
         self.switched = 0.0
+        self._started = 0.0
         self._foreign: set[str] = set()
         self._met: set[str] = set()  # devices that the DVA has ever listed
         self._listed = 0.0  # time of the DVA's newest list of devices [s]
@@ -104,6 +106,7 @@ class KnownSystem:
         self.agent.on_dispatch = self._note_switch
         self.agent.start()
         clock = self.clock
+        self._started = clock.now
         clock.every(LOOK, self._look, start=clock.now + 0.05)
         clock.every(ASK_SENSORS, self._ask_sensors, start=clock.now + POLL)
 
@@ -121,6 +124,12 @@ class KnownSystem:
     def answers(self) -> bool:
         """True if the DVA has been heard recently."""
         return self.hearing == "answers"
+
+    @property
+    def is_silent(self) -> bool:
+        """True if the DVA has said nothing for so long that somebody has to look after it."""
+        heard = self.device.dva_watch.heard
+        return self.clock.now - (self._started if heard is None else heard) > ALARM_AFTER
 
     @property
     def role(self) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from dva_sim.agents.robot.controller import Mode
-from dva_sim.console.events.console_alarms import UNHEARD
+from dva_sim.console.events.robot_conditions import UNHEARD
 from dva_sim.console.robots.shown_mode import EMERGENCY, EMERGENCY_LAPSES, emergency_shown
 from dva_sim.console.system.system_state import DeviceState
 from dva_sim.console.wire.rows import EmergencyShown, RobotRow

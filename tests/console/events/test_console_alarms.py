@@ -7,7 +7,8 @@ from helpers.console.simulated_phone import PhonePage
 from helpers.wording import unnamed
 
 from dva_sim.console.asking.refusal import Refused
-from dva_sim.console.events.console_alarms import ESCALATED_FOR, UNHEARD, ConsoleAlarms
+from dva_sim.console.events.console_alarms import ESCALATED_FOR, ConsoleAlarms
+from dva_sim.console.events.robot_conditions import UNHEARD
 from dva_sim.worlds.bodies import TickTarget
 
 
@@ -117,3 +118,56 @@ def test_nobody_left_to_send_is_an_alarm_only_while_something_waits(page, alarms
 def test_a_row_that_is_gone_is_none_to_act_on(alarms):
     with pytest.raises(Refused, match="is over"):
         alarms.members("event 1")
+
+
+# --- robots and the system itself --------------------------------------------------------------
+
+CONDITIONS = [
+    ({"silent": True, "mode": "Idle"}, "robot-1 is lost: the DVA hears nothing of it", "high"),
+    ({"battery": 0.2}, "robot-1: battery at 20 %", "medium"),
+    ({"battery": 0.05}, "robot-1: battery at 5 %", "high"),
+    ({"emergency": {"by": "ana"}}, "Emergency stop: robot-1 stopped until released", "high"),
+]
+
+
+@pytest.mark.parametrize(("row", "text", "priority"), CONDITIONS)
+def test_what_somebody_has_to_do_about_a_robot_is_an_alarm_until_it_is_done(
+    alarms, row, text, priority
+):
+    assert texts(alarms, robots=[robot(0), robot(1)]) == []
+    (shown,) = alarms.look([], [robot(0, **row), robot(1)], 10_000)["alarms"]
+    assert (shown["text"], shown["priority"]) == (text, priority)
+    (shown,) = alarms.look([], [robot(0), robot(1)], 10_000)["alarms"]
+    assert shown["state"] == "returned"
+
+
+def test_a_fleet_that_stands_is_one_alarm(alarms):
+    stands = {"emergency": {"by": "ana"}}
+    (text,) = texts(alarms, robots=[robot(0, **stands), robot(1, **stands), robot(2)])
+    assert text == "Emergency stop: 2 of 3 robots stopped until released"
+
+
+def test_a_robot_that_falls_silent_is_lost_to_the_pages_when_it_is_to_the_dva(page):
+    entry = page.world.run.dva.core.registry.entries
+    agent = page.robot()
+    page.until(lambda: agent.device.id_tag in entry)
+    page.let(3.0)
+    agent.device.leave()
+    page.until(lambda: entry[agent.device.id_tag].silent)
+    page.let(2.5)  # the list is asked for every 2 s
+    (row,) = [row for row in page.lines_of("rows")[-1]["robots"] if row["silent"]]
+    assert row["i"] == page.world.feed.numbers[agent.device.id_tag]
+    shown = {alarm["text"] for alarm in page.lines_of("alarms")[-1]["alarms"]}
+    assert f"{agent.device.label} is lost: the DVA hears nothing of it" in shown
+
+
+def test_a_dva_that_says_nothing_is_an_alarm_until_it_speaks_again(page):
+    page.let(3.0)
+    assert page.do("server_stop")[0]
+    page.let(7.0)
+    (alarm,) = [row for row in page.lines_of("alarms")[-1]["alarms"] if row["key"] == "dva silent"]
+    assert alarm["priority"] == "critical"
+    assert page.do("server_start", port=6000)[0]
+    page.let(5.0)
+    (alarm,) = [row for row in page.lines_of("alarms")[-1]["alarms"] if row["key"] == "dva silent"]
+    assert alarm["state"] == "returned"

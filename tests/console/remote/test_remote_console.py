@@ -14,7 +14,7 @@ from helpers.processes.programs import Program, Programs
 from helpers.wording import unnamed
 
 from dva_sim.console.dva.device_rows import listed_device_row
-from dva_sim.console.events.console_alarms import UNHEARD
+from dva_sim.console.events.robot_conditions import UNHEARD
 from dva_sim.console.remote.options import check, own_id
 from dva_sim.console.system.system_state import DeviceState
 from dva_sim.console.views.event_rows import event_row

@@ -129,12 +129,13 @@ export const doingOf = (i) => doings.value.get(i) ?? '';
 /** @param {number} i */
 export const driveOf = (i) => seat.value?.drives.find((drive) => drive.i === i);
 /**
- * Mode of a robot: an emergency or manual control as reported to all pages, else as reported to this
- * page as its driver.
+ * Mode of a robot: `Lost` if the DVA has lost it, an emergency or manual control as reported to all
+ * pages, else as reported to this page as its driver.
  * @param {number} i
  */
 export const modeOf = (i) => {
-  const shown = rowOf(i)?.mode || 'Idle';
+  const shown = rowOf(i)?.silent ? 'Lost' : rowOf(i)?.mode || 'Idle';
+  if (shown === 'Lost') return shown;
   return ['Emergency', 'Manual'].includes(shown) ? shown : driveOf(i)?.mode || shown;
 };
 /** Reason why a robot cannot be started; empty if no emergency holds it, or a start releases it. @param {number | null} i */

@@ -15,6 +15,7 @@ const MODE_COLOURS = {
   Teleoperation: 'teleoperation',
   Manual: 'manual',
   Emergency: 'emergency',
+  Lost: 'link-lost',
 };
 
 /** @param {string} mode */

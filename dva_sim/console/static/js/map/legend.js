@@ -5,7 +5,7 @@ import { HAZARDS } from '../palette.js';
 import { ModeMark, SeverityMark, SourceMark, StateMark } from '../ui/icon.js';
 import { plain } from '../ui/words.js';
 
-const MODES = ['Idle', 'Mission', 'Teleoperation'];
+const MODES = ['Idle', 'Mission', 'Teleoperation', 'Manual', 'Emergency', 'Lost'];
 const STATES = ['pending', 'assigned', 'on scene', 'confirmed', 'contained', 'refuted',
   'escalated', 'expired']; // prettier-ignore
 

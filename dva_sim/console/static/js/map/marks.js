@@ -31,6 +31,7 @@ export const MODES = /** @type {Record<string, Path2D>} */ ({
   Teleoperation: path('M.14 0A.2 .2 0 1 1 -.26 0A.2 .2 0 1 1 .14 0'),
   Manual: path('M-.3 0H.2'),
   Emergency: path('M-.26 -.2L.14 .2M.14 -.2L-.26 .2'),
+  Lost: path('M-.24 -.12A.2 .16 0 1 1 -.02 .06L-.02 .1M-.02 .26V.28'),
 });
 
 export const ROBOT = path('M.8 0L.32 .48L-.5 .48L-.5 -.48L.32 -.48Z');

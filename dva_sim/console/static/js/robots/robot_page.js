@@ -56,7 +56,7 @@ function Head({ robot }) {
 }
 
 /**
- * Reason why the robot is stopped; an emergency and a lost link are highlighted.
+ * Reason why the robot is stopped; an emergency and commands that do not come are highlighted.
  * @param {{robot: Thing}} props
  */
 function Reasons({ robot }) {
@@ -66,9 +66,7 @@ function Reasons({ robot }) {
   const stop = rowOf(robot.i)?.emergency;
   const text = stop
     ? `Emergency stop by ${stop.by} at ${clockText(stop.at_ms)}: the robot stands until it is released.`
-    : lost
-      ? `Link lost: ${stopReason}`
-      : stopReason && `Stopped: ${stopReason}`;
+    : stopReason && `Stopped: ${stopReason}`;
   return html`<p class=${stop || lost ? 'reason reported warning' : 'reason reported'} role="status" aria-label="Reason">
     <span>${text || 'It moves.'}${notice && ` ${notice}.`}</span></p>`;
 }

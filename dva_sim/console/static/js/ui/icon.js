@@ -46,6 +46,7 @@ const GLYPHS = /** @type {Record<string, string>} */ ({
   Teleoperation: 'M9.6 12a2.4 2.4 0 1 1-4.8 0 2.4 2.4 0 0 1 4.8 0',
   Manual: 'M5 12h6',
   Emergency: 'M5 9l6 6M11 9l-6 6',
+  Lost: 'M5.4 10a2.8 2.2 0 1 1 3 2.4V13M8.4 16v.2',
 });
 
 /** The box with a bow, as on the map. @param {{mode: string}} props */
