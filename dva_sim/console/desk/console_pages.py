@@ -40,6 +40,7 @@ POSITIONS: Final = 0.1
 ROWS: Final = 0.5
 DEVICES: Final = 1.0
 NEWS: Final = 0.05
+LAG_ALARM: Final = 3.0  # a machine that cannot keep up for longer is an alarm [s]
 HEARD: Final[Mapping[Hearing, str]] = {
     "answers": "answers",
     "silent": "is silent: what is shown is old",
@@ -258,7 +259,7 @@ class ConsolePages:
         if self.system.is_silent:
             text = f"The DVA at {self.system.dva} is silent"
             yield AlarmCondition("dva silent", "DVA silent", "critical", place="", text=text)
-        if self.lag.held:
+        if self.lag.held_for > LAG_ALARM:
             text = "This machine cannot keep up with real time: nobody may drive"
             yield AlarmCondition("lag", "behind real time", "high", place="", text=text)
 

@@ -11,13 +11,15 @@ class LagRule:
 
     Attributes:
         held: True while driving is suspended.
+        held_for: Time for which it has been suspended [s].
         newest: The lag that was measured last [s].
     """
 
     def __init__(self) -> None:
         self.held = False
         self.newest = 0.0
-        self._bad_at = float("-inf")
+        self.held_for = 0.0
+        self._bad_at = self._begun = float("-inf")
 
     def measured(self, now: float, lag: float) -> bool:
         """Take a measurement: True if robots have to stop now that went on until then.
@@ -27,11 +29,13 @@ class LagRule:
             lag: By how much events came too late [s].
         """
         self.newest = lag
-        if lag > LIMIT:
-            begins = not self.held
+        begins = lag > LIMIT and not self.held
+        if begins:
             self.held = True
+            self._begun = now
+        if lag > LIMIT:
             self._bad_at = now
-            return begins
-        if self.held and now - self._bad_at >= GOOD_FOR:
+        elif now - self._bad_at >= GOOD_FOR:
             self.held = False
-        return False
+        self.held_for = now - self._begun if self.held else 0.0
+        return begins

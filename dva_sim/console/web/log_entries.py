@@ -40,6 +40,7 @@ class Entry:
         code: Code of the reply; None without one.
         text: Text of the reply.
         sent: Size of the request [B]; greater than that of `data` if the rest is not known.
+        renews: True for a registration that only repeats the one before.
     """
 
     number: int
@@ -55,6 +56,7 @@ class Entry:
     code: int | None = None
     text: str = ""
     sent: int = 0
+    renews: bool = False
 
     @classmethod
     def of(cls, line: list[Any]) -> Entry:

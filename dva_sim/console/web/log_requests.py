@@ -16,7 +16,7 @@ from starlette.responses import JSONResponse, Response
 
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.log_entries import Entry
-from dva_sim.console.web.logs import AT_ONCE, KEPT, WORDS, KeptLog, LogFilter, Looks
+from dva_sim.console.web.logs import AT_ONCE, KEPT, TICKS, WORDS, KeptLog, LogFilter, Looks
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, problem
 from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.console.wire.roles import Role
@@ -97,7 +97,8 @@ def _given(request: Request) -> dict[str, Any]:
     given: dict[str, Any] = {key: asked[key] for key in WORDS if key in asked}
     since = asked.get("since", "0")
     given["since"] = int(since) if since.isascii() and since.isdigit() else since
-    return given | {"publications": asked.get("publications") == "true"}
+    ticks = {key: asked[key] == "true" for key in TICKS if key in asked}
+    return given | ticks
 
 
 def whole(entry: Entry) -> dict[str, Any]:

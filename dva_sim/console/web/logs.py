@@ -32,6 +32,8 @@ KEPT: Final = 10_000  # exchanges of a log
 KEPT_BYTES: Final = 32 << 20  # of them
 AT_ONCE: Final = 200  # entries told to a page
 WORDS: Final = ("device", "kind", "code", "text", "without")  # of a filter
+TICKS: Final = {"publications": False, "renewals": True}  # of a filter, and as usual
+RENEWED_WITHIN: Final = 15_000  # a device registers again and again in less than that [ms]
 TABLES: Final = ("devices",)
 MOST_LOGS: Final = 8  # that a page looks at
 MOST_KNOWN: Final = 256  # logs of which anything is kept
@@ -49,6 +51,7 @@ class LogFilter:
         text: Text that occurs in a message or its reply.
         without: Id of a device whose messages are left out.
         publications: True to include publications.
+        renewals: True to include registrations that only repeat the one before.
         since: Only entries of a higher number: what came before was cleared.
     """
 
@@ -58,6 +61,7 @@ class LogFilter:
     text: str = ""
     without: str = ""
     publications: bool = False
+    renewals: bool = True
     since: int = 0
 
     @classmethod
@@ -74,16 +78,21 @@ class LogFilter:
             if not isinstance(value, str) or len(value) > 200:
                 raise BadMessage(f"{key} should be a text of at most 200 characters")
         since = given.get("since", 0)
-        all_kinds = given.get("publications", False)
-        if type(since) is not int or not isinstance(all_kinds, bool):
-            raise BadMessage("since should be a number, publications true or false")
-        return cls(**words, publications=all_kinds, since=since)
+        ticks = {key: given.get(key, usual) for key, usual in TICKS.items()}
+        for key, value in ticks.items():
+            if not isinstance(value, bool):
+                raise BadMessage(f"{key} should be true or false")
+        if type(since) is not int:
+            raise BadMessage("since should be a number")
+        return cls(**words, **ticks, since=since)
 
     def takes(self, entry: Entry, names: Names) -> bool:
         """Return True if an entry passes."""
         if entry.number <= self.since or (entry.published and not self.publications):
             return False
         if self.kind and entry.kind != self.kind:
+            return False
+        if entry.renews and not self.renewals:
             return False
         if self.without and entry.header.get("SourceID") == self.without:
             return False
@@ -181,6 +190,7 @@ class KeptLogs:
 
     def __init__(self) -> None:
         self._logs: dict[str, KeptLog] = {}
+        self._registered: dict[str, tuple[str, int]] = {}  # payload and time by source
         self.names: dict[str, str] = {}
 
     def __contains__(self, name: str) -> bool:
@@ -203,11 +213,21 @@ class KeptLogs:
         entries = [Entry.of(one) for one in line["lines"]]
         for entry in entries:
             if entry.kind == "RegMsg" and entry.code == m.OK:
-                self.meet({entry.header["SourceID"]: entry.label})
+                self._register(entry)
         log = self.of(str(line["log"]))
         if line.get("replaces"):
             log.begin(entries[0].number - 1 if entries else 0)
         log.take(entries)
+
+    def _register(self, entry: Entry) -> None:
+        """Learn a label, and whether that registration only repeats the one before."""
+        source = entry.header["SourceID"]
+        payload, time = self._registered.get(source, ("", 0))
+        entry.renews = payload == entry.payload and 0 <= entry.time - time < RENEWED_WITHIN
+        self._registered[source] = entry.payload, entry.time
+        while len(self._registered) > MOST_NAMES:
+            del self._registered[next(iter(self._registered))]
+        self.meet({source: entry.label})
 
 
 class Looks:

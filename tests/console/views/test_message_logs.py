@@ -170,6 +170,20 @@ def test_an_answer_that_comes_later_changes_the_row_and_not_its_place():
     assert list(logs.of("dva").entries) == [1, 2, 3]
 
 
+def test_registrations_that_repeat_the_one_before_are_left_out_until_they_are_wanted():
+    logs = KeptLogs()
+    same, other = (m.Registration(label, "TeleOp", "192.168.0.9") for label in ("one", "two"))
+    asked = {1: (0, same), 2: (10, same), 3: (20, other), 4: (30, other), 5: (50, other)}
+    for number, (seconds, body) in asked.items():
+        exchange = line(number, encoded(number, body))
+        exchange[1] = 1000 * seconds
+        logs.take(batch(exchange))
+    looks = Looks(logs, True)
+    for renewals, numbers in ((False, [1, 3, 5]), (True, [1, 2, 3, 4, 5])):
+        looks.look({"dva": {"renewals": renewals}}, [])
+        assert [row["n"] for row in looks.next()["lines"]] == numbers
+
+
 @pytest.mark.parametrize(
     ("wanted", "numbers"),
     [

@@ -60,8 +60,9 @@ export function Latency({ robots }) {
     colour: `pattern-${rowOf(robot.i)?.pattern}`,
     dash: DASHES[n],
   }));
-  return html`<section class="latency panel" aria-label="Latency">
-    <h2>Latency ${!isAttached.value && html`<${Floor} />`}</h2>
+  const drives = robots.some((robot) => driveOf(robot.i));
+  return html`<section class="panel" aria-label="Latency"><details class="latency" open=${drives}>
+    <summary><h2>Latency ${!isAttached.value && html`<${Floor} />`}</h2></summary>
     <div class="charts reported">${kinds.map(
       (kind, n) => html`<div title=${kind.hint}>
         <${Chart} title=${kind.title} unit="ms" lines=${lines} least=${100}
@@ -69,7 +70,7 @@ export function Latency({ robots }) {
         <${Figures} history=${histories[n]} robots=${robots} none=${kind.none} />
       </div>`,
     )}</div>
-  </section>`;
+  </details></section>`;
 }
 
 /** @param {Kind[]} kinds @param {History[]} histories @param {Thing[]} robots */

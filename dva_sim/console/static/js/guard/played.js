@@ -1,4 +1,4 @@
-/** Guards that people can play, and the setting that allows it. */
+/** Guards that people can play. */
 import { computed } from '../../vendor/preact.js';
 import { scene } from '../store.js';
 
@@ -6,5 +6,4 @@ import { scene } from '../store.js';
 export const playedGuards = computed(() => scene.value?.things.filter((thing) => thing.person) ?? []);
 export const hasPlayedGuards = computed(() => playedGuards.value.length > 0);
 
-export const NO_PLAYED_GUARD =
-  'No guard of this scenario can be played by a person. Start the console with --set guard.kind=person.';
+export const NO_PLAYED_GUARD = 'Nobody can play a guard in this run.';

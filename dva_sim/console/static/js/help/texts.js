@@ -11,6 +11,28 @@ export const TEXTS = [
     ],
   },
   {
+    title: 'Main',
+    lines: [
+      'Lists the requests that the DVA has received, and its replies. Click one to see its header, its XML and the reply.',
+      'Renewals, the registrations that every device repeats, are left out until you tick them.',
+      'Start and stop the server on a port, as in the simulator of the dissertation.',
+    ],
+  },
+  {
+    title: 'Devices',
+    lines: [
+      'All devices that the DVA knows: type, address, what each does, how long ago it was heard, and who holds it.',
+      'Add a fake device to try how a client lists it; it hears nothing. “Revoke” takes a robot from its holder.',
+    ],
+  },
+  {
+    title: 'Robots',
+    lines: [
+      'A card for each robot: picture, place, task and holder. “Lost” means that the DVA hears nothing of it.',
+      'Click a name for the windows of the robot itself: its motors, sensors, messages, manual control and faults.',
+    ],
+  },
+  {
     title: 'Drive',
     lines: [
       'Take control, then Start, then hold an arrow key (or W, A, D), the stick, a slider, or a shoulder button of a gamepad. Letting go stops. There is no reverse.',
@@ -34,6 +56,13 @@ export const TEXTS = [
       'The link between the console and the robots is simulated, as in a study: delay, jitter, loss and bandwidth affect every message and picture. A striped edge marks a simulated link.',
       'The delay is one-way. A round trip takes twice as long, plus the robot’s processing time.',
       'REQ/REP sends the next command only after the last one was answered. Latest-wins keeps sending, and the robot drops commands for which it has a newer one.',
+    ],
+  },
+  {
+    title: 'Audit',
+    lines: [
+      'Who did what, when and why: acts of people, and decisions of the DVA with whom it would have sent itself.',
+      'Each row is chained to the one before by its hash: a change afterwards is found out.',
     ],
   },
 ];

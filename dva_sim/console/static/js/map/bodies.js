@@ -1,6 +1,6 @@
 /** Robots and people from above, with position, heading and mode. */
 import { modeOf, rowOf } from '../store.js';
-import { lettersOn } from './lettering.js';
+import { isFree, lettersOn } from './lettering.js';
 import { MODES, PERSON, ROBOT } from './marks.js';
 
 const LARGER = 1.25; // bodies are drawn a little larger than they are
@@ -117,14 +117,12 @@ export function drawBattery({ ctx, colours }, body, always) {
   ctx.fillRect(left, top, BATTERY.width * share, BATTERY.height);
 }
 
-/** @typedef {{left: number, top: number, width: number}} Place of a name that is written */
-
 /**
  * Draw the name above a body, or below it if another name is in the way; else not at all.
  * @param {Pen} pen
  * @param {Body} body
  * @param {boolean} strong
- * @param {Place[]} written
+ * @param {import('./lettering.js').Place[]} written
  */
 export function drawName({ ctx, colours }, body, strong, written) {
   const letters = lettersOn(ctx);
@@ -144,20 +142,6 @@ export function drawName({ ctx, colours }, body, strong, written) {
   written.push({ left, top, width });
   ctx.strokeText(body.thing.label, body.left, top);
   ctx.fillText(body.thing.label, body.left, top);
-}
-
-/**
- * @param {Place[]} written
- * @param {Place} place
- * @param {number} letters their height [px]
- */
-function isFree(written, { left, top, width }, letters) {
-  return !written.some(
-    (other) =>
-      Math.abs(other.top - top) < letters + 2 &&
-      other.left < left + width + 3 &&
-      left < other.left + other.width + 3,
-  );
 }
 
 /**

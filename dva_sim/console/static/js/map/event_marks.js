@@ -13,6 +13,7 @@ export const EVENT_UP_PX = 22;
 /** @typedef {import('./bodies.js').Pen} Pen */
 
 /**
+ * Draw an event, and return where its label stands.
  * @param {Pen} pen
  * @param {import('../lines.js').SiteEvent} event
  */
@@ -37,8 +38,12 @@ export function drawEvent(pen, event) {
   affine.toPixels(ctx);
   number(ctx, palette[`on-${event.severity}`] ?? palette.ink, event.number, left, top - EVENT_UP_PX);
   const age = isOpen(event) || mine ? ` ${ageText(worldNow() - event.since_ms)}` : '';
-  label(ctx, palette, `${event.state}${age}`, left + EVENT_PX / 2 + 4, top - EVENT_UP_PX, 'left');
+  const words = `${event.state}${age}`;
+  const start = left + EVENT_PX / 2 + 4;
+  label(ctx, palette, words, start, top - EVENT_UP_PX, 'left');
   ctx.globalAlpha = 1;
+  const bottom = top - EVENT_UP_PX + lettersOn(ctx) / 2;
+  return { left: start, top: bottom, width: ctx.measureText(words).width };
 }
 
 /**

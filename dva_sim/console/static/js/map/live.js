@@ -16,17 +16,21 @@ const EVERY_SECOND = 1000;
 
 export class Live {
   /**
+   * @param {import('./plan.js').Plan} ground
    * @param {() => number[]} cones robots whose cone of sight is drawn
    * @param {() => import('../types.js').Goal[]} goals
    * @param {() => number[][][]} ways routes to follow [m]
    */
-  constructor(cones, goals, ways) {
+  constructor(ground, cones, goals, ways) {
+    this.ground = ground;
     this.cones = cones;
     this.goals = goals;
     this.ways = ways;
     this.sight = new Sight(scene.peek()?.site.walls_m ?? []);
     /** @type {Body[]} */
     this.bodies = [];
+    /** @type {import('./lettering.js').Place[]} */
+    this.written = [];
     this.second = 0;
   }
 
@@ -46,6 +50,8 @@ export class Live {
     this.second = Math.floor(now / EVERY_SECOND);
     const pen = { ctx, affine, colours: colours.peek() };
     this.bodies = placed(affine, now);
+    this.ground.drawNames(pen, this.written); // as it was written last
+    this.written = [];
     this.drawCones(pen, now);
     this.drawTrails(pen);
     this.drawWays(pen);
@@ -53,7 +59,7 @@ export class Live {
     this.drawOrders(pen);
     this.drawSources(pen);
     this.drawBodies(pen);
-    for (const event of events.peek()) drawEvent(pen, event);
+    for (const event of events.peek()) this.written.push(drawEvent(pen, event));
   }
 
   /**
@@ -178,12 +184,10 @@ export class Live {
     }
     for (const body of machines) drawRobot(pen, body);
     for (const body of machines) drawBattery(pen, body, roomy);
-    /** @type {import('./bodies.js').Place[]} */
-    const written = [];
     for (const body of [...machines, ...this.bodies.filter((one) => one.thing.kind !== 'robot')]) {
       const mine = chosen?.kind === 'thing' && chosen.key === body.thing.i;
       const named = body.thing.kind !== 'bystander' && roomy;
-      if (named || mine) drawName(pen, body, mine, written);
+      if (named || mine) drawName(pen, body, mine, this.written);
     }
   }
 

@@ -57,7 +57,7 @@ export function MapBox(props) {
 function show(element, plan, options, view, letGo) {
   const ground = new Plan(plan.site);
   const fields = new Fields();
-  const live = new Live(options.cones, options.goals, options.ways);
+  const live = new Live(ground, options.cones, options.goals, options.ways);
   const paper = {
     draw: (/** @type {any} */ ctx, /** @type {any} */ affine) =>
       ground.draw(ctx, affine, colours.peek()),

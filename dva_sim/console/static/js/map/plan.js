@@ -1,6 +1,6 @@
 /** Static parts of the map: floors, walls, doors, exits and names; in metres, y up. */
 import { DARK, LIGHT } from '../palette.js';
-import { lettersOn } from './lettering.js';
+import { isFree, lettersOn } from './lettering.js';
 
 const WALL_M = 0.14;
 const LEAST_PX = 30;
@@ -44,7 +44,6 @@ export class Plan {
     this.drawSolids(ctx, affine, colours);
     this.drawWalls(ctx, affine, colours);
     affine.toPixels(ctx);
-    this.drawNames(ctx, affine, colours);
   }
 
   /**
@@ -82,12 +81,11 @@ export class Plan {
   }
 
   /**
-   * Draw room names where they fit; zooming in shows the others.
-   * @param {CanvasRenderingContext2D} ctx
-   * @param {import('./view.js').Affine} affine
-   * @param {Record<string, string>} colours
+   * Draw room names where they fit, and give way to other words; zooming in shows the others.
+   * @param {import('./bodies.js').Pen} pen
+   * @param {import('./lettering.js').Place[]} written
    */
-  drawNames(ctx, affine, colours) {
+  drawNames({ ctx, affine, colours }, written) {
     const letters = lettersOn(ctx);
     ctx.font = `${letters}px system-ui, sans-serif`;
     ctx.textAlign = 'center';
@@ -98,8 +96,10 @@ export class Plan {
       if (wide < LEAST_PX || height * affine.scale < 2 * letters) continue;
       const [left, top] = affine.pixel(x, y);
       for (const text of [name, name.replace(/^\D+(?=\d)/, '')]) {
-        if (ctx.measureText(text).width > wide - 8) continue;
-        ctx.fillText(text, left, top);
+        const textWidth = ctx.measureText(text).width;
+        if (textWidth > wide - 8) continue;
+        const place = { left: left - textWidth / 2, top: top + letters / 2, width: textWidth };
+        if (isFree(written, place, letters)) ctx.fillText(text, left, top);
         break;
       }
     }

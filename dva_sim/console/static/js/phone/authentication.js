@@ -132,7 +132,7 @@ function DeviceList({ devices, know, off }) {
   const ask = async () => {
     const done = await act('phone_devices');
     if (!done.ok || !done.devices) return;
-    const all = robotsFirst(done.devices);
+    const all = robotsOf(done.devices);
     know(all);
     if (!all.some((one) => one.id === choices.peek().device)) choose({ device: all[0]?.id ?? '' });
   };
@@ -140,7 +140,7 @@ function DeviceList({ devices, know, off }) {
   return html`<li class=${off ? 'step off' : 'step'}><h2>Choose a device</h2>
     <button type="button" class=${devices || off ? 'big' : 'big go'} disabled=${off || !maySteer.value}
       onClick=${ask}>Get device list</button>
-    ${devices?.length === 0 && html`<p>No devices are registered.</p>`}
+    ${devices?.length === 0 && html`<p>No robot is registered.</p>`}
     <${Choice} name="Device" value=${options.length ? choices.value.device : ''} disabled=${off || !options.length}
       options=${options.length ? options : [['', 'not listed yet']]}
       onInput=${(/** @type {string} */ id) => choose({ device: id })} />
@@ -148,11 +148,9 @@ function DeviceList({ devices, know, off }) {
 }
 
 /** @param {import('../lines.js').Device[]} devices */
-function robotsFirst(devices) {
-  const isRobot = (/** @type {import('../lines.js').Device} */ one) => Number(one.type === 'Robot');
-  return [...devices].sort(
-    (a, b) => isRobot(b) - isRobot(a) || a.label.localeCompare(b.label, 'en', { numeric: true }),
-  );
+function robotsOf(devices) {
+  const found = devices.filter((one) => one.type === 'Robot');
+  return found.sort((a, b) => a.label.localeCompare(b.label, 'en', { numeric: true }));
 }
 
 /** Device entry in the notation of the founding document. @param {import('../lines.js').Device} device */

@@ -1,7 +1,9 @@
 /** Entry point of the phone pages. */
 import { connect, keepDriveSocket } from '../net/sockets.js';
 import { showPhone } from './app.js';
-import { keepDriveInHand } from './drive.js';
+import { seat } from '../store.js';
+import { vibrateFor } from '../shell/calling.js';
+import { isKnown, keepDriveInHand } from './drive.js';
 import { keepSampling } from './samples.js';
 
 showPhone(/** @type {HTMLElement} */ (document.getElementById('app')));
@@ -9,3 +11,4 @@ connect();
 keepDriveSocket();
 keepDriveInHand();
 keepSampling();
+vibrateFor(() => isKnown.peek(), () => seat.value?.order?.event);

@@ -8,10 +8,10 @@ const CODES = /** @type {[string, string][]} */ ([
 ]);
 
 /** @typedef {{device: string, kind: string, code: string, text: string, without: string,
- *   publications: boolean, since: number}} LogFilter */
+ *   publications: boolean, renewals: boolean, since: number}} LogFilter */
 
 /** @type {LogFilter} */
-export const ALL = { device: '', kind: '', code: '', text: '', without: '', publications: false, since: 0 };
+export const ALL = { device: '', kind: '', code: '', text: '', without: '', publications: false, renewals: false, since: 0 };
 
 /** @param {LogFilter} filter */
 export const isNarrow = (filter) =>
@@ -30,6 +30,7 @@ export function RequestFilters({ filter, kinds, own, onOwn, onFilter, isPaused, 
     <${Choice} name="Kind" value=${filter.kind} options=${options} onInput=${(/** @type {string} */ kind) => onFilter({ kind })} />
     <${Choice} name="Code" value=${filter.code} options=${CODES} onInput=${(/** @type {string} */ code) => onFilter({ code })} />
     ${mayDrive.value && html`<${Field} name="Search" value=${filter.text} onInput=${(/** @type {string} */ text) => onFilter({ text })} />`}
+    <${Tick} name="Renewals" value=${filter.renewals} onInput=${(/** @type {boolean} */ renewals) => onFilter({ renewals })} />
     ${isAttached.value
       ? html`<${Tick} name="This console's" value=${own} onInput=${onOwn} />`
       : html`<${Tick} name="Publications" value=${filter.publications} onInput=${(/** @type {boolean} */ publications) => onFilter({ publications })} />`}

@@ -1,12 +1,16 @@
-/** All robots, each with a link to its page; or the page of the robot named in the address. */
-import { html } from '../../vendor/preact.js';
-import { modeOf, robots, rowOf, rows, scene } from '../store.js';
+/** All robots, each on a card with a link to its page; or the page of the robot named in the address. */
+import { html, useEffect } from '../../vendor/preact.js';
+import { isPast, modeOf, robots, rowOf, rows, scene, tracks } from '../store.js';
+import { CameraPicture } from '../drive/camera.js';
+import { select } from '../events/shared.js';
+import { eventsInOrder, isOpen, placeOf, roomAt } from '../map/shown.js';
+import { watch } from '../net/sockets.js';
 import { detail } from '../shell/route.js';
 import { ModeMark } from '../ui/icon.js';
-import { percentText } from '../ui/words.js';
+import { percentText, plain } from '../ui/words.js';
 import { RobotPage } from './robot_page.js';
 
-const HEADS = ['Robot', 'Mode', 'Holder', 'Speed', 'Battery', 'Why it is stopped'];
+const MOST_PICTURES = 6; // of more, a page and its renderer have too much to draw
 
 /** The page. */
 export function RobotsPage() {
@@ -27,23 +31,45 @@ function Nobody({ name }) {
 }
 
 function List() {
-  void rows.value;
+  const key = robots.value.map((robot) => robot.i).join();
+  const areSeen = !isPast.value && robots.value.length <= MOST_PICTURES;
+  useEffect(() => {
+    if (areSeen) watch(robots.peek().map((robot) => robot.i));
+    return () => watch([]);
+  }, [key, areSeen]);
   return html`<main class="page robots-page" id="main" tabindex="-1"><h1>Robots</h1>
-    <div class="scrolls panel" tabindex="0" role="group" aria-label="Table, scrolls sideways">
-      <table aria-label="Robots"><thead><tr>${HEADS.map((head) => html`<th scope="col">${head}</th>`)}</tr></thead>
-      <tbody class="reported">${robots.value.map((robot) => html`<${Row} key=${robot.i} robot=${robot} />`)}</tbody></table>
-    </div></main>`;
+    <ul class="robot-cards" aria-label="Robots">${robots.value.map(
+      (robot) => html`<${Card} key=${robot.i} robot=${robot} isSeen=${areSeen} />`,
+    )}</ul></main>`;
 }
 
-/** @param {{robot: import('../lines.js').Thing}} props */
-function Row({ robot }) {
+/**
+ * Robot with what an operator looks for: its picture, place, task and holder.
+ * @param {{robot: import('../lines.js').Thing, isSeen: boolean}} props
+ */
+function Card({ robot, isSeen }) {
+  void rows.value;
   const row = rowOf(robot.i);
   const mode = modeOf(robot.i);
-  return html`<tr>
-    <th scope="row"><a href=${robotAddress(robot.label)}>${robot.label}</a></th>
-    <td><${ModeMark} mode=${mode} /> ${mode}</td>
-    <td>${row?.holder_label ?? row?.holder ?? '–'}</td>
-    <td class="n">${(row?.set_speed_mps ?? 0).toFixed(2)} m/s</td>
-    <td class="n">${percentText(row?.battery)}</td>
-    <td class="soft">${row?.stop_reason ?? ''}</td></tr>`;
+  const at = tracks.last(robot.i);
+  const lines = /** @type {[string, unknown][]} */ ([
+    ['Place', at ? roomAt(at.x, at.y) : 'unknown'],
+    ['Task', taskOf(robot.label)],
+    ['Held by', row?.holder_label || row?.holder || 'nobody'],
+    ['Speed', at ? `${at.speed.toFixed(2)} m/s` : 'unknown'],
+    ['Battery', row?.battery === null ? 'unknown' : percentText(row?.battery)],
+    ['Stopped', row?.stop_reason],
+  ]);
+  return html`<li class="cockpit" aria-label=${robot.label}>
+    <h2 class="reported"><${ModeMark} mode=${mode} /> <a href=${robotAddress(robot.label)}>${robot.label}</a> <span class="soft">${mode}</span></h2>
+    ${isSeen && html`<${CameraPicture} robot=${robot} />`}
+    <dl class="reported">${lines.filter(([, text]) => text).map(
+      ([name, text]) => html`<dt>${name}</dt><dd>${text}</dd>`,
+    )}</dl></li>`;
+}
+
+/** @param {string} label */
+function taskOf(label) {
+  const event = eventsInOrder().find((one) => isOpen(one) && one.assigned.includes(label));
+  return event ? html`<a href="#/events" onClick=${() => select(event.number)}>${plain(event.kind)}, ${placeOf(event)}</a>` : 'none';
 }
