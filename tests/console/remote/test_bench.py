@@ -5,9 +5,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from helpers.console.remote_console import OWN, RemotePage, attached
+from helpers.console.remote_console import OWN, NotedBench, attached
 
-from dva_sim.agents.device import do_nothing
 from dva_sim.console.asking.answers import BYE
 from dva_sim.console.bench import NOT_HERE, UNATTENDED
 from dva_sim.console.desk.console_actions import ConsoleActions
@@ -103,32 +102,6 @@ def test_the_clock_stops_when_the_other_end_is_gone(other):
 
 
 # --- at a page ---------------------------------------------------------------------------------
-
-
-class NotedBench:
-    """A bench that appoints the console of a page, and notes what is asked of it."""
-
-    def __init__(self, page: RemotePage) -> None:
-        self._roles = page.world.world.run.dva.core.roles
-        self._own = page.system.device.id_tag
-        self.asked: list[str] = []
-
-    def server(self) -> dict[str, Any]:
-        return {"listens": True, "address": HERE, "port": 5600, "modelled": False}
-
-    def open_server(self, port: int, on_result: Any) -> None:
-        self.asked.append(f"start {port}")
-        on_result(True, "started")
-
-    def close_server(self, on_result: Any) -> None:
-        self.asked.append("stop")
-        on_result(True, "stopped")
-
-    def appoint(self, room: str, role: Any, then: Any = do_nothing) -> None:
-        assert room == self._own
-        self.asked.append(str(role))
-        self._roles.appoint(room, role)
-        then()
 
 
 @pytest.fixture

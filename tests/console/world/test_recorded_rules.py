@@ -1,18 +1,15 @@
 """A console's recording is judged as the console itself was, whatever people do to its robots."""
 
-import os
 from pathlib import Path
 from typing import Any
 
 import pytest
+from helpers.console.recorded_console import RecordedPage
 from helpers.console.simulated_phone import PhonePage
 
 from dva_sim.agents.robot.controller import Decision, RobotController
-from dva_sim.live.kept_facts import keep_run
-from dva_sim.live.recording import Keeper, LiveRecorder
 from dva_sim.protocol import messages as m
 from dva_sim.recordings.reading import read_recording
-from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation.full.stage import id_of
 from dva_sim.simulation.full.verdicts import RULES, verdicts
 from dva_sim.testing.evidence import judged_recording
@@ -28,12 +25,7 @@ class Recorded:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, path: Path) -> None:
         self.page = PhonePage(monkeypatch, client="a1", bystander__count=0)
         self.world, self._path = self.page.world, path
-        self._keeper = Keeper(path, self.world.scenario, self.world.seed)
-        self._outlet = PipeEnd(os.dup(inlet := self._keeper.inlet()))
-        os.close(inlet)
-        self.world.recorder.kept = LiveRecorder(self.world.clock, self._outlet)
-        self.world.recorder.kept.is_own = self.world.is_ours
-        keep_run(self.world.run, self.world.recorder.kept)
+        self._recorded = RecordedPage(self.page, path)
 
     def ask(self, after: float, body: m.Body, session: int = 5) -> None:
         """Let the DVA ask the first robot for something."""
@@ -42,8 +34,7 @@ class Recorded:
 
     def states(self) -> list[dict[str, str]]:
         """The verdicts at the console's end, and those on its recording."""
-        self._outlet.close()
-        assert self._keeper.finish() is None
+        self._recorded.finish()
         recorded = judged_recording(read_recording(self._path))
         both: list[Any] = [verdicts(self.world.recorder), recorded]
         return [{verdict.rule: verdict.state for verdict in some} for some in both]

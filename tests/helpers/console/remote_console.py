@@ -10,6 +10,7 @@ from helpers.console.declared_lines import checked
 from helpers.console.simulated_phone import FIRE, PhonePage
 from helpers.console.waiting_for_disk import take_what_is_safe
 
+from dva_sim.agents.device import do_nothing
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.bench import NOT_HERE
 from dva_sim.console.desk.console_actions import ConsoleActions
@@ -22,6 +23,7 @@ from dva_sim.recordings.audit_log import AuditRow, read_rows
 from dva_sim.simulation.full.stage import id_of
 
 OWN = id_of("control-room", 900)
+DVA_HERE = "198.51.100.1:5600"
 
 
 class RemotePage:
@@ -31,24 +33,28 @@ class RemotePage:
         world: World of the DVA.
         audit: File of the audit log.
         role: Role that the DVA gives its control room.
+        number: Number of its control room.
 
     Attributes:
         lines: Lines sent to the page.
     """
 
-    def __init__(self, world: PhonePage, audit: Path, role: str = "supervise") -> None:
+    def __init__(
+        self, world: PhonePage, audit: Path, role: str = "supervise", number: int = 900
+    ) -> None:
         self.world, run = world, world.world.run
-        run.dva.core.roles.appoint(OWN, role)
+        own = id_of("control-room", number)
+        run.dva.core.roles.appoint(own, role)
         links = RemoteLinks(
             clock=world.world.clock,
             recorder=Recorder(),
             network=run.network,
-            own=OWN,
-            address="198.51.100.9:5600",
-            seat_id=lambda number: id_of("console", 900 + number),
-            join=lambda _: "198.51.100.9:5700",
+            own=own,
+            address=f"198.51.100.9:{number}",
+            seat_id=lambda seat: id_of("console", number + seat),
+            join=lambda _: f"198.51.100.9:{number + 100}",
         )
-        options = ConsoleOptions(dva="198.51.100.1:5600", scenario="hands-on", audit=audit)
+        options = ConsoleOptions(dva=DVA_HERE, scenario="hands-on", audit=audit)
         self.keeper = AuditKeeper(audit, lambda: world.world.clock.now, {})
         self.pages = RemotePages(options, links, self.keeper)
         self.system = self.pages.system
@@ -103,6 +109,33 @@ class RemotePage:
         """The rows of the audit log, which ends by that."""
         self.keeper.close()
         return read_rows(self.keeper.path)
+
+
+class NotedBench:
+    """A bench that appoints the console of a page, and notes what is asked of it."""
+
+    def __init__(self, page: RemotePage) -> None:
+        self._roles = page.world.world.run.dva.core.roles
+        self._own = page.system.device.id_tag
+        self.asked: list[str] = []
+
+    def server(self) -> dict[str, Any]:
+        """See `Bench`, as all others."""
+        return {"listens": True, "address": DVA_HERE, "port": 5600, "modelled": False}
+
+    def open_server(self, port: int, on_result: Any) -> None:
+        self.asked.append(f"start {port}")
+        on_result(True, "started")
+
+    def close_server(self, on_result: Any) -> None:
+        self.asked.append("stop")
+        on_result(True, "stopped")
+
+    def appoint(self, room: str, role: Any, then: Any = do_nothing) -> None:
+        assert room == self._own
+        self.asked.append(str(role))
+        self._roles.appoint(room, role)
+        then()
 
 
 @contextmanager
