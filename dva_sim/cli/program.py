@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, NoReturn
 import typer
 
 from dva_sim import __version__
-from dva_sim.cli import answers, files, link, results, runs, site, storm, studies
+from dva_sim.cli import answers, files, link, results, runs, site, storm, studies, users
 from dva_sim.cli.commands import Command, PanelGroup, Panels, name_of, typer_of
 from dva_sim.cli.plain_output import replace_what_cannot_be_shown
 from dva_sim.kernel import early_stop
@@ -102,6 +102,21 @@ class SiteGroup(PanelGroup):
     panels: ClassVar[Panels] = {"Commands": {"show": site.show, "export": site.export}}
 
 
+class UsersGroup(PanelGroup):
+    """The commands about the users of a console."""
+
+    panels: ClassVar[Panels] = {
+        "Commands": {
+            "add": users.add,
+            "change": users.change,
+            "remove": users.remove,
+            "lock": users.lock,
+            "unlock": users.unlock,
+            "list": users.list_,
+        }
+    }
+
+
 def _named(*commands: Callable[..., None]) -> dict[str, Command]:
     return {command.__name__.rstrip("_").replace("_", "-"): command for command in commands}
 
@@ -119,6 +134,7 @@ class DvaSimProgram(PanelGroup):
         "Single runs": {
             **_named(runs.episode, runs.replay, runs.live, runs.console),
             **_named(runs.robot, link.link, runs.keys),
+            "users": typer_of(UsersGroup, help="Add, change and lock users of a console."),
         },
         "Listing, checking and validation": {
             **_named(files.list_, files.plugins, files.assumed, files.check),

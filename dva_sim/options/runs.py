@@ -103,6 +103,10 @@ class PageOptions:
     no_token: Annotated[
         bool, OptionForm("Disable the access token: anyone who can reach the page gets in.")
     ] = False
+    users: Annotated[
+        Path | None,
+        OptionForm("File of the users who may log in; see dva-sim users.", metavar="USERS.json"),
+    ] = None
 
 
 @dataclass(frozen=True, eq=False, match_args=False)

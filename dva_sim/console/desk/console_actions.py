@@ -76,6 +76,8 @@ class ConsoleActions:
 
     @does("here")
     def _here(self, _: str, line: PagesHere) -> None:
+        self._pages.users.clear()
+        self._pages.users.update(line.get("users", {}))
         self._driving.attend(line)
         self._pages.rooms.attend(line["pages"])
 

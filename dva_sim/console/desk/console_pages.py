@@ -49,7 +49,13 @@ HEARD: Final[Mapping[Hearing, str]] = {
 
 
 class NamedRooms(DecidingRooms, Protocol):
-    """Control rooms of a console, and who is at them."""
+    """Control rooms of a console, and who is at them.
+
+    Attributes:
+        users: Names of those who have logged in, by client.
+    """
+
+    users: dict[str, str]
 
     def label(self, client: str) -> str:
         """Return the name of a page's person; empty if it has given none."""
@@ -77,6 +83,7 @@ class ConsolePages:
 
     Attributes:
         looked: True while somebody looks at the table of devices.
+        users: Names of those who have logged in, by client.
         alarms: Alarms that need action.
         sensors: Sensors of robots from outside that somebody looks at.
         audited: Keeps who did what; None: nobody does.
@@ -107,6 +114,7 @@ class ConsolePages:
         self.show: Show = lambda *_: None
         self.dropped: Callable[[], int] = lambda: 0
         self.looked = False
+        self.users = rooms.users
         self.sensors = WatchedSensors(system.device, system.state, system.id_of)
         self.alarms = ConsoleAlarms(system.agent, system.named, breaches)
         self.audited: Audited | None = None
@@ -152,8 +160,8 @@ class ConsolePages:
 
     def author(self, client: str) -> str:
         """Return the name of a page's person."""
-        if room := self.rooms.label(client):
-            return room
+        if name := self.users.get(client) or self.rooms.label(client):
+            return name
         person = self.seating.of_client(client)
         return name_of_page(client) if person is None else person.device.label
 

@@ -76,12 +76,14 @@ class ConsoleRooms:
         listener: Control room that receives the DVA's news of events for the pages; its
             reader starts it.
         by_client: The rooms by their pages.
+        users: Names of those who have logged in, by their pages.
     """
 
     def __init__(self, run: Run, appoint: Callable[[str, ControlRoomRole], object]) -> None:
         self._run = run
         self._appoint = appoint
         self.by_client: dict[str, ConsoleRoom] = {}
+        self.users: dict[str, str] = {}
         self._used: set[int] = set()
         self.listener = self._agent(LISTENER, "console")
 
@@ -112,6 +114,7 @@ class ConsoleRooms:
 
     def join(self, client: str, role: str, name: str, on_result: OnResult) -> None:
         """A page's person gets a device of its role, or its device gets another name."""
+        name = self.users.get(client, name)
         room = self.by_client.get(client)
         if room is not None and (not name or room.is_called(name)):
             on_result(True, f"you are {room.device.label}")

@@ -20,6 +20,7 @@ from dva_sim.cameras.children import END_SOON, PAINTED, PipedChild
 from dva_sim.cameras.lines import Show
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.lines import KINDS, Tell
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.realtime import PacedClock
 from dva_sim.options.runs import PageOptions
 from dva_sim.serving.listening import listen
@@ -135,6 +136,8 @@ class ConsoleProcesses:
 
     def _start_web(self, report: Path | None, audit: Path | None) -> PipedChild:
         options = self._options
+        if options.users is not None and options.no_token:
+            raise ConfigError("--users and --no-token exclude each other: nobody need log in")
         listen(options.host, options.port).close()  # else the web process alone would say so
         if self._phones is not None:
             listen(*self._phones, "--phones-port").close()
@@ -142,6 +145,7 @@ class ConsoleProcesses:
         words = ["--host", options.host, "--port", str(options.port)]
         words += ["--pictures-fd", str(ours.fileno())]
         words += ["--no-token"] if options.no_token else []
+        words += [] if options.users is None else ["--users", str(options.users)]
         words += [] if audit is None else ["--audit", str(audit)]
         words += [] if report is None else ["--report", str(report)]
         if self._phones is not None:

@@ -25,12 +25,14 @@ class NamedPeople:
     Attributes:
         listener: The console's own control room.
         by_client: The name of each who has joined, and what the address of its page allows.
+        users: Names of those who have logged in, by their pages.
     """
 
     def __init__(self, system: KnownSystem) -> None:
         self._system = system
         self.listener = system.agent
         self.by_client: dict[str, Named] = {}
+        self.users: dict[str, str] = {}
         self._come = 0
 
     def join(self, client: str, role: str, name: str, on_result: OnResult) -> None:
@@ -41,6 +43,7 @@ class NamedPeople:
         """
         if not self._system.answers:
             raise Refused(NO_ANSWER)
+        name = self.users.get(client, name)
         self._system.let_decide(do_nothing)
         if name or client not in self.by_client:
             self.by_client[client] = name or self._new_name(role), ControlRoomRole(role)

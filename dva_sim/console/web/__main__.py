@@ -6,6 +6,7 @@ import argparse
 import asyncio
 import signal
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from dva_sim.console.web.app import make_app
 from dva_sim.console.web.audit import AuditPages
 from dva_sim.console.web.camera import ConsoleCameras
 from dva_sim.console.web.hub import Hub
+from dva_sim.console.web.logins import Logins
 from dva_sim.console.web.phones import NoCertificate
 from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.wire.actions import prepare_checks
@@ -76,6 +78,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--name", action="append", default=[], help="another name of this machine")
     parser.add_argument("--report", type=Path, help="a study's report that may be shown")
     parser.add_argument("--audit", type=Path, help="file of the audit log")
+    parser.add_argument("--users", type=Path, help="file of the users who may log in")
     parser.add_argument("--no-token", action="store_true", help="everybody may do everything")
     return parser
 
@@ -87,10 +90,13 @@ async def run(options: argparse.Namespace) -> None:
     sock = listen(options.host, options.port)
     port = sock.getsockname()[1]
     tokens = Tokens() if options.no_token else Tokens.drawn()
-    access = rules(options.host, port, options.name, tokens)
-    phones, notices = _phones(options, tokens)
+    logins = None if options.users is None else Logins(options.users, time.monotonic)
+    access = rules(options.host, port, options.name, tokens, logins=logins)
+    phones, notices = _phones(options, tokens, logins)
     simulation = Simulation()
     hub = Hub(simulation)
+    if logins is not None:
+        hub.is_logged_in = lambda token: logins.user_of(token) is not None
     cameras = ConsoleCameras(simulation, hub.clients.watched)
     hub.watching = cameras.tell
     ended = simulation.ended
@@ -119,7 +125,9 @@ async def run(options: argparse.Namespace) -> None:
     simulation.close()
 
 
-def _phones(options: argparse.Namespace, tokens: Tokens) -> tuple[PhoneListener | None, list[str]]:
+def _phones(
+    options: argparse.Namespace, tokens: Tokens, logins: Logins | None
+) -> tuple[PhoneListener | None, list[str]]:
     """The listener for phones, and what people should know of it.
 
     Without a certificate all else goes on.
@@ -128,9 +136,15 @@ def _phones(options: argparse.Namespace, tokens: Tokens) -> tuple[PhoneListener 
         return None, []
     from dva_sim.console.web.phone_listener import listen_for_phones  # late: start-up
 
-    where = options.phones_host, options.phones_port
     try:
-        listener = listen_for_phones(*where, options.name, tokens, options.certificates)
+        listener = listen_for_phones(
+            options.phones_host,
+            options.phones_port,
+            options.name,
+            tokens=tokens,
+            folder=options.certificates,
+            logins=logins,
+        )
     except NoCertificate as error:
         return None, [f"no address for phones: {error}"]
     return listener, list(listener.notices)

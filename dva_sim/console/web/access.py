@@ -6,10 +6,11 @@ import hmac
 import secrets
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields
-from http.cookies import CookieError, SimpleCookie
 
+from dva_sim.console.web.logins import LASTS, Logins, in_cookie, role_of
 from dva_sim.console.wire.roles import Role
 from dva_sim.serving.admission import OwnNames, own_names
+from dva_sim.serving.users import User
 
 
 @dataclass(frozen=True)
@@ -66,33 +67,50 @@ class Entrance:
         cookie: Name of the cookie; browsers do not tell ports apart, so the port is in it.
         own: Names under which it is served.
         secure: True if it is served over https: then its cookie goes nowhere else.
+        logins: Logins of users; None: nobody logs in.
     """
 
     tokens: Tokens
     cookie: str
     own: OwnNames
     secure: bool = False
+    logins: Logins | None = None
 
     def role(self, headers: Mapping[str, str], query: Mapping[str, str]) -> Role:
-        """The best role of what is shown: a token in the address, in a header, in the cookie."""
+        """The best role of what is shown: a token in the address, a header, a cookie; a login."""
         if not self.tokens.are_asked:
             return Role.SUPERVISE
         kind, _, bearer = headers.get("authorization", "").partition(" ")
-        shown = [query.get("token", ""), self._in_cookie(headers.get("cookie", ""))]
+        shown = [query.get("token", ""), in_cookie(headers, self.cookie)]
         shown.append(bearer.strip() if kind.lower() in ("bearer", "token") else "")
-        return max(self.tokens.role_of(token) for token in shown)
+        by_token = max(self.tokens.role_of(token) for token in shown)
+        return max(by_token, role_of(self.user(headers)))
 
-    def _in_cookie(self, header: str) -> str:
-        try:
-            morsel = SimpleCookie(header).get(self.cookie)
-        except CookieError:
-            return ""
-        return morsel.value if morsel else ""
+    def user(self, headers: Mapping[str, str]) -> User | None:
+        """Return the user who is logged in."""
+        return None if self.logins is None else self.logins.user_of(self.session(headers))
+
+    def session(self, headers: Mapping[str, str]) -> str:
+        """Return the token of a login; empty without one."""
+        return in_cookie(headers, self.login_cookie)
+
+    @property
+    def login_cookie(self) -> str:
+        """Name of the cookie of logins."""
+        return f"{self.cookie}_login"
 
     def cookie_for(self, role: Role) -> str:
         """The header that gives a browser its role."""
+        return self._cookie(self.cookie, self.tokens.of(role))
+
+    def cookie_of_login(self, token: str) -> str:
+        """The header that gives a browser its login, or takes it back: then the token is empty."""
+        lasts = round(LASTS) if token else 0
+        return f"{self._cookie(self.login_cookie, token)}; Max-Age={lasts}"
+
+    def _cookie(self, name: str, value: str) -> str:
         secure = "; Secure" if self.secure else ""
-        return f"{self.cookie}={self.tokens.of(role)}; HttpOnly; SameSite=Strict; Path=/{secure}"
+        return f"{name}={value}; HttpOnly; SameSite=Strict; Path=/{secure}"
 
 
 def rules(
@@ -102,6 +120,7 @@ def rules(
     tokens: Tokens | None = None,
     *,
     secure: bool = False,
+    logins: Logins | None = None,
 ) -> Entrance:
     """The rules of a console that listens on an address.
 
@@ -110,6 +129,7 @@ def rules(
         names: More names under which it is asked for.
         tokens: New ones are drawn if there are none.
         secure: True if it listens by https.
+        logins: Logins of users; None: nobody logs in.
     """
     own = own_names(host, names)
-    return Entrance(tokens or Tokens.drawn(), f"dva_sim_{port}", own, secure)
+    return Entrance(tokens or Tokens.drawn(), f"dva_sim_{port}", own, secure, logins)

@@ -26,8 +26,9 @@ from dva_sim.cameras.streams import CameraStreams, headers_of
 from dva_sim.console.web import static_files
 from dva_sim.console.web.access import Entrance
 from dva_sim.console.web.audit import AuditPages
-from dva_sim.console.web.hub import Hub
+from dva_sim.console.web.hub import LOGIN, USER, Hub
 from dva_sim.console.web.log_requests import LogRequests
+from dva_sim.console.web.login_pages import LOGIN_PAGE, LOGIN_STYLE, LOGOUT, LoginPages
 from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePages
 from dva_sim.console.web.relay import NoPictures, open_camera
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
@@ -136,9 +137,21 @@ class Doorkeeper:
         if refusal is not None:
             return PlainTextResponse(refusal[1] + "\n", refusal[0], headers=NOT_KEPT)
         scope[ROLE] = role = self._access.role(asking.headers, asking.query_params)
+        user = self._access.user(asking.headers)
+        scope[USER] = "" if user is None else user.name
+        scope[LOGIN] = "" if user is None else self._access.session(asking.headers)
         if role is Role.NOBODY and scope["path"] not in (OPEN, *UNGUARDED):
-            return _unknown(scope["path"])
+            return self._unknown(scope["path"])
         return None
+
+    def _unknown(self, path: str) -> Response | None:
+        """Response to somebody without permission; None: the page may be seen all the same."""
+        if self._access.logins is not None:
+            if path in (LOGIN_PAGE, LOGIN_STYLE):
+                return None
+            if path in PAGES:
+                return RedirectResponse(f"{LOGIN_PAGE}?next={path}", 303, headers=NOT_KEPT)
+        return _unknown(path)
 
 
 _STARTS = ("http.response.start", "websocket.accept", "websocket.http.response.start")
@@ -295,6 +308,7 @@ def make_app(
     phones = PhonePages(door)
     log = audit or AuditPages(None)
     logs = LogRequests(hub)
+    login = LoginPages(access, hub, PAGES)
 
     async def see(ws: WebSocket) -> None:
         await hub.see(ws, ws.scope[ROLE])
@@ -304,6 +318,8 @@ def make_app(
 
     routes = [
         *(Route(path, pages.index) for path in PAGES),
+        Route(LOGIN_PAGE, login.page, methods=["GET", "POST"]),
+        Route(LOGOUT, login.leave, methods=["POST"]),
         Route("/trust", phones.trust),
         Route(AUTHORITY, phones.authority),
         Route("/api/phones", _for(Role.DRIVE, phones.about)),

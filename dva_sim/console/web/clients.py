@@ -76,6 +76,8 @@ class Client:
         page: Name that the page gives itself until it is loaded again; empty: none.
         ws: Its state socket, while that is open.
         asked: Time of a program's newest request [s].
+        user: Name of the user who is logged in; empty: none.
+        login: Token of that login.
     """
 
     def __init__(self, name: str, role: Role, state: RunState, page: str = "") -> None:
@@ -85,6 +87,8 @@ class Client:
         self.key = secrets.token_urlsafe(24)
         self.ws: WebSocket | None = None
         self.asked = 0.0
+        self.user = ""
+        self.login = ""
         self.feed = PageFeed(state, name, role >= Role.DRIVE)
         self.wake = asyncio.Event()
         self.watches: frozenset[int] = frozenset()

@@ -31,6 +31,10 @@ TIDY = 10.0  # from one look at silent programs to the next [s]
 WITHOUT_PAGE = ("emergency", "stop", "gone")  # what is done though a page sees nothing
 REFUSED, STUCK, LEAVING = 1008, 1013, 1001  # why a socket is closed
 
+USER = "dva_sim.user"  # name of the user who is logged in, in a request's scope
+LOGIN = "dva_sim.login"  # token of the login, likewise
+LOGIN_OVER = "the login is over"
+
 Next = Callable[[], str | None]
 Hear = Callable[[str], None]
 
@@ -40,12 +44,17 @@ class Hub:
 
     Args:
         simulation: The simulation.
+
+    Attributes:
+        watching: Callback when pages look at other robots.
+        is_logged_in: Predicate of the token of a login: True while that goes on.
     """
 
     def __init__(self, simulation: Simulation) -> None:
         self.simulation = simulation
         self.clients = Clients(simulation.state)
         self.watching: Callable[[], None] = lambda: None
+        self.is_logged_in: Callable[[str], bool] = lambda _: True
         self._open: set[WebSocket] = set()
         self._later: set[asyncio.Task[None]] = set()
         simulation.changed = self._changed
@@ -72,8 +81,11 @@ class Hub:
         if client.ws is not None:  # the page has lost that one, and we did not know
             wire_of(client.ws.scope).drop(STUCK, "this page was opened again")
         client.ws = ws
+        client.user = ws.scope.get(USER, "")
+        client.login = ws.scope.get(LOGIN, "")
         self._tell_here()
         you = {"k": "you", "client": client.name, "key": client.key, "role": role.name.lower()}
+        you["user"] = client.user
         client.feed.put(you)
 
         def hear(text: str) -> None:
@@ -127,7 +139,8 @@ class Hub:
 
     def _tell_here(self) -> None:
         """Tell the simulation who is there, so that the DVA orders nobody who is not."""
-        self.simulation.send({"do": "here", "pages": self.clients.acting()})
+        users = {client.name: client.user for client in self.clients.here() if client.user}
+        self.simulation.send({"do": "here", "pages": self.clients.acting(), "users": users})
 
     def _leave(self, client: Client) -> None:
         """A page is gone: its robots stop, and after a while others may have them."""
@@ -161,6 +174,13 @@ class Hub:
             await asyncio.sleep(TIDY)
             for silent in self.clients.silent_programs(time.monotonic()):
                 self._give_back(silent)
+            self.close_ended()
+
+    def close_ended(self) -> None:
+        """Close the pages of users whose login is over."""
+        for client in self.clients.here():
+            if client.login and client.ws is not None and not self.is_logged_in(client.login):
+                wire_of(client.ws.scope).drop(REFUSED, LOGIN_OVER)
 
     def new_program(self, role: Role) -> Client | None:
         """A seat for a program; None if there are too many of its role or above."""

@@ -11,6 +11,7 @@ from dva_sim.console.pages.addresses import address_of, own_address, own_hosts
 from dva_sim.console.web.access import Entrance, Tokens, rules
 from dva_sim.console.web.certificate_files import certificates, data_folder
 from dva_sim.console.web.certificates import Hosts
+from dva_sim.console.web.logins import Logins
 from dva_sim.console.web.phones import PhoneDoor
 from dva_sim.serving.listening import listen
 
@@ -34,7 +35,13 @@ class PhoneListener(NamedTuple):
 
 
 def listen_for_phones(
-    host: str, port: int, names: Sequence[str], tokens: Tokens, folder: Path | None = None
+    host: str,
+    port: int,
+    names: Sequence[str],
+    *,
+    tokens: Tokens,
+    folder: Path | None = None,
+    logins: Logins | None = None,
 ) -> PhoneListener:
     """Listen, with a certificate of this machine.
 
@@ -44,6 +51,7 @@ def listen_for_phones(
         names: More names of this machine.
         tokens: Tokens of all roles.
         folder: Folder of the certificates; by default in the user's data folder.
+        logins: Logins of users; None: nobody logs in.
 
     Raises:
         ConfigError: the address is not of this machine, or taken.
@@ -52,7 +60,7 @@ def listen_for_phones(
     sock = listen(host, port, "--phones-port")
     try:
         port = sock.getsockname()[1]
-        access = rules(host, port, (*names, *own_hosts(())), tokens, secure=True)
+        access = rules(host, port, (*names, *own_hosts(())), tokens, secure=True, logins=logins)
         shown = own_address(host) if access.own.any_address else host.strip("[]")
         known = Hosts.of(own_hosts([*names, shown]))
         kept = certificates(folder or data_folder() / "phones", known)

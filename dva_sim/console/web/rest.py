@@ -226,24 +226,33 @@ async def body_of_request(request: Request) -> dict[str, Any]:
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind != "application/json":
         raise TooStrange(415, "the content type should be application/json")
+    try:
+        return read(await bytes_of_body(request, MOST_BYTES))
+    except BadMessage as error:
+        raise BadMessage(f"the body {error}") from None
+
+
+async def bytes_of_body(request: Request, most: int) -> bytes:
+    """Return a body that is not too long, and arrives in time.
+
+    Raises:
+        TooStrange: it is otherwise.
+    """
     length = request.headers.get("content-length", "0")
-    if length.isdigit() and int(length) > MOST_BYTES:
-        raise TooStrange(413, f"the body is longer than {MOST_BYTES} bytes")
+    if length.isdigit() and int(length) > most:
+        raise TooStrange(413, f"the body is longer than {most} bytes")
     data = bytearray()
     try:
         async with asyncio.timeout(BODY_WITHIN):
             async for piece in request.stream():
                 data += piece
-                if len(data) > MOST_BYTES:
-                    raise TooStrange(413, f"the body is longer than {MOST_BYTES} bytes")
+                if len(data) > most:
+                    raise TooStrange(413, f"the body is longer than {most} bytes")
     except TimeoutError:
         raise TooStrange(408, f"the body has not arrived within {BODY_WITHIN:g} s") from None
     except ClientDisconnect:
         raise TooStrange(400, "the body is not whole") from None
-    try:
-        return read(bytes(data))
-    except BadMessage as error:
-        raise BadMessage(f"the body {error}") from None
+    return bytes(data)
 
 
 class TooStrange(Exception):

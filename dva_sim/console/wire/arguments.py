@@ -324,9 +324,13 @@ class LogsLooked(TypedDict):
 
 
 class PagesHere(TypedDict):
-    """Clients that are there and may act, each with the role of its page; empty without one."""
+    """Clients that are there and may act, each with the role of its page; empty without one.
+
+    `users` are the names of those who have logged in, by client.
+    """
 
     pages: dict[str, str]
+    users: NotRequired[dict[str, str]]
 
 
 class SampleBatch(TypedDict):

@@ -19,12 +19,13 @@ from dva_sim.console.wire.scenes import OrderShown, Place, SceneShown
 
 
 class YouLine(TypedDict):
-    """Identity of a page."""
+    """Identity of a page; `user`: who is logged in there, or empty."""
 
     k: Literal["you"]
     client: str
     key: str
     role: str
+    user: str
 
 
 class PongLine(TypedDict):

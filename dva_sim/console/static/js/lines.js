@@ -342,8 +342,8 @@
  * @typedef {{k: 'bye', why: string, t?: number}} Bye
  */
 /**
- * Identity of a page.
- * @typedef {{k: 'you', client: string, key: string, role: string}} You
+ * Identity of a page; `user`: who is logged in there, or empty.
+ * @typedef {{k: 'you', client: string, key: string, role: string, user: string}} You
  */
 /**
  * An answer to a ping, with the time of this machine [ms].

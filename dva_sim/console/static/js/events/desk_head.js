@@ -22,9 +22,10 @@ export function DeskHead({ join }) {
   return html`<div class="desk-head">
     <details><summary>${ownRoom.value || 'You'}${decides}</summary>
       <section class="panel" aria-label="You">
+        ${you.value?.user ? html`<p>The log shows you as ${you.value.user}.</p>` : html`
         <${Field} name="Your name" value=${ownName.value} onInput=${rename}
           hint=${ownRoom.value ? `The log shows you as ${ownRoom.value}` : 'As shown in the log'} />
-        <button type="button" onClick=${join}>Use this name</button>
+        <button type="button" onClick=${join}>Use this name</button>`}
         ${asked && html`<${Choice} name="Who decides" value=${mode.value} options=${MODES}
           disabled=${!maySupervise.value} onInput=${(/** @type {string} */ to) => act('dispatch_mode', { mode: to })} />`}
         ${asked?.switched && html`<small class="soft">set by ${asked.switched.label}</small>`}

@@ -30,6 +30,8 @@ function address(path) {
   return `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}${path}`;
 }
 
+const LOGIN_OVER = 'the login is over';
+
 /** Start listening, for the lifetime of the page. */
 export function connect() {
   const old = you.value?.key ?? rememberedKey();
@@ -43,6 +45,7 @@ export function connect() {
   const end = (/** @type {{code?: number, reason?: string}} */ why) => {
     stopAsking();
     window.clearInterval(look);
+    if (why.code === REFUSED && why.reason === LOGIN_OVER) location.assign('/login');
     socket.onclose = socket.onmessage = null;
     socket.close();
     if (why.code === LEAVING && isAlive()) connection.value = why.reason || 'it was ended';

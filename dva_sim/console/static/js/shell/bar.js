@@ -18,6 +18,7 @@ import { openHelp } from '../help/help.js';
 export function Bar() {
   return html`<header class="bar">
     <${Time} /><${Link} /><${Age} /><${Alarms} /><span class="gap"></span><${Who} />
+    ${you.value?.user && html`<button type="button" class="plain" title=${you.value.user} onClick=${logOut}>Log out</button>`}
     ${!isPast.value && html`<${SoundButton} />`}
     <button type="button" class="plain" onClick=${openHelp} aria-label="Help" title="Help (?)">
       <${Icon} name="circle-question-mark" /></button>
@@ -90,5 +91,10 @@ function Who() {
   const me = you.value;
   if (!me) return null;
   return html`<span class="item who" title=${`What your address allows. The simulation calls this page ${me.client}.`}>
-    you may ${me.role === 'phone' ? 'drive' : me.role}</span>`;
+    ${me.user || 'you'} may ${me.role === 'phone' ? 'drive' : me.role}</span>`;
+}
+
+async function logOut() {
+  await fetch('/logout', { method: 'POST' });
+  location.assign('/login');
 }
