@@ -264,6 +264,7 @@ _LIST = (
         over_link=True,
     ),
     Action("phone_permission", "asks for the permission for a robot", PhoneWish, over_link=True),
+    Action("phone_report", "reports an event that its person sees", ReportAsked, over_link=True),
     Action("phone_calibrate", "calibrates a phone", CalibrationAsked),
     # --- guards
     Action("guard_join", "plays a guard from then on", GuardAsked, seats=True),

@@ -10,12 +10,19 @@ import time
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.asking.dispatcher import does
-from dva_sim.console.asking.refusal import NO_ANSWER, OnResult, Refused
+from dva_sim.console.asking.refusal import NO_ANSWER, OnResult, Refused, unanswered
 from dva_sim.console.driving.drive_actions import Driving
+from dva_sim.console.events.decisions import place_of, report_of, why
 from dva_sim.console.phones.phone_input import samples_of, settings_of
 from dva_sim.console.phones.phone_seat import PhoneSeat
 from dva_sim.console.wire.actions import Asked
-from dva_sim.console.wire.arguments import CalibrationAsked, PhoneIdentity, PhoneWish, SampleBatch
+from dva_sim.console.wire.arguments import (
+    CalibrationAsked,
+    PhoneIdentity,
+    PhoneWish,
+    ReportAsked,
+    SampleBatch,
+)
 from dva_sim.console.wire.seats import DeviceShown
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.protocol import messages as m
@@ -188,6 +195,22 @@ class PhoneActions:
             on_result(ok, text)
 
         person.take([robot], answered, level)
+
+    @does("phone_report")
+    def _report(self, client: str, line: ReportAsked, on_result: OnResult) -> None:
+        device = self._device(client)[1].device
+        x, y = place_of(line, self._world.system.site)
+        body, done = report_of(line, m.Position(*device.frame.to_latlon(x, y)))
+
+        def answered(reply: m.Reply) -> None:
+            if reply.code != m.OK:
+                on_result(False, why(reply))
+            elif isinstance(reply.content, m.EventStatus):
+                on_result(True, done, event=reply.content.event_id)
+            else:
+                on_result(True, done)
+
+        device.ask(device.dva, body, answered, lambda: unanswered(on_result))
 
     def _asked(self, given: str) -> str:
         """Resolve the requested id; unknown ones pass, so that the DVA can refuse them.

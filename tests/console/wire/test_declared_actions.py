@@ -58,7 +58,7 @@ def test_what_does_an_action_has_its_arguments_by_their_declared_type(path):
     """Those that need more of a request, such as who asks, take it as it is."""
     name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
     kinds = [one for one in vars(import_module(name)).values() if inspect.isclass(one)]
-    methods = [one for kind in kinds for one in vars(kind).values() if hasattr(one, "does")]
+    methods = [one for kind in kinds for one in list(vars(kind).values()) if hasattr(one, "does")]
     assert methods
     for method in methods:
         given = get_type_hints(method).get("line", Asked)

@@ -27,6 +27,7 @@ export const PATIENCE_MS = {
  "phone_register": 65000,
  "phone_devices": 65000,
  "phone_permission": 65000,
+ "phone_report": 65000,
  "phone_calibrate": 10000,
  "guard_join": 10000,
  "guard_leave": 10000,

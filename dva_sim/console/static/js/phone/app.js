@@ -1,4 +1,4 @@
-/** Frame of the five screens: heading, link status, alerts, emergency stop. */
+/** Frame of the screens: heading, link status, alerts, emergency stop. */
 import { html, render, useEffect, useRef } from '../../vendor/preact.js';
 import { connection, scene, seat } from '../store.js';
 import { resumeStops } from '../net/emergency.js';
@@ -9,9 +9,11 @@ import { CalibrationScreen } from './calibration.js';
 import { choices } from './choices.js';
 import { robot } from './drive.js';
 import { EmergencyFooter } from './emergency_footer.js';
+import { EventScreen } from './event.js';
 import { InstructionsScreen } from './instructions.js';
 import { LinkStatus } from './link_status.js';
 import { MainScreen } from './main_screen.js';
+import { ReportScreen } from './report.js';
 import { SCREENS, screen } from './screens.js';
 import { TeleoperationScreen } from './teleoperation.js';
 
@@ -21,6 +23,8 @@ const BODIES = /** @type {Record<string, any>} */ ({
   calibration: CalibrationScreen,
   instructions: InstructionsScreen,
   teleoperation: TeleoperationScreen,
+  event: EventScreen,
+  report: ReportScreen,
 });
 
 /** @param {HTMLElement} where */

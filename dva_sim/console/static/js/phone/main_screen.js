@@ -7,7 +7,7 @@ import { dark, switchTheme } from '../shell/theme.js';
 import { SeverityMark } from '../ui/icon.js';
 import { ageText, capital, plain } from '../ui/words.js';
 import { holds, isKnown, phone } from './drive.js';
-import { SCREENS } from './screens.js';
+import { MENU, SCREENS } from './screens.js';
 
 /** The screen. */
 export function MainScreen() {
@@ -15,9 +15,8 @@ export function MainScreen() {
     authentication: isKnown.value ? (holds.value ? 'a robot is in your hands' : 'registered') : '',
     calibration: phone.value?.calibrated ? 'done' : '',
   });
-  const names = Object.keys(SCREENS).filter((name) => name !== 'main');
   return html`<nav class="menu" aria-label="Screens">
-      ${names.map((name) => html`<a class="big" href=${`#/${name}`}>${SCREENS[name]}
+      ${MENU.map((name) => html`<a class="big" href=${`#/${name}`}>${SCREENS[name]}
         ${done[name] && html`<small>${done[name]}</small>`}</a>`)}
     </nav>
     <${Events} />
@@ -30,13 +29,12 @@ export function MainScreen() {
 
 function Events() {
   const open = eventsInOrder().filter(isOpen);
-  const next = holds.value ? 'teleoperation' : 'authentication';
   return html`<section aria-label="Events"><h2>Events <span class="count">${open.length} open</span></h2>
     ${open.length === 0 && html`<p class="soft">${noEventText()}</p>`}
     <ul class="cards reported">${open.map(
       (event) => html`<li key=${event.number}><${SeverityMark} severity=${event.severity} />
         <span class="what"><b>${capital(plain(event.kind))}</b> ${placeOf(event)}
           <small>${event.severity}, ${plain(event.state)} ${ageText(ageOf(event.since_ms))}</small></span>
-        <a class="go" href=${`#/${next}`} aria-label=${`Drive there: event ${event.number}`}>Drive there</a></li>`,
+        <a class="go" href=${`#/event?${event.number}`} aria-label=${`Open event ${event.number}`}>Open</a></li>`,
     )}</ul></section>`;
 }

@@ -1,4 +1,4 @@
-/** Current one of the five screens, kept in the address so that a reload shows the same. */
+/** Current screen, kept in the address so that a reload shows the same. */
 import { computed, signal } from '../../vendor/preact.js';
 
 /** Names of the screens with their headings, in the order of the menu. */
@@ -8,9 +8,16 @@ export const SCREENS = /** @type {Record<string, string>} */ ({
   calibration: 'Calibration',
   instructions: 'Instructions',
   teleoperation: 'Teleoperation',
+  event: 'Event',
+  report: 'Report',
 });
+/** Screens of the menu. */
+export const MENU = ['authentication', 'calibration', 'instructions', 'teleoperation', 'report'];
 const hash = signal(location.hash);
 window.addEventListener('hashchange', () => (hash.value = location.hash));
+
+/** Text behind the name of the screen in the address. */
+export const subject = computed(() => hash.value.split('?')[1] ?? '');
 
 export const screen = computed(() => {
   const name = hash.value.replace(/^#\/?/, '').split('?')[0];
