@@ -1,12 +1,13 @@
 """Reports of people with a phone: by the phone's own device, at a place on the map."""
 
 import pytest
-from helpers.console.simulated_phone import PhonePage
+from helpers.console.simulated_phone import FIRE, PhonePage
 
 
 @pytest.fixture
 def phone(monkeypatch: pytest.MonkeyPatch) -> PhonePage:
-    return PhonePage(monkeypatch, client="c1", bystander__count=0, events=[], operator__count=0)
+    later = [FIRE[0] | {"at_s": 900, "latest_s": 900}]
+    return PhonePage(monkeypatch, client="c1", bystander__count=0, events=later)
 
 
 WHERE = {"kind": "gas_leak", "severity": "high", "x_m": 20.0, "y_m": 12.0}
