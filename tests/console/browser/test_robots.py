@@ -106,9 +106,12 @@ def driving(page: Page) -> Iterator[None]:
 def test_the_list_leads_to_the_windows_of_each_robot(shared, console):
     page = shared(console)
     page.get_by_role("link", name="Robots").click()
-    table = page.get_by_role("table", name="Robots")
-    expect(table.get_by_role("row")).to_have_count(3)
-    table.get_by_role("link", name="robot-2").click()
+    cards = page.get_by_role("list", name="Robots")
+    expect(cards.get_by_role("listitem")).to_have_count(2)
+    card = cards.get_by_role("listitem").filter(has_text="robot-2")
+    expect(card.get_by_role("img", name="What robot-2 sees")).to_be_visible()
+    expect(card).to_contain_text("South corridor")
+    card.get_by_role("link", name="robot-2").click()
 
     expect(page.get_by_role("heading", name="robot-2", level=1)).to_be_visible()
     for region in REGIONS:
