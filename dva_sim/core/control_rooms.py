@@ -301,12 +301,15 @@ class ControlRooms:
         if entry is None or entry.silent or entry.device.device_type not in DRIVERS:
             raise _Refused(m.UNKNOWN_DEVICE, f"no operator {named}")
         device = entry.device
-        if device.device_type == CONTROL_ROOM and device.id_tag != sender.id_tag:
+        is_room = device.device_type == CONTROL_ROOM
+        if is_room and device.id_tag != sender.id_tag:
             raise _Refused(m.NOT_PERMITTED, f"only {device.label} decides what it drives")
-        if not self._access.allows(device, robot, "teleoperation", now):
+        # A room may also let the robot go by itself, and as many as it likes.
+        levels = ("teleoperation", "missions") if is_room else ("teleoperation",)
+        if not any(self._access.allows(device, robot, level, now) for level in levels):
             raise _Refused(m.NOT_PERMITTED, f"{device.label} may not drive {robot.label}")
         in_hand = self._orders.engaged.count(named)
-        if in_hand >= self._orders.rules.operator_span:
+        if not is_room and in_hand >= self._orders.rules.operator_span:
             raise _Refused(m.BUSY, f"{device.label} has {in_hand} in hand already")
         return device
 

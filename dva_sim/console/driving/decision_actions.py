@@ -23,9 +23,10 @@ from dva_sim.console.events.decisions import (
     report_of,
     why,
 )
-from dva_sim.console.events.missions import inspection_of, send_on_mission
+from dva_sim.console.events.missions import SentRobots
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import (
+    FindingAsked,
     MissionAsked,
     OfDevice,
     OfSome,
@@ -71,6 +72,7 @@ class DecisionActions:
         self._system = system
         self._rooms = rooms
         self._driving = driving
+        self._sent = SentRobots()
 
     @does("room_join")
     def _join(self, client: str, line: RoomName, on_result: OnResult) -> None:
@@ -129,12 +131,19 @@ class DecisionActions:
         if status is None:
             raise Refused(f"there is no event {line['event']}")
         robot = self._driving.robot(line["robot"])
-        label = self._system.label_of(robot)
+        decisions = line.get("decisions")
+        known = status.decisions if decisions is None else decisions
 
         def send(agent: ControlRoomAgent, on_result: OnResult) -> None:
-            send_on_mission(agent.device, robot, label, inspection_of(status), on_result)
+            mission = self._sent.send(client, agent, robot, status)
+            mission.begin(line.get("reason") or None, known, on_result)
 
         self._rooms.decide(client, _role(line), on_result, send)
+
+    @does("mission_found")
+    def _found(self, client: str, line: FindingAsked, on_result: OnResult) -> None:
+        """Report what a person sees through the robot that went by itself."""
+        self._sent.mission(client, line["event"]).found(line["finding"], on_result)
 
     @does("revoke")
     def _revoke(self, client: str, line: OfDevice, on_result: OnResult) -> None:

@@ -1,91 +1,261 @@
-"""Robots that go to an event by themselves and are given back when they have looked."""
+"""Robots that people send to an event by themselves: an order of the DVA each, to a control room.
+
+The control room is the operator of the order: it has the robot begin, tells the DVA how far it is,
+and ends the order with a finding. A person who watches says what is there; where nobody does, what
+the robot has had in view counts once it has looked for long enough, but never as an all-clear.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Final
 
-from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.control_room.control_room import ControlRoomAgent
+from dva_sim.agents.device import do_nothing
+from dva_sim.agents.observation import IN_VIEW
 from dva_sim.agents.operator.steps import give_back, start
-from dva_sim.console.asking.refusal import OnResult, unanswered
+from dva_sim.console.asking.refusal import OnResult, Refused, unanswered
 from dva_sim.console.events.decisions import why
 from dva_sim.protocol import messages as m
 
 ASK_PERIOD: Final = 3.0  # from one question how a mission stands to the next [s]
 MOST_UNANSWERED: Final = 10  # of such questions in a row; then it is given back
 UNDER_WAY: Final = ("under_way", "waiting", "replanning")
+BY_A_PERSON: Final = 0.95  # confidence in a finding; of operators, too
+BY_ITS_CAMERA: Final = 0.6  # in what a robot's sensor alone reports; assumed
+NOTHING: Final = f"nothing {IN_VIEW}"
 
 
-def inspection_of(status: m.EventStatus) -> m.Inspect:
-    """Return the mission that sends a robot to look at an event."""
-    return m.Inspect(status.event_id, status.kind, status.position)
-
-
-def send_on_mission(
-    device: AgentDevice, robot: str, label: str, body: m.Inspect, on_result: OnResult
-) -> None:
-    """Get the permission for a robot, and have it begin.
+class RobotMission:
+    """One robot on its way to an event, and its order.
 
     Args:
-        device: Device of the control room that sends it.
+        agent: Control room that sends it.
         robot: Id of the robot.
-        label: Label of the robot.
-        body: Mission with its destination.
-        on_result: Callback for the result.
+        status: The event, as it was known.
+        on_over: Callback once the order has ended.
     """
 
-    def granted(reply: m.Reply) -> None:
-        if not isinstance(reply.content, m.Permission):
-            on_result(False, f"{label}: {why(reply)}")
-            return
-        session = reply.content.session
+    def __init__(
+        self,
+        agent: ControlRoomAgent,
+        robot: str,
+        status: m.EventStatus,
+        on_over: Callable[[], object],
+    ) -> None:
+        self._agent = agent
+        self._device = agent.device
+        self._robot = robot
+        self._label = agent.device.label_of(robot)
+        self._status = status
+        self._on_over = on_over
+        self._session = 0
+        self._is_there = False
+        self._is_over = False
+
+    def begin(self, reason: str | None, decisions: int | None, on_result: OnResult) -> None:
+        """Have the DVA assign the robot to this control room, and the robot begin.
+
+        Args:
+            reason: Reason in words.
+            decisions: Number of decisions on the event that the person knew of.
+            on_result: Callback for the result.
+        """
+
+        def assigned(reply: m.Reply) -> None:
+            if reply.code == m.OK:
+                self._get_permission(on_result)
+            else:
+                self._put_away()
+                on_result(False, why(reply))
+
+        def unheard() -> None:
+            self._put_away()
+            unanswered(on_result)
+
+        self._device.connect(self._robot)
+        room = self._device.id_tag
+        body = m.Assign(self._status.event_id, self._robot, room, None, reason, decisions)
+        self._agent.ask(body, assigned, unheard)
+
+    def _get_permission(self, on_result: OnResult) -> None:
+        def granted(reply: m.Reply) -> None:
+            if isinstance(reply.content, m.Permission):
+                self._session = reply.content.session
+                self._start(on_result)
+            else:
+                refused(why(reply))
 
         def refused(text: str) -> None:
-            give_back(device, robot, session)
-            on_result(False, f"{label}: {text}")
+            self._end("failed")
+            on_result(False, f"{self._label}: {text}")
 
-        def lost() -> None:
-            give_back(device, robot, session)
-            unanswered(on_result, f"{label}: it does not answer")
+        def unheard() -> None:
+            self._end("failed")
+            unanswered(on_result)
+
+        wish = m.PermissionRequest(self._robot, "missions")
+        self._device.ask(self._device.dva, wish, granted, unheard)
+
+    def _start(self, on_result: OnResult) -> None:
+        status = self._status
 
         def begun() -> None:
-            _follow(device, robot, label, session)
-            on_result(True, f"{label} goes to event {body.event_id} by itself")
+            self._device.progress(status.event_id, "departed")
+            self._device.clock.call_after(ASK_PERIOD, self._ask, 0)
+            on_result(True, f"{self._label} goes to event {status.event_id} by itself")
+
+        def refused(text: str) -> None:
+            self._end("failed")
+            on_result(False, f"{self._label}: {text}")
+
+        def lost() -> None:
+            self._end("failed")
+            unanswered(on_result, f"{self._label}: it does not answer")
 
         start(
-            *(device, robot, body, lambda: session),
-            wanted=lambda: True,
+            *(self._device, self._robot),
+            m.Inspect(status.event_id, status.kind, status.position),
+            lambda: self._session,
+            wanted=lambda: not self._is_over,
             begun=begun,
             refused=refused,
             lost=lost,
         )
 
-    device.connect(robot)
-    wish = m.PermissionRequest(robot, "missions")
-    device.ask(device.dva, wish, granted, partial(unanswered, on_result))
+    # --- on its way -------------------------------------------------------------------------
 
+    def _ask(self, silences: int) -> None:
+        """Ask how the mission stands, until it is over."""
 
-def _follow(device: AgentDevice, robot: str, label: str, session: int) -> None:
-    """Ask how a mission stands until it is over; then the robot is given back."""
-
-    def answered(reply: m.Reply) -> None:
-        status = reply.content
-        if isinstance(status, m.MissionStatus) and status.mission_state in UNDER_WAY:
-            device.clock.call_after(ASK_PERIOD, ask, 0)
-            return
-        if isinstance(status, m.MissionStatus):
-            text = status.mission_state.replace("_", " ")
-            device.tell(f"the mission of {label} is {text}: {status.reason}", "order")
-        give_back(device, robot, session)
-
-    def ask(silences: int) -> None:
         def lost() -> None:
-            if silences < MOST_UNANSWERED:
-                device.clock.call_after(ASK_PERIOD, ask, silences + 1)
+            if self._is_over:
                 return
-            device.tell(f"{label} does not answer: how its mission stands is unknown", "link")
-            give_back(device, robot, session)
+            if silences < MOST_UNANSWERED:
+                self._device.clock.call_after(ASK_PERIOD, self._ask, silences + 1)
+                return
+            text = f"{self._label} does not answer: how its mission stands is unknown"
+            self._device.tell(text, "link")
+            self._end("failed")
 
-        device.ask(robot, m.GetMissionStatus(), answered, lost, session)
+        if self._is_over:
+            return
+        order = self._agent.orders.get(self._status.event_id)
+        if order is None or order.device != self._robot:
+            self._end("")  # the DVA has taken the order back
+            return
+        body = m.GetMissionStatus()
+        self._device.ask(self._robot, body, self._go_on, lost, self._session)
 
-    device.clock.call_after(ASK_PERIOD, ask, 0)
+    def _go_on(self, reply: m.Reply) -> None:
+        status = reply.content
+        if self._is_over:
+            return
+        if not isinstance(status, m.MissionStatus):
+            self._end("failed")
+            return
+        is_looking = status.reason.endswith(IN_VIEW)
+        if is_looking and not self._is_there:
+            self._is_there = True
+            self._device.progress(self._status.event_id, "arrived")
+        if status.mission_state in UNDER_WAY:
+            self._device.clock.call_after(ASK_PERIOD, self._ask, 0)
+            return
+        text = status.mission_state.replace("_", " ")
+        self._device.tell(f"the mission of {self._label} is {text}: {status.reason}", "order")
+        if is_looking and status.reason != NOTHING:
+            self._report("confirmed", BY_ITS_CAMERA)
+            self._end("done")
+        else:
+            self._end("failed")
+
+    # --- its end ----------------------------------------------------------------------------
+
+    def found(self, finding: str, on_result: OnResult) -> None:
+        """Report what a person sees through the robot, and end the order.
+
+        Args:
+            finding: `confirmed` or `refuted`.
+            on_result: Callback for the result.
+        """
+        number = self._status.event_id
+
+        def answered(reply: m.Reply) -> None:
+            if reply.code != m.OK:
+                on_result(False, why(reply))
+                return
+            self._device.tell(f"{finding} event {number}", "event")
+            self._end("done")
+            on_result(True, f"event {number} is {finding}")
+
+        self._report(finding, BY_A_PERSON, answered, partial(unanswered, on_result))
+
+    def _report(
+        self,
+        finding: str,
+        confidence: float,
+        answered: Callable[[m.Reply], object] = do_nothing,
+        unheard: Callable[[], object] = do_nothing,
+    ) -> None:
+        about = self._status
+        severity = about.severity
+        body = m.EventReport(
+            about.event_id, about.kind, about.position, severity, confidence, finding
+        )
+        self._device.report_finding(body, answered, unheard)
+
+    def _end(self, state: str) -> None:
+        """End the order, and give the robot back; without a state the DVA has ended it."""
+        if self._is_over:
+            return
+        self._put_away()
+        if self._session:
+            self._device.ask(self._robot, m.CancelMission(), session=self._session)
+        if state:
+            self._agent.orders.pop(self._status.event_id, None)
+            self._device.progress(self._status.event_id, state)
+        if self._session:
+            give_back(self._device, self._robot, self._session)
+
+    def _put_away(self) -> None:
+        self._is_over = True
+        self._on_over()
+
+
+class SentRobots:
+    """Robots that the people of a console have sent to events, by page."""
+
+    def __init__(self) -> None:
+        self._missions: dict[tuple[str, int], RobotMission] = {}
+
+    def send(
+        self, client: str, agent: ControlRoomAgent, robot: str, status: m.EventStatus
+    ) -> RobotMission:
+        """Return the mission of a robot, which is known here until it is over.
+
+        Args:
+            client: Page that sends it.
+            agent: Control room of the page's person.
+            robot: Id of the robot.
+            status: The event, as it is known.
+        """
+        key = client, status.event_id
+
+        def forget() -> None:
+            if self._missions.get(key) is mission:
+                del self._missions[key]
+
+        mission = self._missions[key] = RobotMission(agent, robot, status, forget)
+        return mission
+
+    def mission(self, client: str, event: int) -> RobotMission:
+        """Return the mission that a page has sent a robot on.
+
+        Raises:
+            Refused: it has sent none there.
+        """
+        mission = self._missions.get((client, event))
+        if mission is None:
+            raise Refused(f"you have sent no robot to event {event}")
+        return mission

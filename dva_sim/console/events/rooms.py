@@ -119,8 +119,8 @@ class ConsoleRooms:
         if room is not None and (not name or room.is_called(name)):
             on_result(True, f"you are {room.device.label}")
             return
-        if room is not None:
-            self.leave(client)
+        if room is not None:  # what it has sent goes on
+            self._end(self.by_client.pop(client), room.device.clock.now + LONG)
         room = self._new(role, name)
         if room is None:
             on_result(False, "too many control rooms have come and gone: try again in two minutes")
@@ -168,15 +168,17 @@ class ConsoleRooms:
                 room.device.resume()
 
     def leave(self, client: str) -> None:
-        """A page is gone for good, or has another name; what it asked for is answered yet."""
+        """A page is gone for good: what it asked for is answered yet, what it sent is open."""
         room = self.by_client.pop(client, None)
         if room is not None:
+            room.agent.orders.clear()
             self._end(room, room.device.clock.now + LONG)
 
     def _end(self, room: ConsoleRoom, latest: float) -> None:
-        """Let a device leave that nobody waits for, or only in vain."""
+        """Let a device leave that nobody waits for, or only in vain, and that has no order."""
         clock = room.device.clock
-        if room.unanswered and clock.now < latest:
+        is_awaited = bool(room.unanswered) and clock.now < latest
+        if is_awaited or room.agent.orders:
             clock.call_after(LOOK, self._end, room, latest)
             return
         room.device.leave()

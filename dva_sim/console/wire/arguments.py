@@ -278,8 +278,14 @@ class ModeAsked(TypedDict):
     reason: NotRequired[Reason]
 
 
-class MissionAsked(OfRobot, OfEvent):
+class MissionAsked(OfRobot, WithReason):
     """A robot for an event."""
+
+
+class FindingAsked(OfEvent):
+    """Finding of a robot that goes by itself, as a person sees it."""
+
+    finding: Literal["confirmed", "refuted"]
 
 
 class TakeoverAsked(OfRobot):

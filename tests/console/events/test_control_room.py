@@ -90,7 +90,7 @@ def test_what_is_under_way_is_answered_though_its_person_takes_another_name(room
     assert (line["ok"], "outcome" in line) == (True, False)
     room.let(0.3)
     assert [one["label"] for one in room.lines_of("control")[-1]["rooms"]] == ["bea"]
-    room.until(lambda: left(room, "ana"))
+    room.until(lambda: left(room, "ana"), 400.0, 5.0)  # a robot that it has sent goes on
 
 
 def left(one: PhonePage, label: str) -> bool:

@@ -51,6 +51,7 @@ export const PATIENCE_MS = {
  "event_proposal": 65000,
  "dispatch_mode": 65000,
  "mission": 65000,
+ "mission_found": 65000,
  "take_over": 65000,
  "alarm_acknowledge": 65000,
  "alarm_shelve": 10000,

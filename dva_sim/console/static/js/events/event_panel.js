@@ -1,6 +1,6 @@
 /** Event in hand: its state, who could go, one button for what is next, and the other decisions. */
 import { html, signal, useRef, useState } from '../../vendor/preact.js';
-import { alarmList, mayDispatch, maySteer, maySupervise, selection, thingNamed } from '../store.js';
+import { alarmList, control, mayDispatch, maySteer, maySupervise, selection, thingNamed } from '../store.js';
 import { act } from '../net/actions.js';
 import { ageOf } from '../net/world_time.js';
 import { isOpen } from '../map/shown.js';
@@ -9,7 +9,7 @@ import { SeverityMark, StateMark } from '../ui/icon.js';
 import { ageText, capital, plain } from '../ui/words.js';
 import { SHELF_S } from './desk_list.js';
 import { assignTo, candidateOf, chosen, estimateOf, ProposalPanel, waysOf } from './proposal.js';
-import { inHand, reason } from './shared.js';
+import { inHand, ownRoom, reason } from './shared.js';
 
 /** @typedef {import('../lines.js').SiteEvent} SiteEvent */
 /** @typedef {{ok: boolean, text: string}} Done */
@@ -88,7 +88,7 @@ function Decisions({ event }) {
 const WAYS = /** @type {Record<string, string>} */ ({
   order: 'by the DVA’s order', mission: 'by itself', drive: 'I drive',
 });
-const wayWanted = signal('order');
+const wayWanted = signal('');
 
 /** Next step of an open event: sending the chosen candidate, or acknowledging. @param {{event: SiteEvent, tell: (done: Done) => void}} props */
 function NextStep({ event, tell }) {
@@ -100,17 +100,24 @@ function NextStep({ event, tell }) {
   const acknowledge = async () => tell(await act('event_acknowledge', { event: event.number }));
   const send = async () => {
     if (way === 'drive') return tell(await drive(whom, reason.peek().trim()));
-    if (way === 'mission') return tell(await act('mission', { robot: whom, event: event.number }));
+    const about = { event: event.number, decisions: event.decisions ?? null, reason: reason.peek().trim() };
+    if (way === 'mission') return tell(await act('mission', { robot: whom, ...about }));
     return tell(await assignTo(event, whom));
   };
+  const find = async (/** @type {string} */ finding) =>
+    tell(await act('mission_found', { event: event.number, finding }));
+  const looks = isOwnMission(event);
   return html`<div class="next-step">
+    ${looks && html`<div class="buttons" role="group" aria-label="Finding">
+      <button type="button" class="primary" disabled=${off} onClick=${() => find('confirmed')}>Confirm</button>
+      <button type="button" disabled=${off} onClick=${() => find('refuted')}>Refute</button></div>`}
     ${ways.length > 1 && !isSent && html`<fieldset><legend class="hidden">How</legend>${ways.map((one) => html`<label key=${one}>
       <input type="radio" name="way" checked=${one === way} onInput=${() => (wayWanted.value = one)} />${WAYS[one]}</label>`)}</fieldset>`}
     <div class="buttons">
       ${whom && !isSent && html`<button type="button" class="primary" data-deed="send" disabled=${off} onClick=${send}>
         ${way === 'drive' ? `Drive ${whom} there` : `Send ${estimateOf(whom)}`}</button>`}
       ${!whom && !sentTo(event).length && html`<p class="none">Nobody can go.</p>`}
-      ${!event.acknowledged && html`<button type="button" class=${whom && !isSent ? '' : 'primary'} disabled=${off}
+      ${!event.acknowledged && html`<button type="button" class=${looks || (whom && !isSent) ? '' : 'primary'} disabled=${off}
         onClick=${acknowledge}>Acknowledge</button>`}
     </div></div>`;
 }
@@ -124,6 +131,13 @@ async function drive(robot, words) {
   selection.value = null;
   chooseRobots([robot]);
   return { ok: true, text: '' };
+}
+
+/** True where a robot looks by itself for this page's person, as far as labels tell. @param {SiteEvent} event */
+function isOwnMission(event) {
+  const senders = event.assigned.filter((who) => !thingNamed(who));
+  const others = (control.value?.rooms ?? []).map((room) => room.label).filter((label) => label !== ownRoom.value);
+  return event.assigned.some(isRobot) && senders.some((who) => !others.includes(who));
 }
 
 /** @param {string} who */

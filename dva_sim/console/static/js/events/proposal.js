@@ -41,15 +41,19 @@ export const estimateOf = (label) => {
 };
 
 /**
- * Ways to send a candidate: by the DVA's order, on a mission without a driver, or driven from this page.
+ * Ways to send a candidate, the likeliest first: by the DVA's order, on a mission without a driver, or
+ * driven from this page.
  * @param {Candidate | undefined} who
  * @returns {string[]}
  */
 export function waysOf(who) {
-  if (!who) return [];
+  if (!who || (who.robot && known.value?.task === 'contain')) return []; // robots only look
   const robot = who.robot && robots.value.find((one) => one.label === who.label);
   const isIdle = robot && modeOf(robot.i) === 'Idle' && !rowOf(robot.i)?.holder;
-  return [who.can && 'order', isIdle && 'mission', robot && (who.can || isIdle) && 'drive'].filter((way) => typeof way === 'string');
+  const alone = isIdle && 'mission';
+  const ordered = who.can && 'order';
+  const first = who.free ? [ordered, alone] : [alone, ordered]; // no operator may be there to drive it
+  return [...first, robot && (who.can || isIdle) && 'drive'].filter((way) => typeof way === 'string');
 }
 
 /** Choose a candidate by place in the list, from 0. @param {number} place */
