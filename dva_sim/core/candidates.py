@@ -16,6 +16,7 @@ from dva_sim.protocol.devices import GUARD, ROBOT
 from dva_sim.protocol.wire_size import LIST_BYTES, xml_size
 
 MOST_NAMED = 32
+NO_WAY = "there is no way"
 CANDIDATE_BYTES = 200  # of one, without what is written for people [B]
 
 
@@ -52,6 +53,8 @@ def _reason(event: Event, advised: Advised | None, everybody: list[m.Candidate])
     if advised is None:
         if event.waits_for is None:
             return "nobody is missing there"
+        if everybody and all(c.reason == NO_WAY for c in everybody):
+            return "no way leads there: nobody can go"
         return "the policy lets it wait" if free else "nobody can go"
     if advised.device in (event.responder, event.actor):
         return "was sent there by the policy"
@@ -109,7 +112,7 @@ def _why_not(
     if entry.position is None:
         return "nobody knows where it is"
     if not math.isfinite(way):
-        return "there is no way"
+        return NO_WAY
     if device.device_type == ROBOT:
         return _why_not_a_robot(dispatcher, device.id_tag, event, now)
     return ""

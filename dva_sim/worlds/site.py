@@ -198,6 +198,28 @@ class Site(FloorPlan):
         x, y = places[np.argmin(np.hypot(*offsets.T))].tolist()
         return x, y
 
+    def floor_near(self, x: float, y: float, within: float) -> tuple[float, float] | None:
+        """The place that a robot can reach nearest to a point [m], in the same room.
+
+        Args:
+            x: To the east [m].
+            y: To the north [m].
+            within: Farthest from the point [m].
+
+        Returns:
+            The point itself where a robot can stand there; None if there is no such place.
+        """
+        places = self.free_middles(FOOTPRINT)
+        gaps = np.hypot(*(places - (x, y)).T)
+        room = self.room_at(x, y)
+        near = np.flatnonzero(gaps <= within)
+        for index in near[np.argsort(gaps[near])]:
+            near_x, near_y = places[index].tolist()
+            if room in (None, self.room_at(near_x, near_y)):
+                is_there = gaps[index] <= self.grid.resolution
+                return (x, y) if is_there else (near_x, near_y)
+        return None
+
     def free_middles(self, clearance: float) -> Floats:
         """Middles `(n, 2)` [m] of all cells that `sample_free` chooses from."""
         columns = self.grid.cells.shape[1]

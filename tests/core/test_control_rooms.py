@@ -1,5 +1,6 @@
 """Control rooms: who may decide what, who wins, and what the rules hold whatever is decided."""
 
+import numpy as np
 import pytest
 from helpers.dva.dispatch_office import (
     DVA,
@@ -466,6 +467,16 @@ def test_a_proposal_names_everybody_with_a_time_and_a_reason():
     times = {c.device: c.arrival_in for c in content.candidates}
     assert times[GUARD] == pytest.approx(20 + 12 / 1.3, abs=0.1)
     assert content.candidates[0].device == ROBOT
+
+
+def test_a_proposal_tells_that_no_way_leads_to_a_place(monkeypatch):
+    office = staffed(ask_first=True)
+    nowhere = np.full((1, 3), np.inf)
+    monkeypatch.setattr(office.core.dispatcher.situations, "travel", lambda *_: (nowhere, nowhere))
+    office.fire(12)
+    content = decide(office, m.GetProposal(1), 1.0)[0].content
+    assert isinstance(content, m.Proposal)
+    assert content.reason == "no way leads there: nobody can go"
 
 
 def test_a_proposal_tells_why_nobody_can_go():

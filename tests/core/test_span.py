@@ -1,11 +1,20 @@
 """Limit on the robots of one operator, which holds for any policy."""
 
 import pytest
-from helpers.dva.dispatch_office import GUARD, OPERATOR, OTHER_OPERATOR, OTHER_ROBOT, ROBOT, Office
+from helpers.dva.dispatch_office import (
+    GUARD,
+    OPERATOR,
+    OTHER_OPERATOR,
+    OTHER_ROBOT,
+    ROBOT,
+    ROOM,
+    Office,
+)
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import State
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import ControlRoomRole
 
 THIRD_ROBOT = "02:00:00:01:00:03"
 
@@ -70,6 +79,19 @@ def test_an_operator_gets_the_robots_of_all_its_orders_and_no_other():
     office.register(OTHER_OPERATOR, "TeleOp")
     asked = m.PermissionRequest(OTHER_ROBOT, "missions")
     assert office.say(OTHER_OPERATOR, asked)[0].code == m.BUSY
+
+
+def test_a_control_room_sends_as_many_robots_by_itself_as_it_likes():
+    office = office_of(span=1)
+    office.core.roles.appoint(ROOM, ControlRoomRole.DISPATCH)
+    office.register(ROOM, "ControlRoom")
+    office.busy(OPERATOR)
+    three_fires(office)
+    for event, robot in ((1, ROBOT), (2, OTHER_ROBOT)):
+        reply, sends = office.say(ROOM, m.Assign(event, robot, ROOM))
+        assert reply.code == m.OK
+        assert [send.to for send in sends] == [ROOM]
+    assert office.core.orders.engaged.count(ROOM) == 2
 
 
 def test_all_that_a_lost_operator_had_in_hand_is_open_to_others():

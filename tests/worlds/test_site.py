@@ -40,6 +40,41 @@ def test_a_room_behind_a_wall_has_no_place(tmp_path):
     assert site.place_in("vault") is None
 
 
+@pytest.mark.parametrize("name", ["caparica", "office-block"])
+def test_a_robot_gets_to_the_floor_near_any_point_that_has_some(name):
+    site = load_site(name)
+    planner = Planner(site, 0.30)
+    base = site.robot_bases[0]
+    west, south, east, north = site.extent
+    found = 0
+    for x in np.linspace(west, east, 8):
+        for y in np.linspace(south, north, 8):
+            place = site.floor_near(x, y, 2.0)
+            if place is not None:
+                found += 1
+                assert math.dist(place, (x, y)) <= 2.0
+                assert site.room_at(x, y) in (None, site.room_at(*place))
+                assert math.isfinite(planner.distance(place, (base.x, base.y)))
+    assert found > 40
+
+
+def test_free_floor_is_its_own_place_and_that_of_a_desk_is_before_it():
+    site = load_site("caparica")
+    assert site.floor_near(20.0, 12.0, 2.0) == (20.0, 12.0)
+    (x, y), *_ = site.solids[0]
+    desk = (x + 0.05, y + 0.05)
+    place = site.floor_near(*desk, 2.0)
+    assert place is not None
+    assert place != desk
+    assert site.is_free(*place, 0.30)
+
+
+def test_a_room_behind_a_wall_has_no_floor_nearby(tmp_path):
+    closed = feature("room", "Polygon", square(20, 20, 3), name="vault")
+    site = load_site(write_site(tmp_path, [*TWO_ROOMS, closed]))
+    assert site.floor_near(21.5, 21.5, 2.0) is None
+
+
 def test_bases_posts_and_desks_of_caparica_stand_free():
     site = load_site("caparica")
     for pose in (*site.robot_bases, *site.guard_posts, *site.operator_desks):

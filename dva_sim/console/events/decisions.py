@@ -17,6 +17,7 @@ from dva_sim.protocol.control_room import FREE
 from dva_sim.worlds.site import Site
 
 UNKNOWN_ROOM: Final = "unknown room"  # where no site is known
+BEFORE: Final = 2.0  # farthest of an event from the place that somebody pointed at [m]
 CERTAIN: Final = 0.9  # of what somebody in a control room reports
 DECISIONS: Final = (
     *("event_acknowledge", "event_assign", "event_take_off", "event_false_alarm"),
@@ -66,17 +67,26 @@ def decision_of(
 
 
 def place_of(line: PlaceAsked, site: Site | None) -> tuple[float, float]:
-    """A place on the site [m]; where no site is known, any place.
+    """Return where an event is raised [m]: on floor that a robot can reach, at the named place.
+
+    Who points at a desk or a wall means the floor before it. Where no site is known, any place.
 
     Raises:
-        Refused: it lies beyond the site.
+        Refused: nobody can go there.
     """
     x = line["x_m"]
     y = line["y_m"]
-    left, low, right, high = (x, y, x, y) if site is None else site.extent
+    if site is None:
+        return x, y
+    left, low, right, high = site.extent
     if not (left <= x <= right and low <= y <= high):
-        raise Refused("x_m and y_m should be a place on the site")
-    return x, y
+        raise Refused("that is outside the site, where nobody can go")
+    floor = site.floor_near(x, y, BEFORE)
+    if floor is None:
+        room = site.room_at(x, y)
+        where = f"there in {room}" if room else "there"
+        raise Refused(f"nobody can go {where}: a robot reaches no floor within {BEFORE:g} m")
+    return floor
 
 
 def report_of(line: ReportAsked, place: m.Position) -> tuple[m.EventReport, str]:

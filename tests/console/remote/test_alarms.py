@@ -111,4 +111,4 @@ def test_an_event_beyond_the_site_is_refused_as_at_a_console_of_its_own(tmp_path
     with attached(monkeypatch, tmp_path) as page:
         answer = page.ask("event_raise", kind="fire", severity="low", x_m=100.0, y_m=12.0)
     assert not answer["ok"]
-    assert "a place on the site" in answer["text"]
+    assert "outside the site" in answer["text"]
