@@ -89,6 +89,8 @@ class Rules:
         decide_within: Time that the policy waits for a person, where it asks first [s].
         declined_pause: Pause before the next request to a responder who declined an order or was
             not reached [s].
+        severity_moves: True if the severity of an event rises with what is learnt of it; otherwise
+            it is the highest reported.
     """
 
     escalate_after: float = 120.0
@@ -104,6 +106,7 @@ class Rules:
     operator_span: int = 1
     decide_within: float = 60.0
     declined_pause: float = 10.0
+    severity_moves: bool = False
 
 
 STIRRED = 0.5  # who has moved less has not moved: positions are known that well [m]

@@ -23,6 +23,7 @@ from dva_sim.core.robot_access import RobotAccess
 from dva_sim.core.roles import Roles
 from dva_sim.core.sensing import Sensing
 from dva_sim.core.sessions import DvaAnswer, Send, Sessions
+from dva_sim.core.severity import Grading
 from dva_sim.core.travel_times import SiteKnowledge, Travel
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.control_room import ControlRoomBody
@@ -107,7 +108,10 @@ class Dva:
         self.sensing = sensing or Sensing()
         self.handovers = Handovers(self.orders, supervisors)
         self.control_rooms = ControlRooms(self.dispatcher, self.handovers, self.roles, self.access)
-        self._reports = Reports(self.dispatcher, self.events, self.sensing, self.control_rooms)
+        grading = Grading(self.orders)
+        self._reports = Reports(
+            self.dispatcher, self.events, self.sensing, self.control_rooms, grading
+        )
         self._robot_access = RobotAccess(
             self.dispatcher,
             self.handovers,

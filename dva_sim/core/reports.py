@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from dva_sim.core.control_rooms import ControlRooms
 from dva_sim.core.dispatcher import Dispatcher
-from dva_sim.core.events import Cause, Event, EventTable, State, apart
+from dva_sim.core.events import SAME_SPOT, Cause, Event, EventTable, State, apart
 from dva_sim.core.registry import DRIVERS, DeviceEntry
 from dva_sim.core.sensing import Sensing
 from dva_sim.core.sessions import DvaAnswer, Send
+from dva_sim.core.severity import Grading
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import CONTROL_ROOM, ROBOT, ControlRoomRole
 
@@ -31,12 +32,14 @@ class Reports:
         events: All events.
         sensing: Robot sensors that the DVA uses.
         control_rooms: Tells which control room may report.
+        grading: Raises the severity of events.
     """
 
     dispatcher: Dispatcher
     events: EventTable
     sensing: Sensing
     control_rooms: ControlRooms
+    grading: Grading
 
     # --- by those who were sent ----------------------------------------------------------
 
@@ -52,6 +55,8 @@ class Reports:
             text = f"event {event.number} is another one, a {event.kind} elsewhere"
             return DvaAnswer(m.UNKNOWN_EVENT, text)
         sends = self.dispatcher.orders.found(event, device, body.finding, now)
+        if event.state is State.CONFIRMED:
+            self.grading.found(event, body.severity, device, now)
         if event.waits_for is not None:
             sends += self.dispatcher.decide(now)
         return DvaAnswer(sends=sends)
@@ -103,15 +108,32 @@ class Reports:
         sends: list[Send] = []
         if event is None:
             event, sends = self._corrected(source, body, now)
+        if event is None and (settled := self._said_again(source, body, now)) is not None:
+            self.events.merge(settled, body.severity)
+            return DvaAnswer(sends=sends)
         if event is None and self.events.full:
             return DvaAnswer(m.BUSY, "too many events are open; no more are accepted")
+        is_known = event is not None
         if event is None:
             contain = self.dispatcher.orders.rules.containment
             event = self.events.add(body.kind, body.position, body.severity, now, contain)
-        else:
-            self.events.merge(event, body.severity)
         self.events.note_source(event, source, body.confidence)
+        if is_known:
+            self.grading.reported(event, body.severity, source, now)
+            self.events.merge(event, body.severity)
         return DvaAnswer(sends=sends + self.dispatcher.decide(now))
+
+    def _said_again(self, source: str, body: m.EventReport, now: float) -> Event | None:
+        """Return the event that people have found, or were called to, if a device repeats it."""
+        if not self.dispatcher.orders.rules.severity_moves:
+            return None
+        near = max(self.events.merge_distance, SAME_SPOT)
+        again = (
+            event
+            for event in _settled(self.events, body.kind, now)
+            if source in event.sources and apart(event.position, body.position) < near
+        )
+        return next(again, None)
 
     def _withdrawn(self, source: str, body: m.EventReport, now: float) -> DvaAnswer:
         """Close an event that all its reporters have withdrawn before anybody was sent."""
@@ -152,6 +174,7 @@ class Reports:
     def felt(self, robot: str, body: m.SensorValue, place: m.Position, now: float) -> DvaAnswer:
         """Handle a sensor value of a robot: it may be a new event, or support a known one."""
         alarm = self.sensing.crossed(robot, body)
+        self._grade(robot, body, place, now)
         if alarm is None:
             return DvaAnswer()
         event = _within_reach(self.events.open.values(), alarm.kind, place)
@@ -172,6 +195,16 @@ class Reports:
         sends = self.dispatcher.orders.transition(event, Cause.SENSED, now)
         return DvaAnswer(sends=sends + self.dispatcher.decide(now))
 
+    def _grade(self, robot: str, body: m.SensorValue, place: m.Position, now: float) -> None:
+        """Let a value that stands above its alarm level say how grave the event nearby is."""
+        times = self.sensing.times_alarm(robot, body.sensor)
+        if not times:
+            return
+        kind = self.sensing.alarms[body.sensor].kind
+        event = _within_reach(self.events.open.values(), kind, place)
+        if event is not None:
+            self.grading.sensed(event, body.sensor, robot, times_alarm=times, now=now)
+
 
 # --- which event it is ---------------------------------------------------------------------
 
@@ -185,7 +218,12 @@ def _within_reach(events: Iterable[Event], kind: str, place: m.Position) -> Even
 
 def _is_no_news(events: EventTable, kind: str, place: m.Position, now: float) -> bool:
     """Return True if people recently found such an event nearby, or were called to one."""
-    lately = (
-        e for e in events.closed.values() if e.state in _FOUND and now - e.times["closed"] < NO_NEWS
-    )
-    return _within_reach(lately, kind, place) is not None
+    return _within_reach(_settled(events, kind, now), kind, place) is not None
+
+
+def _settled(events: EventTable, kind: str, now: float) -> Iterator[Event]:
+    """Yield the events of a kind that people have recently found, or were called to."""
+    for event in events.closed.values():
+        is_found = event.kind == kind and event.state in _FOUND
+        if is_found and now - event.times["closed"] < NO_NEWS:
+            yield event

@@ -8,6 +8,7 @@ that stand above a threshold several times in a row.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -54,6 +55,7 @@ class Sensing:
     _mute: set[str] = field(default_factory=set)
     _due: dict[str, float] = field(default_factory=dict)
     _above: dict[tuple[str, str], int] = field(default_factory=dict)
+    _times: dict[tuple[str, str], deque[float]] = field(default_factory=dict)
     _wanted: bool = False
 
     # --- which sensors there are -------------------------------------------------------
@@ -73,6 +75,7 @@ class Sensing:
         self._mute.discard(robot)
         for key in [key for key in self._above if key[0] == robot]:
             del self._above[key]
+            del self._times[key]
 
     def on_reply(self, robot: str, content: object, now: float) -> None:
         """A robot has answered, or not; of one that is gone meanwhile nothing is kept."""
@@ -143,9 +146,18 @@ class Sensing:
         key = robot, value.sensor
         if max(value.values) < alarm.threshold:
             self._above.pop(key, None)
+            self._times.pop(key, None)
             return None
+        self._times.setdefault(key, deque(maxlen=IN_A_ROW)).append(
+            max(value.values) / alarm.threshold
+        )
         self._above[key] = self._above.get(key, 0) + 1
         return alarm if self._above[key] == IN_A_ROW else None
+
+    def times_alarm(self, robot: str, sensor: str) -> float:
+        """Return how many times its alarm level a sensor has shown lately; 0 where it is below."""
+        times = self._times.get((robot, sensor), ())
+        return min(times) if len(times) == IN_A_ROW else 0.0
 
     def _heeded(self, robot: str) -> tuple[str, ...]:
         return tuple(s.name for s in self.known[robot].sensors if s.name in self.alarms)

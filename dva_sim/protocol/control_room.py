@@ -211,7 +211,7 @@ class EventStatus:
         event_id: The DVA's number of the event.
         kind: `fire`, `gas_leak` or `flood`.
         position: Position of the event.
-        severity: 0 (harmless) to 1, the highest reported.
+        severity: 0 (harmless) to 1, the highest reported, or as the DVA has graded it since.
         confidence: Confidence that the event is real, 0 to 1.
         event_state: `pending`, `assigned`, `on_scene`, `confirmed`, `contained`, `refuted`,
             `escalated` or `expired`.

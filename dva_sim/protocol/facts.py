@@ -24,14 +24,14 @@ class Fact:
         role: Role of the author, if it is a control room: `look`, `drive`, `dispatch`, `supervise`.
         action: Kind of decision: `acknowledge`, `assign`, `take_off`, `false_alarm`, `escalate`,
             `note`, `set_dispatch`, `revoke`, `raise`, `take`, `take_over`, `give_back`, `expire`,
-            `emergency`, `release_emergency`.
+            `emergency`, `release_emergency`, `severity`.
         event: Number of the event that it is about.
         device: Id of the guard or robot that it is about.
         operator: Id of the device that drives that robot.
         task: `confirm`, `contain` or `stand_by`.
         arrival_in: Expected arrival of the device [s from then].
         mode: New dispatch mode: `automatic` or `ask_first`.
-        text: Text of a note, or place where an event was raised.
+        text: Text of a note, place where an event was raised, or word for its severity.
         cause: Reason in words of the author.
         code: `messages.OK`, or why it was refused.
         outcome: Result in words; for a refusal its reason.

@@ -9,10 +9,10 @@ from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.console.events.decisions import UNKNOWN_ROOM, about_event
 from dva_sim.console.wire.events import SiteEventShown
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.event_kinds import severity_word
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.site import Site
 
-SEVERITIES: Final = ((0.75, "critical"), (0.5, "high"), (0.25, "medium"), (0.0, "low"))
 MOST_OVER: Final = 50  # events that are over
 
 
@@ -62,7 +62,7 @@ def event_row(
         "latitude_deg": status.position.latitude,
         "longitude_deg": status.position.longitude,
         "room": site.room_at(x, y) if site is not None else UNKNOWN_ROOM,
-        "severity": next(name for least, name in SEVERITIES if status.severity >= least),
+        "severity": severity_word(status.severity),
         "severity_value": round(status.severity, 2),
         "state": status.event_state.replace("_", " "),
         "over": is_over,

@@ -99,6 +99,7 @@ def make_core(stage: Stage, permissions: Permissions) -> Dva:
             dispatch.rules(),
             operator_span=stage.scenario.operator.span,
             arrived_within=at_event_m(stage.scenario),
+            severity_moves=stage.follows_severity,
         ),
         rng=stage.streams["dva/policy"],
         sessions=Sessions(permissions),

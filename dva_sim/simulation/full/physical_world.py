@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import Observation
@@ -14,6 +15,7 @@ from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.kernel.recorder import TrackPoint
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.event_kinds import severity_word
 from dva_sim.simulation.full.hazards import Danger, Hearsay, RunHazard, RunHazards
 from dva_sim.simulation.full.stage import DVA, Stage
 from dva_sim.simulation.full.team import TeamBuilder
@@ -31,6 +33,7 @@ DANGEROUS = Conditions(
     explosive=0.2,
 )
 """Causes of danger at a place, by the limits of `danger_radius` (docs/explanation/hazards.md)."""
+LOOK_AGAIN = 10.0  # from one look whether a hazard has become graver to the next [s]; assumed
 REPORT_AGAIN = 2.0  # after a report that was not answered, or refused [s]
 
 
@@ -147,6 +150,24 @@ class Field(RunHazards):
         self._say(device, body)
         device.tell(f"reports {incident.kind.replace('_', ' ')}", "event")
         self._sound_alarm()
+        if self.stage.follows_severity:
+            self._follow(device, incident, body)
+
+    def _follow(self, device: AgentDevice, incident: RunHazard, told: m.EventReport) -> None:
+        """Let a detector or caller report again whenever the hazard has become graver."""
+
+        def look() -> bool:
+            nonlocal told
+            now = self.stage.clock.now
+            severity = incident.hazard.severity(now)
+            goes_on = any(incident is one for one in self._going_on(now))
+            if goes_on and severity_word(severity) != severity_word(told.severity):
+                told = replace(told, severity=severity)
+                self._say(device, told)
+                device.tell(f"reports that it is {severity_word(severity)}", "event")
+            return goes_on
+
+        self.stage.clock.every(LOOK_AGAIN, look)
 
     def _say(self, device: AgentDevice, body: m.EventReport) -> None:
         """Report until the DVA has taken it: it is said only once."""

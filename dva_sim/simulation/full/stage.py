@@ -193,6 +193,12 @@ class Stage:
         """Rule by which robots are released after an emergency, as in `release_of`."""
         return release_of(self.scenario, self.attended)
 
+    @property
+    def follows_severity(self) -> bool:
+        """True if the severity of events rises with what is learnt of them."""
+        configured = self.scenario.dva.severity
+        return self.attended if configured is None else configured == "followed"
+
     def pattern_for(self, robot: str) -> Pattern:
         """Return the pattern of the next drive of a robot, by its id."""
         name = self.pattern_names.get(robot, self.scenario.pattern)

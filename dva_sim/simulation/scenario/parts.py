@@ -464,6 +464,10 @@ class DvaConfig(Config):
         supervisors: Operators who may take a robot from its holder, by label or id.
         control_rooms: Roles of control rooms, `look`, `drive`, `dispatch` or `supervise`, by label,
             such as `control-room-1`, and of other devices by id. Others may look.
+        severity: Severity of events. `reported`: the highest in a report, each of which is made
+            once. `followed`: it rises with repeated reports, sensors of robots and findings, too,
+            and detectors and callers report again as it grows. Left out: `followed` at a console,
+            else `reported`.
     """
 
     sensors: tuple[Literal["temperature", "smoke", "gas"], ...] = ()
@@ -472,6 +476,7 @@ class DvaConfig(Config):
     control_rooms: dict[Annotated[str, Field(pattern=CONTROL_ROOM)], RoleName] = Field(
         default_factory=dict
     )
+    severity: Literal["reported", "followed"] | None = None
 
 
 class EmergencyConfig(Config):

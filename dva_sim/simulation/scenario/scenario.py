@@ -49,7 +49,7 @@ NEWER = (
     ("operator", "kind"),
     ("disturbance",),
     ("dva",),
-    ("dva", "control_rooms"),
+    ("dva", "control_rooms", "severity"),
     ("emergency",),
 )
 """Keys that came after results were published: a part, or some keys of one."""

@@ -47,6 +47,35 @@ def around(played: Run) -> tuple[float, float]:
     return x + 1.0, y
 
 
+# --- a growing hazard ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "attended", "follows"),
+    [
+        ({}, False, False),
+        ({}, True, True),
+        ({"dva.severity": "followed"}, False, True),
+        ({"dva.severity": "reported"}, True, False),
+    ],
+)
+def test_severity_moves_at_a_console_or_where_a_scenario_says_so(changes, attended, follows):
+    stage = Run(scenario({}, **changes), 1).stage
+    stage.attended = attended
+    assert stage.follows_severity == follows
+
+
+def test_who_has_reported_a_hazard_reports_again_as_it_grows():
+    changes = {"guard.count": 1, "guard.mobilisation_s": 500, "dva.severity": "followed"}
+    played, _ = run({"hazard": {"growth": "fast"}}, **changes)
+    told = [(fact.text, fact.cause) for fact in played.dva.facts if fact.action == "severity"]
+    assert told == [
+        ("medium", "caller reports it as graver"),
+        ("high", "caller reports it as graver"),
+        ("critical", "caller reports it as graver"),
+    ]
+
+
 # --- false alarms ----------------------------------------------------------------------
 
 

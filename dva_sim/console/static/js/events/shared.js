@@ -44,14 +44,17 @@ export const openEvents = computed(() => {
   return filter.value === 'mine' ? listed.filter(isMine) : listed;
 });
 
-/** Closed events by how they ended, the newest first. @type {import('../../vendor/preact.js').Signal<[string, SiteEvent[]][]>} */
+const ENDINGS = ['escalated', 'confirmed', 'contained', 'refuted', 'expired'];
+
+/** Closed events by how they ended, in each the newest first. @type {import('../../vendor/preact.js').Signal<[string, SiteEvent[]][]>} */
 export const closedEvents = computed(() => {
   const endings = /** @type {Record<string, SiteEvent[]>} */ ({});
   for (const event of [...events.value].reverse()) {
     if (isOpen(event) || (filter.value === 'mine' && !isMine(event))) continue;
     (endings[event.state] ??= []).push(event);
   }
-  return Object.entries(endings);
+  const rank = (/** @type {string} */ ending) => (ENDINGS.indexOf(ending) + ENDINGS.length + 1) % (ENDINGS.length + 1);
+  return Object.entries(endings).sort(([one], [other]) => rank(one) - rank(other));
 });
 
 /** Event in hand: the selected one, else the most severe unacknowledged one. */
