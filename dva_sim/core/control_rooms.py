@@ -229,7 +229,7 @@ class ControlRooms:
         task = body.task or "confirm"
         entry = self._responder(body.device)
         device = entry.device
-        if self._is_sent(event, device.id_tag, task):
+        if self._is_sent(body, event, task):
             return "is sent there already"
         if task == "confirm":
             self._may_look(body, event)
@@ -237,11 +237,18 @@ class ControlRooms:
             self._may_act(body, event, device, task)
         if self._orders.emergencies.holds(device.id_tag):
             raise _Refused(m.BUSY, f"{device.label} is stopped by an emergency: release it first")
+        is_passed_on = self._passes_on(body, event)
         engaged = self._orders.engaged.all(device.id_tag)
-        if engaged:
+        if engaged and not is_passed_on:
             text = f"{device.label} is at event {engaged[0].number}: take it off there first"
             raise _Refused(m.BUSY, text)
-        driver = self._driver(body, device, sender, now) if device.device_type == ROBOT else None
+        driver = None
+        if device.device_type == ROBOT:
+            driver = self._driver(body, device, sender, now)
+            holder = self._handovers.holder(device.id_tag, driver, now)
+            if holder is not None and not (is_passed_on and holder.holder == event.operator):
+                text = f"{device.label} is held by {holder.label}: take it over first"
+                raise _Refused(m.BUSY, text)
         return self._send(body, event, entry, driver, now)
 
     def _responder(self, device: str) -> DeviceEntry:
@@ -251,20 +258,27 @@ class ControlRooms:
         return entry
 
     @staticmethod
-    def _is_sent(event: Event, device: str, task: str) -> bool:
+    def _is_sent(body: m.Assign, event: Event, task: str) -> bool:
         if task == "confirm":
-            return event.state in LOOKING and event.responder == device
+            looks = event.state in LOOKING and event.responder == body.device
+            return looks and body.operator in (None, event.operator)
         stand_by = event.state is not State.CONFIRMED
-        return event.actor == device and stand_by == (task == "stand_by")
+        return event.actor == body.device and stand_by == (task == "stand_by")
+
+    @staticmethod
+    def _passes_on(body: m.Assign, event: Event) -> bool:
+        """Return True if a robot that looks there stays, and another answers for it."""
+        looks = (body.task or "confirm") == "confirm" and event.state in LOOKING
+        return looks and event.responder == body.device
 
     def _may_look(self, body: m.Assign, event: Event) -> None:
         """Nobody is taken from a scene, and from the way only by who knows of it."""
         who = self._orders.label_of(event.responder or "")
         if event.state is State.CONFIRMED:
             raise _Refused(m.WRONG_MODE, f"event {event.number} is confirmed: somebody has looked")
-        if event.state is State.ON_SCENE:
+        if event.state is State.ON_SCENE and not self._passes_on(body, event):
             raise _Refused(m.BUSY, f"{who} is there already: take it off first")
-        if event.state is State.ASSIGNED and body.decisions is None:
+        if event.state in LOOKING and body.decisions is None:
             raise _Refused(m.BUSY, f"{who} is on the way; to send another, include Decisions")
 
     def _may_act(self, body: m.Assign, event: Event, device: m.Device, task: str) -> None:
@@ -287,14 +301,8 @@ class ControlRooms:
             hands = self._dispatcher.situations.operators(now)
             if not hands:
                 raise _Refused(m.BUSY, f"no operator is free to drive {robot.label}")
-            driver = hands[0].device
-        else:
-            driver = self._named_driver(body.operator, robot, sender, now)
-        holder = self._handovers.holder(robot.id_tag, driver.id_tag, now)
-        if holder is not None:
-            text = f"{robot.label} is held by {holder.label}: take it over first"
-            raise _Refused(m.BUSY, text)
-        return driver.id_tag
+            return hands[0].device.id_tag
+        return self._named_driver(body.operator, robot, sender, now).id_tag
 
     def _named_driver(self, named: str, robot: m.Device, sender: m.Device, now: float) -> m.Device:
         entry = self._orders.registry.entries.get(named)
@@ -320,7 +328,7 @@ class ControlRooms:
         orders = self._orders
         device = entry.device.id_tag
         looks = (body.task or "confirm") == "confirm"
-        before = event.responder if looks and event.state is State.ASSIGNED else None
+        before = event.responder if looks and event.state in LOOKING else None
         before = before if looks else event.actor
         sends = orders.recall(event, before, now, replaced=True) if before else []
         event.handling.taken_off.discard(device)

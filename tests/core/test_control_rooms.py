@@ -469,6 +469,31 @@ def test_a_proposal_names_everybody_with_a_time_and_a_reason():
     assert content.candidates[0].device == ROBOT
 
 
+@pytest.mark.parametrize("progress", ["departed", "arrived"])
+def test_a_robot_that_goes_by_itself_is_passed_on_to_a_colleague(progress):
+    office = staffed()
+    office.silence(OPERATOR, 0.0)
+    office.fire(12, now=1.0)
+    decide(office, m.TakeOff(1, GUARD, decisions=office.event(1).handling.decisions), 1.0)
+    body = m.Assign(1, ROBOT, ROOM, decisions=office.event(1).handling.decisions)
+    assert decide(office, body, 2.0)[0].code == m.OK
+    office.progress(ROOM, progress, 3.0)
+    assert office.say(ROOM, m.PermissionRequest(ROBOT, "missions"), 3.0)[0].code == m.OK
+
+    unseen = m.Assign(1, ROBOT, OTHER_ROOM)
+    assert decide(office, unseen, 4.0, OTHER_ROOM)[0].code == m.BUSY
+    body = m.Assign(1, ROBOT, OTHER_ROOM, decisions=office.event(1).handling.decisions)
+    reply, sends = decide(office, body, 5.0, OTHER_ROOM)
+    assert reply.code == m.OK
+    assert (office.event(1).responder, office.event(1).operator) == (ROBOT, OTHER_ROOM)
+    told = [(send.to, type(send.body)) for send in sends]
+    assert (ROOM, m.OrderProgress) in told
+    assert (OTHER_ROOM, m.Order) in told
+    asked = m.PermissionRequest(ROBOT, "missions")
+    assert office.say(OTHER_ROOM, asked, 6.0)[0].code == m.OK
+    assert office.say(ROOM, asked, 6.0)[0].code == m.BUSY
+
+
 def test_a_proposal_tells_that_no_way_leads_to_a_place(monkeypatch):
     office = staffed(ask_first=True)
     nowhere = np.full((1, 3), np.inf)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from dva_sim.agents.control_room.history import EventHistory
 from dva_sim.agents.device import AUDIT, EVENT, AgentDevice, do_nothing
 from dva_sim.protocol import messages as m
 
@@ -24,6 +25,7 @@ class ControlRoomAgent:
     Attributes:
         events: Latest published state of each event, by number.
         received_at: Time of that publication [s].
+        histories: Steps of each event, by number, as far as they were heard.
         devices: Registered devices by id, from the latest list.
         dispatch: Dispatch mode and own role; None until the first publication.
         raised: Number of the event that it has raised last, by the DVA's record of that.
@@ -41,6 +43,7 @@ class ControlRoomAgent:
         self.device = device
         self.events: dict[int, m.EventStatus] = {}
         self.received_at: dict[int, float] = {}
+        self.histories: dict[int, EventHistory] = {}
         self.devices: dict[str, m.Device] = {}
         self.dispatch: m.DispatchStatus | None = None
         self.raised: int | None = None
@@ -125,6 +128,9 @@ class ControlRoomAgent:
             case m.DeviceList(devices=devices):
                 self.devices = {device.id_tag: device for device in devices}
             case m.AuditRecord():
+                if body.event_id in self.histories:
+                    history = self.histories[body.event_id]
+                    history.hear_record(body, self.device.clock.now)
                 if body.author == self.device.id_tag and body.action == "raise":
                     self.raised = body.event_id
                 self.on_record(body)
@@ -136,7 +142,8 @@ class ControlRoomAgent:
         if known is not None and (status.age, status.decisions) < (known.age, known.decisions):
             return
         self.events[number] = status
-        self.received_at[number] = self.device.clock.now
+        self.received_at[number] = now = self.device.clock.now
+        self.histories.setdefault(number, EventHistory()).hear_status(status, now)
         self._forget_the_oldest()
         self.on_event(status)
 
@@ -145,7 +152,7 @@ class ControlRoomAgent:
             return
         closed = [n for n, status in self.events.items() if status.closed_for is not None]
         for number in sorted(closed)[:-MOST_CLOSED]:
-            del self.events[number], self.received_at[number]
+            del self.events[number], self.received_at[number], self.histories[number]
 
     def _on_request(self, message: m.Message) -> m.Reply:
         """Answer a request of the DVA to a holder of robots: it has asked for nothing."""

@@ -9,6 +9,7 @@ from dva_sim.console.asking.refusal import OnResult
 from dva_sim.console.bench import ServerActions
 from dva_sim.console.desk.console_pages import ConsolePages
 from dva_sim.console.driving.decision_actions import DecisionActions
+from dva_sim.console.driving.desk_actions import DeskActions, instructions_of
 from dva_sim.console.driving.drive_actions import LOOK, Driving, is_gone_for_good
 from dva_sim.console.events.alarm_actions import AlarmActions
 from dva_sim.console.wire.actions import ActionPlace, Asked
@@ -33,10 +34,28 @@ class ConsoleActions:
         self._driving = driving = Driving(pages.driven)
         alarms = AlarmActions(pages.alarms, pages.author, lambda *given: dispatcher.do(*given))
         decisions = DecisionActions(pages.driven, pages.rooms, driving)
+        desk = DeskActions(
+            pages.driven,
+            pages.rooms,
+            driving,
+            decisions,
+            instructions_of(pages.scenario),
+            author=pages.author,
+        )
         server = ServerActions(pages.system.bench)
+        holders = self, driving, decisions, desk, alarms, pages.fakes, server
         dispatcher = ActionDispatcher(
             place,
-            holders=(self, driving, decisions, alarms, pages.fakes, server, *self.holders(driving)),
+            holders=(
+                self,
+                driving,
+                decisions,
+                desk,
+                alarms,
+                pages.fakes,
+                server,
+                *self.holders(driving),
+            ),
             tell=self._tell,
             elsewhere=elsewhere,
             audited=lambda: pages.audited,

@@ -34,6 +34,7 @@ from dva_sim.console.wire.scenes import LinkShown, SceneLine
 from dva_sim.kernel.recorder import Breach
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import ROBOT
+from dva_sim.simulation.scenario import Scenario
 
 # From one line to the next, real time [s].
 POSITIONS: Final = 0.1
@@ -57,9 +58,6 @@ class NamedRooms(DecidingRooms, Protocol):
 
     users: dict[str, str]
 
-    def label(self, client: str) -> str:
-        """Return the name of a page's person; empty if it has given none."""
-
     def entries(self) -> list[RoomEntry]:
         """Return who decides, and what each may."""
 
@@ -82,6 +80,7 @@ class ConsolePages:
         breaches: Function that returns the broken safety rules, as far as they are judged here.
 
     Attributes:
+        scenario: Scenario of the system, or one of defaults.
         looked: True while somebody looks at the table of devices.
         users: Names of those who have logged in, by client.
         alarms: Alarms that need action.
@@ -90,6 +89,7 @@ class ConsolePages:
         lag: Rule that holds drives while what runs here lags; nothing runs at a remote DVA's.
     """
 
+    scenario: Scenario
     lag = LagRule()
 
     def __init__(
@@ -160,7 +160,7 @@ class ConsolePages:
 
     def author(self, client: str) -> str:
         """Return the name of a page's person."""
-        if name := self.users.get(client) or self.rooms.label(client):
+        if name := self.users.get(client) or self.rooms.names().get(client):
             return name
         person = self.seating.of_client(client)
         return name_of_page(client) if person is None else person.device.label
@@ -304,8 +304,17 @@ class ConsolePages:
             self._events = event_rows(system.agent, system.labels, system.site, system.frame)
             self._news.tell({"k": "events", "t": now_ms, "events": self._events})
         dispatch = dispatch_shown(system.agent.dispatch, system.switched)
-        rooms = self.rooms.entries()
-        self._news.tell({"k": "control", "t": now_ms, "dispatch": dispatch, "rooms": rooms})
+        handing_over = self.rooms.handing_over
+        self._news.tell(
+            {
+                "k": "control",
+                "t": now_ms,
+                "dispatch": dispatch,
+                "rooms": self.rooms.entries(),
+                "offers": handing_over.shown(self.rooms.names()),
+                "owners": handing_over.owners_shown(),
+            }
+        )
 
     def tell_seats(self) -> None:
         """Tell everybody in a seat about their own drives."""

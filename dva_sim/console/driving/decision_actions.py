@@ -23,6 +23,7 @@ from dva_sim.console.events.decisions import (
     report_of,
     why,
 )
+from dva_sim.console.events.handing_over import HandingOver
 from dva_sim.console.events.missions import SentRobots
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import (
@@ -44,9 +45,14 @@ class DecidingRooms(Protocol):
 
     Attributes:
         listener: Control room that knows events and devices for the pages.
+        handing_over: Work that people offer to each other.
     """
 
     listener: ControlRoomAgent
+    handing_over: HandingOver
+
+    def names(self) -> Mapping[str, str]:
+        """Return the name of each person who decides, by page."""
 
     def join(self, client: str, role: str, name: str, on_result: OnResult) -> None:
         """Let a page's person decide, within a role, under a name of their own.
@@ -66,13 +72,16 @@ class DecisionActions:
         system: System whose events and robots those are.
         rooms: Control rooms of the console.
         driving: Seats, and drives from pages.
+
+    Attributes:
+        sent: Robots that people have sent by themselves.
     """
 
     def __init__(self, system: DrivenSystem, rooms: DecidingRooms, driving: Driving) -> None:
         self._system = system
         self._rooms = rooms
         self._driving = driving
-        self._sent = SentRobots()
+        self.sent = SentRobots()
 
     @does("room_join")
     def _join(self, client: str, line: RoomName, on_result: OnResult) -> None:
@@ -135,7 +144,7 @@ class DecisionActions:
         known = status.decisions if decisions is None else decisions
 
         def send(agent: ControlRoomAgent, on_result: OnResult) -> None:
-            mission = self._sent.send(client, agent, robot, status)
+            mission = self.sent.send(client, agent, robot, status)
             mission.begin(line.get("reason") or None, known, on_result)
 
         self._rooms.decide(client, _role(line), on_result, send)
@@ -143,7 +152,7 @@ class DecisionActions:
     @does("mission_found")
     def _found(self, client: str, line: FindingAsked, on_result: OnResult) -> None:
         """Report what a person sees through the robot that went by itself."""
-        self._sent.mission(client, line["event"]).found(line["finding"], on_result)
+        self.sent.mission(client, line["event"]).found(line["finding"], on_result)
 
     @does("revoke")
     def _revoke(self, client: str, line: OfDevice, on_result: OnResult) -> None:

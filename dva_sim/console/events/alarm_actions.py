@@ -48,7 +48,7 @@ class AlarmActions:
     @does("alarm_shelve")
     def _shelve(self, client: str, line: ShelveAsked, on_result: OnResult) -> None:
         keys = self._alarms.members(line["alarm"])
-        self._alarms.shelve(keys, line["for_s"], self._author(client))
+        self._alarms.shelve(keys, line["for_s"], self._author(client), line["reason"])
         on_result(True, f"shelved for {line['for_s'] / 60:.0f} minutes")
 
     @does("alarm_unshelve")

@@ -3,7 +3,8 @@
 An alarm is a condition that somebody has to act on, and whether somebody has said to have seen it.
 Both together are its state: unacknowledged, acknowledged, or returned (over, and nobody has seen
 it). An alarm that is over and seen is removed. A person who cannot act now may shelve one, always
-with an end. There is one list, the gravest on top. In a flood, alarms of one kind and place are one
+with an end and a reason, and never an unacknowledged critical one; one that gets graver comes back
+at once. There is one list, the gravest on top. In a flood, alarms of one kind and place are one
 row ("7 x fire, Corridor 2"), so that the list stays short enough to be read.
 
 References:
@@ -76,6 +77,7 @@ class RaisedAlarm:
         seen_by: Person who acknowledged it.
         shelved_until: Real time [s]; None if it is not shelved.
         shelved_by: Person who shelved it.
+        shelved_why: Reason in words.
     """
 
     condition: AlarmCondition
@@ -85,6 +87,7 @@ class RaisedAlarm:
     seen_by: str = ""
     shelved_until: float | None = None
     shelved_by: str = ""
+    shelved_why: str = ""
 
 
 class Alarms:
@@ -128,13 +131,20 @@ class Alarms:
     def _raise(self, condition: AlarmCondition, now: float, known: RaisedAlarm | None) -> None:
         alarm = RaisedAlarm(condition, AlarmState.UNACKNOWLEDGED, now)
         if known is not None:  # it comes back: a shelf goes on
-            alarm = replace(alarm, shelved_until=known.shelved_until, shelved_by=known.shelved_by)
+            alarm = replace(
+                alarm,
+                shelved_until=known.shelved_until,
+                shelved_by=known.shelved_by,
+                shelved_why=known.shelved_why,
+            )
         self._raised.append(now)
         self._keep(self._seen(alarm, condition.seen_by))
 
     def _go_on(self, known: RaisedAlarm, condition: AlarmCondition, now: float) -> None:
         alarm = replace(known, condition=condition)
         graver = PRIORITIES.index(condition.priority) < PRIORITIES.index(known.condition.priority)
+        if graver:
+            alarm = replace(alarm, shelved_until=None, shelved_by="", shelved_why="")
         if graver and not condition.seen_by:
             alarm = replace(alarm, state=AlarmState.UNACKNOWLEDGED, raised=now, seen_by="")
             self._raised.append(now)
@@ -192,14 +202,21 @@ class Alarms:
         else:
             del self.known[key]
 
-    def shelve(self, key: str, seconds: float, by: str, now: float) -> None:
+    def must_be_seen(self, key: str) -> bool:
+        """Return True if an alarm is critical, lasts, and nobody has acknowledged it."""
+        alarm = self.known[key]
+        is_open = alarm.is_on and alarm.state is AlarmState.UNACKNOWLEDGED
+        return is_open and alarm.condition.priority == PRIORITIES[0]
+
+    def shelve(self, key: str, seconds: float, by: str, now: float, why: str = "") -> None:
         """Somebody cannot act on an alarm now: out of the list, for so long [s]."""
         until = now + min(seconds, LONGEST_SHELF)
-        self.known[key] = replace(self.known[key], shelved_until=until, shelved_by=by)
+        alarm = replace(self.known[key], shelved_until=until, shelved_by=by, shelved_why=why)
+        self.known[key] = alarm
 
     def unshelve(self, key: str, now: float) -> None:
         """An alarm is back in the list; what lasts is new there again."""
-        alarm = replace(self.known[key], shelved_until=None, shelved_by="")
+        alarm = replace(self.known[key], shelved_until=None, shelved_by="", shelved_why="")
         if alarm.is_on:
             alarm = replace(alarm, state=AlarmState.UNACKNOWLEDGED, raised=now, seen_by="")
             alarm = self._seen(alarm, alarm.condition.seen_by)
@@ -264,4 +281,5 @@ def _row(alarms: Sequence[RaisedAlarm], now: float) -> AlarmRow:
         "seen_by": first.seen_by,
         "left_s": None if until is None else max(0, round(until - now)),
         "shelved_by": first.shelved_by,
+        "shelved_why": first.shelved_why,
     }

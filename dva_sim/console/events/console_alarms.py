@@ -141,10 +141,16 @@ class ConsoleAlarms:
         """Somebody has seen an alarm."""
         self.alarms.acknowledge(key, by)
 
-    def shelve(self, keys: Iterable[str], seconds: float, by: str) -> None:
-        """Somebody cannot act on alarms now."""
+    def shelve(self, keys: Sequence[str], seconds: float, by: str, why: str) -> None:
+        """Somebody cannot act on alarms now.
+
+        Raises:
+            Refused: one of them is critical, and nobody has acknowledged it.
+        """
+        if any(map(self.alarms.must_be_seen, keys)):
+            raise Refused("A critical alarm has to be acknowledged before it can be shelved.")
         for key in keys:
-            self.alarms.shelve(key, seconds, by, self._clock())
+            self.alarms.shelve(key, seconds, by, self._clock(), why)
 
     def unshelve(self, keys: Iterable[str]) -> None:
         """They are back in the list."""

@@ -35,6 +35,11 @@ class RobotMission:
         robot: Id of the robot.
         status: The event, as it was known.
         on_over: Callback once the order has ended.
+
+    Attributes:
+        agent: The control room.
+        robot: Id of the robot.
+        status: The event.
     """
 
     def __init__(
@@ -44,11 +49,11 @@ class RobotMission:
         status: m.EventStatus,
         on_over: Callable[[], object],
     ) -> None:
-        self._agent = agent
+        self.agent = agent
         self._device = agent.device
-        self._robot = robot
+        self.robot = robot
         self._label = agent.device.label_of(robot)
-        self._status = status
+        self.status = status
         self._on_over = on_over
         self._session = 0
         self._is_there = False
@@ -74,10 +79,10 @@ class RobotMission:
             self._put_away()
             unanswered(on_result)
 
-        self._device.connect(self._robot)
+        self._device.connect(self.robot)
         room = self._device.id_tag
-        body = m.Assign(self._status.event_id, self._robot, room, None, reason, decisions)
-        self._agent.ask(body, assigned, unheard)
+        body = m.Assign(self.status.event_id, self.robot, room, None, reason, decisions)
+        self.agent.ask(body, assigned, unheard)
 
     def _get_permission(self, on_result: OnResult) -> None:
         def granted(reply: m.Reply) -> None:
@@ -95,11 +100,11 @@ class RobotMission:
             self._end("failed")
             unanswered(on_result)
 
-        wish = m.PermissionRequest(self._robot, "missions")
+        wish = m.PermissionRequest(self.robot, "missions")
         self._device.ask(self._device.dva, wish, granted, unheard)
 
     def _start(self, on_result: OnResult) -> None:
-        status = self._status
+        status = self.status
 
         def begun() -> None:
             self._device.progress(status.event_id, "departed")
@@ -115,7 +120,7 @@ class RobotMission:
             unanswered(on_result, f"{self._label}: it does not answer")
 
         start(
-            *(self._device, self._robot),
+            *(self._device, self.robot),
             m.Inspect(status.event_id, status.kind, status.position),
             lambda: self._session,
             wanted=lambda: not self._is_over,
@@ -123,6 +128,11 @@ class RobotMission:
             refused=refused,
             lost=lost,
         )
+
+    @property
+    def event(self) -> int:
+        """Number of the event."""
+        return self.status.event_id
 
     # --- on its way -------------------------------------------------------------------------
 
@@ -141,12 +151,12 @@ class RobotMission:
 
         if self._is_over:
             return
-        order = self._agent.orders.get(self._status.event_id)
-        if order is None or order.device != self._robot:
+        order = self.agent.orders.get(self.status.event_id)
+        if order is None or order.device != self.robot:
             self._end("")  # the DVA has taken the order back
             return
         body = m.GetMissionStatus()
-        self._device.ask(self._robot, body, self._go_on, lost, self._session)
+        self._device.ask(self.robot, body, self._go_on, lost, self._session)
 
     def _go_on(self, reply: m.Reply) -> None:
         status = reply.content
@@ -158,7 +168,7 @@ class RobotMission:
         is_looking = status.reason.endswith(IN_VIEW)
         if is_looking and not self._is_there:
             self._is_there = True
-            self._device.progress(self._status.event_id, "arrived")
+            self._device.progress(self.status.event_id, "arrived")
         if status.mission_state in UNDER_WAY:
             self._device.clock.call_after(ASK_PERIOD, self._ask, 0)
             return
@@ -179,7 +189,7 @@ class RobotMission:
             finding: `confirmed` or `refuted`.
             on_result: Callback for the result.
         """
-        number = self._status.event_id
+        number = self.status.event_id
 
         def answered(reply: m.Reply) -> None:
             if reply.code != m.OK:
@@ -198,7 +208,7 @@ class RobotMission:
         answered: Callable[[m.Reply], object] = do_nothing,
         unheard: Callable[[], object] = do_nothing,
     ) -> None:
-        about = self._status
+        about = self.status
         severity = about.severity
         body = m.EventReport(
             about.event_id, about.kind, about.position, severity, confidence, finding
@@ -211,12 +221,12 @@ class RobotMission:
             return
         self._put_away()
         if self._session:
-            self._device.ask(self._robot, m.CancelMission(), session=self._session)
+            self._device.ask(self.robot, m.CancelMission(), session=self._session)
         if state:
-            self._agent.orders.pop(self._status.event_id, None)
-            self._device.progress(self._status.event_id, state)
+            self.agent.orders.pop(self.status.event_id, None)
+            self._device.progress(self.status.event_id, state)
         if self._session:
-            give_back(self._device, self._robot, self._session)
+            give_back(self._device, self.robot, self._session)
 
     def _put_away(self) -> None:
         self._is_over = True
@@ -240,13 +250,13 @@ class SentRobots:
             robot: Id of the robot.
             status: The event, as it is known.
         """
-        key = client, status.event_id
 
         def forget() -> None:
-            if self._missions.get(key) is mission:
+            for key in [key for key, known in self._missions.items() if known is mission]:
                 del self._missions[key]
 
-        mission = self._missions[key] = RobotMission(agent, robot, status, forget)
+        mission = RobotMission(agent, robot, status, forget)
+        self._missions[client, status.event_id] = mission
         return mission
 
     def mission(self, client: str, event: int) -> RobotMission:
@@ -259,3 +269,29 @@ class SentRobots:
         if mission is None:
             raise Refused(f"you have sent no robot to event {event}")
         return mission
+
+    def of_client(self, client: str) -> list[RobotMission]:
+        """Return the missions that a page has sent robots on."""
+        return [mission for (of, _), mission in self._missions.items() if of == client]
+
+    def hand_to(
+        self, client: str, agent: ControlRoomAgent, mission: RobotMission, on_result: OnResult
+    ) -> None:
+        """Let another page's person answer for a mission.
+
+        A control room of their own gets an order of its own; people who share one keep the order.
+
+        Args:
+            client: Page of the person.
+            agent: Control room of the person.
+            mission: Mission of somebody else.
+            on_result: Callback for the result.
+        """
+        if mission.agent is agent:
+            self._missions = {key: one for key, one in self._missions.items() if one is not mission}
+            self._missions[client, mission.event] = mission
+            on_result(True, f"event {mission.event} is yours")
+            return
+        known = agent.events.get(mission.event, mission.status)
+        handed = self.send(client, agent, mission.robot, known)
+        handed.begin("handed over", known.decisions, on_result)

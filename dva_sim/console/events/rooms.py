@@ -13,6 +13,7 @@ from typing import Final, Unpack
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.asking.refusal import OnResult, unanswered
+from dva_sim.console.events.handing_over import HandingOver
 from dva_sim.console.wire.events import RoomEntry
 from dva_sim.console.wire.limits import LONG
 from dva_sim.console.wire.seats import Answered
@@ -77,6 +78,7 @@ class ConsoleRooms:
             reader starts it.
         by_client: The rooms by their pages.
         users: Names of those who have logged in, by their pages.
+        handing_over: Work that people offer to each other.
     """
 
     def __init__(self, run: Run, appoint: Callable[[str, ControlRoomRole], object]) -> None:
@@ -84,6 +86,7 @@ class ConsoleRooms:
         self._appoint = appoint
         self.by_client: dict[str, ConsoleRoom] = {}
         self.users: dict[str, str] = {}
+        self.handing_over = HandingOver()
         self._used: set[int] = set()
         self.listener = self._agent(LISTENER, "console")
 
@@ -193,10 +196,9 @@ class ConsoleRooms:
 
     # --- what pages are told ----------------------------------------------------------------
 
-    def label(self, client: str) -> str:
-        """Return the name of a page's person; empty without a control room."""
-        room = self.by_client.get(client)
-        return "" if room is None else room.device.label
+    def names(self) -> Mapping[str, str]:
+        """Return the name of each person who decides, by page."""
+        return {client: room.device.label for client, room in self.by_client.items()}
 
     def entries(self) -> list[RoomEntry]:
         """Return who decides."""

@@ -9,6 +9,7 @@ from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import do_nothing
 from dva_sim.console.asking.refusal import NO_ANSWER, OnResult, Refused
 from dva_sim.console.bench import UNATTENDED
+from dva_sim.console.events.handing_over import HandingOver
 from dva_sim.console.system.known_system import KnownSystem
 from dva_sim.console.wire.events import RoomEntry
 from dva_sim.protocol.devices import ControlRoomRole
@@ -26,6 +27,7 @@ class NamedPeople:
         listener: The console's own control room.
         by_client: The name of each who has joined, and what the address of its page allows.
         users: Names of those who have logged in, by their pages.
+        handing_over: Work that people offer to each other.
     """
 
     def __init__(self, system: KnownSystem) -> None:
@@ -33,6 +35,7 @@ class NamedPeople:
         self.listener = system.agent
         self.by_client: dict[str, Named] = {}
         self.users: dict[str, str] = {}
+        self.handing_over = HandingOver()
         self._come = 0
 
     def join(self, client: str, role: str, name: str, on_result: OnResult) -> None:
@@ -47,7 +50,7 @@ class NamedPeople:
         self._system.let_decide(do_nothing)
         if name or client not in self.by_client:
             self.by_client[client] = name or self._new_name(role), ControlRoomRole(role)
-        on_result(True, f"you are {self.label(client)}, and may {self._system.role}")
+        on_result(True, f"you are {self.by_client[client][0]}, and may {self._system.role}")
 
     def _new_name(self, role: str) -> str:
         self._come += 1
@@ -73,10 +76,9 @@ class NamedPeople:
     def attend(self, _: Mapping[str, str]) -> None:
         """Note which pages are open: all are one device for the DVA, whose role it alone knows."""
 
-    def label(self, client: str) -> str:
-        """Return the name of a page's person; empty if it has given none."""
-        known = self.by_client.get(client)
-        return "" if known is None else known[0]
+    def names(self) -> Mapping[str, str]:
+        """Return the name of each person who has joined, by page."""
+        return {client: name for client, (name, _) in self.by_client.items()}
 
     def entries(self) -> list[RoomEntry]:
         """Return who decides, within what both the DVA and the page's address allow."""

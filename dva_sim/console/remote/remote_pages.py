@@ -64,7 +64,7 @@ class RemotePages(ConsolePages):
         bench: Bench | None = None,
     ) -> None:
         named = scenario_shown(options)
-        scenario = named or Scenario()
+        scenario = self.scenario = named or Scenario()
         self._has_keys = options.keys is not None
         self._links = links
         site = None if named is None else site_of(named, 1)

@@ -301,9 +301,38 @@ class OfAlarm(TypedDict):
 
 
 class ShelveAsked(OfAlarm):
-    """An alarm, and for how long it is shelved."""
+    """An alarm, for how long it is shelved, and why."""
 
     for_s: Annotated[float, Number(1, SHIFT)]
+    reason: Annotated[str, Text(1, 256)]
+
+
+class DetailsAsked(TypedDict):
+    """An event by its number; none: all of them."""
+
+    event: NotRequired[EventNumber]
+
+
+class TickAsked(OfEvent):
+    """A step of the instructions for an event, and whether it is done."""
+
+    step: Annotated[int, Whole(0, 63)]
+    done: bool
+
+
+class HandOverAsked(TypedDict):
+    """Work for a colleague: one event, or all that one has in hand."""
+
+    to: Annotated[str, Text(1, 64)]
+    note: Annotated[str, Text(0, 256)]
+    event: NotRequired[EventNumber]
+
+
+class OfferAnswered(TypedDict):
+    """Answer to an offer, by its number."""
+
+    offer: EventNumber
+    accept: bool
 
 
 class Wish(TypedDict):

@@ -101,13 +101,67 @@ class RoomEntry(TypedDict):
     client: str
 
 
+class OfferShown(TypedDict):
+    """Work that somebody offers to a colleague.
+
+    `sender` and `to` are names of people, `client` the page of the colleague; `whole` is true where
+    all is handed over, at the end of a shift.
+    """
+
+    number: int
+    sender: str
+    to: str
+    client: str
+    events: list[int]
+    robots: list[str]
+    note: str
+    whole: bool
+    at_ms: int
+
+
+class OwnerShown(TypedDict):
+    """Person who answers for an event that was handed over."""
+
+    event: int
+    label: str
+
+
 class ControlLine(TypedDict):
-    """Dispatch mode, and who decides."""
+    """Dispatch mode, who decides, and what they hand over to each other."""
 
     k: Literal["control"]
     t: int
     dispatch: DispatchShown | None
     rooms: list[RoomEntry]
+    offers: list[OfferShown]
+    owners: list[OwnerShown]
+
+
+class StepShown(TypedDict):
+    """One step in the history of an event."""
+
+    event: int
+    at_ms: int
+    what: str
+    who: str
+    device: str
+    reason: str
+
+
+class InstructionShown(TypedDict):
+    """One line of the instructions for an event; `step` is its number among those to be ticked."""
+
+    text: str
+    step: int | None
+    done: LabelledMoment | None
+
+
+class DetailsShown(TypedDict):
+    """History of one event or of all, and the instructions of one."""
+
+    event: int | None
+    history: list[StepShown]
+    instructions: list[InstructionShown]
 
 
 class AlarmRow(TypedDict):
@@ -125,6 +179,7 @@ class AlarmRow(TypedDict):
     seen_by: str
     left_s: int | None
     shelved_by: str
+    shelved_why: str
 
 
 class AlarmsLine(TypedDict):

@@ -4,6 +4,7 @@ from typing import Final, Literal
 
 from typing_extensions import TypedDict
 
+from dva_sim.console.wire.events import DetailsShown
 from dva_sim.console.wire.scenes import OrderShown, Point
 
 
@@ -162,6 +163,7 @@ class Answered(TypedDict, total=False):
 
     t: int
     late: bool
+    details: DetailsShown
     device: str
     devices: list[DeviceShown]
     event: int

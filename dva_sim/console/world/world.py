@@ -222,7 +222,7 @@ class ConsoleWorld(ConsolePages):
     @override
     def author(self, client: str) -> str:
         guard = self.guards.by_client.get(client)
-        if guard is not None and not self.rooms.label(client):
+        if guard is not None and not self.rooms.names().get(client):
             return guard.device.label
         return super().author(client)
 

@@ -15,6 +15,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml
 from dva_sim.simulation.scenario.alarms import table_of, why_not, with_events
+from dva_sim.simulation.scenario.instructions import read_instructions
 from dva_sim.simulation.scenario.parts import EventConfig
 from dva_sim.simulation.scenario.scenario import (
     Scenario,
@@ -51,6 +52,7 @@ def locate_files(data: dict[str, Any], folders: Sequence[Path]) -> None:
         data["events"] = events = {"table": events}
     if isinstance(events, dict):
         _locate_table(events, folders)
+    _locate_instructions(data.get("instructions"), folders)
     holders = [(data if part is None else data.get(part), key) for part, key in _IN_FILES]
     holders += [(event, "kind") for event in events] if isinstance(events, list | tuple) else []
     for holder, key in holders:
@@ -67,6 +69,16 @@ def _locate_table(events: dict[str, Any], folders: Sequence[Path]) -> None:
     if isinstance(table, str):
         beside = (folder / table for folder in folders)
         events["table"] = str(next(filter(resources.is_file, beside), table))
+
+
+def _locate_instructions(named: object, folders: Sequence[Path]) -> None:
+    """A file of instructions lies beside the scenario that names it, or in the working folder."""
+    if not isinstance(named, dict):
+        return
+    for kind, file in named.items():
+        if isinstance(file, str):
+            beside = (folder / file for folder in folders)
+            named[kind] = str(next(filter(resources.is_file, beside), file))
 
 
 def check_names(scenario: Scenario, error: Fail) -> None:
@@ -97,10 +109,18 @@ def check_names(scenario: Scenario, error: Fail) -> None:
         pattern_of(scenario)
     check_strategy(scenario.operator.strategy, scenario.operator.options, error)
     check_policy(scenario.dispatch.policy, scenario.dispatch.options, error)
+    for kind, file in scenario.instructions.items():
+        _check_instructions(file, ("instructions", kind), error)
     for number, event in enumerate(scenario.events):
         _check_position(scenario, event, ("events", number, "position"), error)
         if event.kind not in KINDS:
             _check_hazard(event, ("events", number), error)
+
+
+def _check_instructions(file: str, path: KeyPath, error: Fail) -> None:
+    """Refuse instructions that cannot be read."""
+    with _located(error, lambda _: path):
+        read_instructions(Path(file))
 
 
 def _check_position(scenario: Scenario, event: EventConfig, path: KeyPath, error: Fail) -> None:

@@ -20,6 +20,7 @@ from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml
 from dva_sim.network.connections import Depth, TransportKind, ZeromqConfig
 from dva_sim.network.link import LinkConfig
 from dva_sim.network.patterns import Pattern, load_pattern
+from dva_sim.protocol.event_kinds import EventKind
 from dva_sim.simulation.scenario.event_table import OrTable, WithTable
 from dva_sim.simulation.scenario.parts import (
     AccessConfig,
@@ -51,6 +52,7 @@ NEWER = (
     ("dva",),
     ("dva", "control_rooms", "severity"),
     ("emergency",),
+    ("instructions",),
 )
 """Keys that came after results were published: a part, or some keys of one."""
 
@@ -68,6 +70,8 @@ class Scenario(WithTable):
             then.
         transport: Transport of the messages: ZeroMQ over TCP, or datagrams.
         events: List of events, or a table of dated alarms.
+        instructions: Text file for people at a console by kind of event, such as `{fire: fire.md}`,
+            beside the scenario; lines of a list are steps that they tick.
         network_depth: Depth of the model of ZeroMQ over TCP: whole messages, exact where nothing is
             lost or queued; TCP segments; or as each link requires.
     """
@@ -98,6 +102,7 @@ class Scenario(WithTable):
     events: Annotated[tuple[EventConfig, ...], Field(min_length=1), OrTable()] = (
         EventConfig(kind="fire"),
     )
+    instructions: dict[EventKind, str] = Field(default_factory=dict)
     dispatch: DispatchConfig = DispatchConfig()
     access: tuple[AccessConfig, ...] = ()
     dva: DvaConfig = DvaConfig()

@@ -113,11 +113,11 @@ def test_the_list_has_the_gravest_first_then_what_nobody_saw_then_the_newest():
 
 
 def test_a_shelved_alarm_is_out_of_the_list_until_its_end_and_then_new(burning):
-    burning.shelve("event 1", 60.0, "ana", 0.0)
+    burning.shelve("event 1", 60.0, "ana", 0.0, "a drill")
     burning.update([fire()], 59.0)
     assert texts(burning) == []
     (row,) = burning.shelved(59.0)
-    assert (row["left_s"], row["shelved_by"]) == (1, "ana")
+    assert (row["left_s"], row["shelved_by"], row["shelved_why"]) == (1, "ana", "a drill")
 
     burning.update([fire()], 60.0)
     assert burning.shelved(60.0) == []
@@ -128,6 +128,28 @@ def test_no_shelf_lasts_longer_than_a_shift(burning):
     burning.shelve("event 1", 1e9, "ana", 0.0)
 
     assert burning.known["event 1"].shelved_until == LONGEST_SHELF
+
+
+def test_a_shelved_alarm_that_gets_graver_is_in_the_list_again():
+    alarms = Alarms()
+    alarms.update([fire(1, "low")], 0.0)
+    alarms.acknowledge("event 1", "ana")
+    alarms.shelve("event 1", 600.0, "ana", 1.0, "a drill")
+    alarms.update([fire(1, "critical")], 2.0)
+    assert alarms.shelved(2.0) == []
+    assert states(alarms) == {"event 1": "unacknowledged"}
+
+
+@pytest.mark.parametrize(
+    ("priority", "acknowledged", "must"),
+    [("critical", False, True), ("critical", True, False), ("high", False, False)],
+)
+def test_a_critical_alarm_must_be_seen_before_anything_else(priority, acknowledged, must):
+    alarms = Alarms()
+    alarms.update([fire(1, priority)], 0.0)
+    if acknowledged:
+        alarms.acknowledge("event 1", "ana")
+    assert alarms.must_be_seen("event 1") == must
 
 
 def test_what_returns_on_the_shelf_stays_shelved_when_it_comes_back(burning):

@@ -260,13 +260,29 @@ def test_an_alarm_is_seen_at_the_dva_where_an_event_is_behind_it(room):
 
 def test_a_shelved_alarm_comes_back_and_a_row_that_is_gone_is_told(room):
     (alarm,) = [one for one in alarms(room) if one["event"] == 1]
-    assert room.do("alarm_shelve", alarm=alarm["key"], for_s=60)[0]
+    assert not room.do("alarm_shelve", alarm=alarm["key"], for_s=60)[0]  # without a reason
+    assert room.do("alarm_shelve", alarm=alarm["key"], for_s=60, reason="a drill")[0]
     assert not [one for one in alarms(room) if one["event"] == 1]
-    assert room.lines_of("alarms")[-1]["shelved"][0]["shelved_by"] == "ana"
+    (shelved,) = room.lines_of("alarms")[-1]["shelved"]
+    assert (shelved["shelved_by"], shelved["shelved_why"]) == ("ana", "a drill")
     room.let(60.0)
     assert [one for one in alarms(room) if one["event"] == 1]
     done, _ = room.do("alarm_acknowledge", alarm="event 99")
     assert not done
+
+
+def test_a_critical_alarm_is_shelved_only_once_it_is_acknowledged(room):
+    about = {"kind": "flood", "severity": "critical", "x_m": 20.0, "y_m": 12.0}
+    assert room.do("event_raise", **about)[0]
+    number = room.lines_of("done")[-1]["event"]
+    room.let(1.0)
+    shelf = {"alarm": f"event {number}", "for_s": 60, "reason": "a drill"}
+    done, text = room.do("alarm_shelve", **shelf)
+    assert (done, unnamed(text, "critical", "acknowledged")) == (False, [])
+
+    assert room.do("event_acknowledge", event=number)[0]
+    room.let(1.0)
+    assert room.do("alarm_shelve", **shelf)[0]
 
 
 def test_a_page_that_is_gone_for_good_has_no_room_any_more(room):

@@ -44,7 +44,7 @@ def test_an_open_event_is_an_alarm_and_seen_by_a_message_to_the_dva(page):
 
 def test_an_alarm_is_shelved_by_name_and_comes_back(page):
     page.alarms()
-    assert page.ask("alarm_shelve", alarm="event 1", for_s=60.0)["ok"]
+    assert page.ask("alarm_shelve", alarm="event 1", for_s=60.0, reason="a drill")["ok"]
     assert page.alarms() == []
     (shelved,) = page.lines_of("alarms")[-1]["shelved"]
     assert shelved["shelved_by"] == "ana"

@@ -53,6 +53,10 @@ export const PATIENCE_MS = {
  "mission": 65000,
  "mission_found": 65000,
  "take_over": 65000,
+ "event_details": 10000,
+ "event_tick": 10000,
+ "hand_over": 10000,
+ "hand_over_answer": 65000,
  "alarm_acknowledge": 65000,
  "alarm_shelve": 10000,
  "alarm_unshelve": 10000

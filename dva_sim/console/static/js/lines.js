@@ -168,14 +168,24 @@
  * @typedef {{label: string, role: string, client: string}} RoomEntry
  */
 /**
- * Dispatch mode, and who decides.
- * @typedef {{k: 'control', t: number, dispatch: Dispatch | null, rooms: RoomEntry[]}} Control
+ * Work that somebody offers to a colleague.
+ * @typedef {{number: number, sender: string, to: string, client: string, events: number[],
+ *   robots: string[], note: string, whole: boolean, at_ms: number}} Offer
+ */
+/**
+ * Person who answers for an event that was handed over.
+ * @typedef {{event: number, label: string}} Owner
+ */
+/**
+ * Dispatch mode, who decides, and what they hand over to each other.
+ * @typedef {{k: 'control', t: number, dispatch: Dispatch | null, rooms: RoomEntry[],
+ *   offers: Offer[], owners: Owner[]}} Control
  */
 /**
  * A row of the list of alarms.
  * @typedef {{key: string, priority: string, state: string, text: string, place: string,
  *   count: number, event: number | null, since_ms: number, is_new: boolean, seen_by: string,
- *   left_s: number | null, shelved_by: string}} AlarmRow
+ *   left_s: number | null, shelved_by: string, shelved_why: string}} AlarmRow
  */
 /**
  * The alarms, and how many there were lately.
@@ -309,6 +319,19 @@
  *   lines: LogEntry[]}} Log
  */
 /**
+ * One step in the history of an event.
+ * @typedef {{event: number, at_ms: number, what: string, who: string, device: string,
+ *   reason: string}} Step
+ */
+/**
+ * One line of the instructions for an event; `step` is its number among those to be ticked.
+ * @typedef {{text: string, step: number | null, done: LabelledMoment | null}} Instruction
+ */
+/**
+ * History of one event or of all, and the instructions of one.
+ * @typedef {{event: number | null, history: Step[], instructions: Instruction[]}} Details
+ */
+/**
  * A device on the DVA's list.
  * @typedef {{id: string, label: string, type: string, address: string}} Device
  */
@@ -333,9 +356,10 @@
  */
 /**
  * Outcome of an action.
- * @typedef {{t?: number, late?: boolean, device?: string, devices?: Device[], event?: number,
- *   hand?: number | null, outcome?: string, phone?: PhoneIdentity, proposal?: Proposal,
- *   tour?: TourPlan, k: 'done', id: string | null, ok: boolean, text: string}} Done
+ * @typedef {{t?: number, late?: boolean, details?: Details, device?: string, devices?: Device[],
+ *   event?: number, hand?: number | null, outcome?: string, phone?: PhoneIdentity,
+ *   proposal?: Proposal, tour?: TourPlan, k: 'done', id: string | null, ok: boolean,
+ *   text: string}} Done
  */
 /**
  * It is over.

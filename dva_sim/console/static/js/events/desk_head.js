@@ -3,7 +3,7 @@ import { html } from '../../vendor/preact.js';
 import { allowed, control, isDispatcher, mayDispatch, maySupervise, you } from '../store.js';
 import { act } from '../net/actions.js';
 import { Choice, Field } from '../ui/fields.js';
-import { mode, ownName, ownRoom, raising, rename } from './shared.js';
+import { mode, onShift, ownName, ownRoom, raising, rename } from './shared.js';
 
 const MODES = /** @type {[string, string][]} */ ([
   ['automatic', 'the policy, by itself'],
@@ -13,6 +13,12 @@ const MODES = /** @type {[string, string][]} */ ([
 const byDva = () => `The DVA lets this console ${allowed.value}.`;
 const byAddress = () => `This address may ${you.value?.role ?? 'look'}. Those for dispatch and for
   supervision are printed where the console was started.`;
+
+/** Show one of the two in place of the event in hand, or neither. @param {typeof raising} what */
+function show(what) {
+  const isShown = what.value;
+  for (const one of [onShift, raising]) one.value = one === what && !isShown;
+}
 
 /** @param {{join: () => void}} props */
 export function DeskHead({ join }) {
@@ -30,6 +36,7 @@ export function DeskHead({ join }) {
           disabled=${!maySupervise.value} onInput=${(/** @type {string} */ to) => act('dispatch_mode', { mode: to })} />`}
         ${asked?.switched && html`<small class="soft">set by ${asked.switched.label}</small>`}
       </section></details>
-    <button type="button" aria-pressed=${raising.value} onClick=${() => (raising.value = !raising.value)}>Raise an event</button>
+    <button type="button" aria-pressed=${onShift.value} onClick=${() => show(onShift)}>Shift</button>
+    <button type="button" aria-pressed=${raising.value} onClick=${() => show(raising)}>Raise an event</button>
   </div>`;
 }

@@ -6,12 +6,11 @@ import { ageOf, sinceSent } from '../net/world_time.js';
 import { isOpen } from '../map/shown.js';
 import { SeverityMark, StateMark } from '../ui/icon.js';
 import { ageText, capital, plain } from '../ui/words.js';
-import { closedEvents, FILTERS, filter, inHand, openEvents, select } from './shared.js';
+import { closedEvents, FILTERS, filter, inHand, openEvents, ownerOf, select, shelfOf } from './shared.js';
+import { Shelve } from './shelve.js';
 
 /** @typedef {import('../lines.js').SiteEvent} SiteEvent */
 /** @typedef {import('../lines.js').AlarmRow} AlarmRow */
-
-export const SHELF_S = 900;
 
 /** The list. */
 export function DeskList() {
@@ -29,7 +28,7 @@ export function DeskList() {
       ${others.map((alarm) => html`<${SystemAlarm} key=${alarm.key} alarm=${alarm} />`)}
       ${open.map((event) => html`<${Row} key=${event.number} event=${event} isNew=${newOnes.has(event.number)} />`)}</ul>
     ${empty && html`<p class="none">${events.value.length ? 'No event is open.' : 'Nothing has been reported.'}</p>`}
-    ${shelved.length > 0 && html`<details><summary>Shelved (${shelved.length})</summary>
+    ${shelved.length > 0 && html`<details open><summary>Shelved (${shelved.length})</summary>
       <ul class="rows">${shelved.map((alarm) => html`<${Shelved} key=${alarm.key} alarm=${alarm} />`)}</ul></details>`}
     ${closedEvents.value.map(([ending, list]) => html`<details key=${ending}>
       <summary>${capital(plain(ending))} (${list.length})</summary>
@@ -54,7 +53,7 @@ function Row({ event, isNew = false }) {
     <button type="button" class="row" aria-pressed=${mine} onClick=${() => select(event.number)}>
       <${SeverityMark} severity=${event.severity} quiet=${event.over} />
       <span class="what"><span class="hidden">Event </span>${event.number} ${what}<small>${[event.severity, event.assigned.join(', ')].filter(Boolean).join(' · ')}
-        ${event.acknowledged && html` · <span class="by">${event.acknowledged.label}</span>`}</small></span>
+        ${ownerOf(event) && html` · <span class="by">${ownerOf(event)}</span>`}${!event.over && shelfOf(event) && ' · shelved'}</small></span>
       <span class="state"><${StateMark} state=${event.state} />${plain(event.state)}<small>${age}</small></span>
     </button></li>`;
 }
@@ -62,9 +61,9 @@ function Row({ event, isNew = false }) {
 /** Alarm that is about no single open event. @param {{alarm: AlarmRow}} props */
 function SystemAlarm({ alarm }) {
   const [busy, setBusy] = useState(false);
-  const ask = async (/** @type {import('../net/actions.js').Action} */ what, /** @type {object} */ more = {}) => {
+  const acknowledge = async () => {
     setBusy(true);
-    await act(what, { alarm: alarm.key, ...more });
+    await act('alarm_acknowledge', { alarm: alarm.key });
     setBusy(false);
   };
   const seen = alarm.state === 'acknowledged';
@@ -75,10 +74,8 @@ function SystemAlarm({ alarm }) {
     <b>${ageText(ageOf(alarm.since_ms))}</b>
     <span class="soft">${alarm.state}${alarm.seen_by ? ` by ${alarm.seen_by}` : ''}</span>
     ${mayDispatch.value && html`<span class="do">${!seen && html`<button type="button" disabled=${busy}
-        aria-label=${`Acknowledge: ${alarm.text}`} onClick=${() => ask('alarm_acknowledge')}>Acknowledge</button>`}
-      <button type="button" disabled=${busy} title="Hide it for 15 minutes"
-        aria-label=${`Shelve for 15 minutes: ${alarm.text}`}
-        onClick=${() => ask('alarm_shelve', { for_s: SHELF_S })}>Shelve</button></span>`}
+        aria-label=${`Acknowledge: ${alarm.text}`} onClick=${acknowledge}>Acknowledge</button>`}
+      <${Shelve} alarm=${alarm} /></span>`}
   </li>`;
 }
 
@@ -86,8 +83,9 @@ function SystemAlarm({ alarm }) {
 function Shelved({ alarm }) {
   const left = Math.max(0, (alarm.left_s ?? 0) - sinceSent(alarmList.value));
   return html`<li class="desk-row alarm shelved reported"><${SeverityMark} severity=${alarm.priority} quiet />
-    <span class="text">${alarm.text}</span>
-    <span class="soft">by ${alarm.shelved_by}, for another ${ageText(1000 * left)}</span>
+    <button type="button" class="plain text" disabled=${alarm.event === null}
+      onClick=${() => select(alarm.event ?? 0)}>${alarm.text}</button>
+    <span class="soft">by ${alarm.shelved_by}, for another ${ageText(1000 * left)}${alarm.shelved_why && `: ${alarm.shelved_why}`}</span>
     ${mayDispatch.value && html`<span class="do"><button type="button" aria-label=${`Unshelve: ${alarm.text}`}
       onClick=${() => act('alarm_unshelve', { alarm: alarm.key })}>Unshelve</button></span>`}
   </li>`;

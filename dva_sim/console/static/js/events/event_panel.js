@@ -7,9 +7,11 @@ import { isOpen } from '../map/shown.js';
 import { chooseRobots } from '../shell/route.js';
 import { SeverityMark, StateMark } from '../ui/icon.js';
 import { ageText, capital, plain } from '../ui/words.js';
-import { SHELF_S } from './desk_list.js';
+import { History, Instructions, useDetails } from './details.js';
+import { HandOver } from './handing_over.js';
 import { assignTo, candidateOf, chosen, estimateOf, ProposalPanel, waysOf } from './proposal.js';
-import { inHand, ownRoom, reason } from './shared.js';
+import { inHand, ownerOf, ownRoom, reason, shelfOf } from './shared.js';
+import { Shelve } from './shelve.js';
 
 /** @typedef {import('../lines.js').SiteEvent} SiteEvent */
 /** @typedef {{ok: boolean, text: string}} Done */
@@ -26,17 +28,31 @@ export function EventPanel() {
       ${' '}${capital(plain(event.kind))}, ${event.room || 'outdoors'}</h2>
     <${Facts} event=${event} />
     ${mayDispatch.value && html`<${Decisions} key=${event.number} event=${event} />`}
+    <${Details} key=${`details ${event.number}`} event=${event} />
   </section>`;
+}
+
+/** Instructions, handing over and history of the event. @param {{event: SiteEvent}} props */
+function Details({ event }) {
+  const details = useDetails(event.number, [event.state, event.decisions, event.severity, event.note].join());
+  const steps = details?.history.length ?? 0;
+  return html`<${Instructions} event=${event.number} details=${details} />
+    ${isOpen(event) && ownRoom.value && html`<details><summary>Hand over</summary><${HandOver} event=${event.number} /></details>`}
+    <details open><summary>History (${steps})</summary><${History} details=${details} /></details>`;
 }
 
 /** @param {{event: SiteEvent}} props */
 function Facts({ event }) {
   const seen = event.acknowledged;
   const last = event.decided;
+  const shelf = isOpen(event) ? shelfOf(event) : undefined;
+  const owner = ownerOf(event);
   return html`<dl class="facts reported">
     <dt>State</dt><dd><${StateMark} state=${event.state} />${plain(event.state)} for ${ageText(ageOf(event.since_ms))},
       reported ${ageText(ageOf(event.reported_ms))} ago</dd>
     <dt>Acknowledged</dt><dd>${seen ? `by ${seen.label}, ${ageText(seen.at_ms - event.reported_ms)} after the report` : 'by nobody yet'}</dd>
+    ${owner && owner !== seen?.label && html`<dt>Answers for it</dt><dd>${owner}</dd>`}
+    ${shelf && html`<dt>Shelved</dt><dd>by ${shelf.shelved_by}: ${shelf.shelved_why}</dd>`}
     <dt>Sent</dt><dd>${[...new Set(event.assigned)].join(', ') || 'nobody'}</dd>
     ${last && html`<dt>Decided</dt><dd>${plain(last.action)} by ${last.label}${last.reason ? `: ${last.reason}` : ''}</dd>`}
     ${event.note && html`<dt>Note</dt><dd class="note">${event.note}</dd>`}
@@ -79,8 +95,7 @@ function Decisions({ event }) {
         onClick=${() => ask('event_escalate', { ...about, reason: words })}>Escalate</button>`}
       <button type="button" disabled=${off}
         onClick=${withWords(() => ask('event_note', { event: event.number, text: words }))}>Note</button>
-      ${open && alarm && html`<button type="button" disabled=${off} title="Hide it for 15 minutes"
-        onClick=${() => ask('alarm_shelve', { alarm: alarm.key, for_s: SHELF_S })}>Shelve</button>`}
+      ${open && alarm && html`<${Shelve} alarm=${alarm} />`}
     </div>
     <p role="status" aria-label="Done">${result}</p></div>`;
 }
@@ -114,7 +129,7 @@ function NextStep({ event, tell }) {
     ${ways.length > 1 && !isSent && html`<fieldset><legend class="hidden">How</legend>${ways.map((one) => html`<label key=${one}>
       <input type="radio" name="way" checked=${one === way} onInput=${() => (wayWanted.value = one)} />${WAYS[one]}</label>`)}</fieldset>`}
     <div class="buttons">
-      ${whom && !isSent && html`<button type="button" class="primary" data-deed="send" disabled=${off} onClick=${send}>
+      ${whom && !isSent && html`<button type="button" class=${looks ? '' : 'primary'} data-deed="send" disabled=${off} onClick=${send}>
         ${way === 'drive' ? `Drive ${whom} there` : `Send ${estimateOf(whom)}`}</button>`}
       ${!whom && !sentTo(event).length && html`<p class="none">Nobody can go.</p>`}
       ${!event.acknowledged && html`<button type="button" class=${looks || (whom && !isSent) ? '' : 'primary'} disabled=${off}

@@ -10,8 +10,9 @@ import { workByKeys } from './desk_keys.js';
 import { DeskHead } from './desk_head.js';
 import { DeskList } from './desk_list.js';
 import { EventPanel } from './event_panel.js';
+import { Offers, Shift } from './handing_over.js';
 import { Raise } from './raise.js';
-import { ownName, raising } from './shared.js';
+import { onShift, ownName, raising } from './shared.js';
 import { Sight } from './sight.js';
 
 /** The page. */
@@ -22,8 +23,13 @@ export function EventsPage() {
     <h1 class="hidden">Events</h1>
     <div class="desk-list">${!isPast.value && html`<${DeskHead} join=${join} />`}<${DeskList} /></div>
     <${Sight} />
-    <div class="desk-panel">${raising.value ? html`<${Raise} />` : html`<${EventPanel} />`}</div>
+    <div class="desk-panel"><${Offers} /><${Panel} /></div>
   </main>`;
+}
+
+function Panel() {
+  if (raising.value) return html`<${Raise} />`;
+  return onShift.value ? html`<${Shift} close=${() => (onShift.value = false)} />` : html`<${EventPanel} />`;
 }
 
 const AGAIN_MS = 1000;

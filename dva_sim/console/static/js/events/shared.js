@@ -9,6 +9,8 @@ const NAME_KEY = 'dva-sim-name';
 
 /** Text of the field for a reason or a note. */
 export const reason = signal('');
+/** True while the shift is shown in place of the event in hand. */
+export const onShift = signal(false);
 /** True while a place for a new event is chosen. */
 export const raising = signal(false);
 /** Place chosen for a new event [m]. */
@@ -31,8 +33,20 @@ export const FILTERS = ['mine', 'open', 'all'];
 /** Filter of the list: the events that this person answers for, the open ones, or all. */
 export const filter = signal('open');
 
+/** Names of the other persons who decide. */
+export const colleagues = computed(() =>
+  (control.value?.rooms ?? []).filter((room) => room.client !== you.value?.client).map((room) => room.label),
+);
+
+/** Person who answers for an event: who took it over last, else who acknowledged it. @param {SiteEvent} event */
+export const ownerOf = (event) =>
+  control.value?.owners?.find((one) => one.event === event.number)?.label ?? event.acknowledged?.label ?? '';
+
+/** Shelf of an event's alarm; undefined if it is on none. @param {SiteEvent} event */
+export const shelfOf = (event) => alarmList.value.shelved.find((alarm) => alarm.event === event.number);
+
 /** @param {SiteEvent} event */
-const isMine = (event) => [event.acknowledged?.label, event.decided?.label].includes(ownRoom.value);
+const isMine = (event) => [ownerOf(event), event.decided?.label].includes(ownRoom.value);
 
 const shelvedEvents = computed(() => new Set(alarmList.value.shelved.map((alarm) => alarm.event)));
 
@@ -70,6 +84,7 @@ export const inHand = computed(() => {
 export function select(number) {
   selection.value = { kind: 'event', key: number };
   raising.value = false;
+  onShift.value = false;
 }
 
 /** Dispatch mode, `automatic` or `ask_first`; empty until the DVA reports it. */

@@ -1,0 +1,87 @@
+"""History of an event as a control room has heard it: each step, who took it, and when."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from dva_sim.protocol import messages as m
+
+MOST_STEPS: Final = 60  # of one event; of more the oldest but the report are lost
+SAME_STEP: Final = 2.0  # a state and the decision that led to it are told within this [s]
+LED_BY: Final = {
+    "assign": "assigned",
+    "false_alarm": "refuted",
+    "escalate": "escalated",
+    "expire": "expired",
+}
+"""States by the decisions that lead to them: who decided says more than that it is so."""
+
+
+class EventStep(NamedTuple):
+    """One step of an event.
+
+    Attributes:
+        time: Time [s].
+        what: State as in `EventStatus`, `reported`, or a decision as in `Fact`.
+        who: Label of the person, policy or rule that decided; empty: nobody did.
+        device: Id of the device that was sent, or is there.
+        reason: Reason or text, in words.
+    """
+
+    time: float
+    what: str
+    who: str = ""
+    device: str = ""
+    reason: str = ""
+
+
+class EventHistory:
+    """All known steps of one event, in the order of their times."""
+
+    def __init__(self) -> None:
+        self.steps: list[EventStep] = []
+        self._known: m.EventStatus | None = None
+
+    def hear_status(self, status: m.EventStatus, at: float) -> None:
+        """The DVA has stated the event at a time [s]."""
+        before = self._known
+        self._known = status
+        if before is None:
+            self._add(EventStep(at - status.age, "reported"))
+        seen = status.acknowledged
+        if seen is not None and (before is None or before.acknowledged is None):
+            self._add(EventStep(at - seen.ago, "acknowledge", seen.label))
+        is_new = status.event_state != ("pending" if before is None else before.event_state)
+        if is_new or (before is not None and status.responder != before.responder):
+            there = status.responder or status.actor
+            if there is None and before is not None and status.closed_for is None:
+                there = before.actor if before.event_state == "confirmed" else before.responder
+            self._add(EventStep(at - status.state_for, status.event_state, "", there or ""))
+
+    def hear_record(self, record: m.AuditRecord, at: float) -> None:
+        """The DVA tells of a decision at a time [s]."""
+        if record.code != m.OK or record.action == "acknowledge":
+            return  # nothing was done, or the status says so
+        words = ": ".join(word for word in (self._said(record), record.reason) if word)
+        step = EventStep(at, record.action, record.label, record.device or "", words or record.text)
+        state = LED_BY.get(record.action)
+        self.steps = [
+            each
+            for each in self.steps
+            if each.what != state or each.who or abs(each.time - at) > SAME_STEP
+        ]
+        self._add(step)
+
+    def _said(self, record: m.AuditRecord) -> str:
+        """Return the words of a decision besides its reason."""
+        if record.action == "severity":
+            return record.text
+        if record.action == "note":  # the status has told of it, the record does not
+            return (self._known and self._known.note) or ""
+        task = record.task or "confirm"
+        return "" if task == "confirm" else f"to {task.replace('_', ' ')}"
+
+    def _add(self, step: EventStep) -> None:
+        self.steps = sorted([*self.steps, step], key=lambda each: each.time)
+        if len(self.steps) > MOST_STEPS:
+            del self.steps[1]

@@ -1,0 +1,126 @@
+"""Work that people hand over to each other: offers, and who answers for an event since. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from dva_sim.console.asking.refusal import Refused
+from dva_sim.console.events.decisions import moment_ms
+from dva_sim.console.wire.events import OfferShown, OwnerShown
+
+MOST_OFFERS: Final = 50  # at once; of more the oldest are withdrawn
+MOST_OWNERS: Final = 1000  # events that were handed over; of more the oldest are forgotten
+
+
+@dataclass(frozen=True, kw_only=True)
+class Offer:
+    """Work that one person offers to another.
+
+    Attributes:
+        sender: Name of the person who offers it.
+        sender_client: Page of that person.
+        to: Name of the colleague.
+        client: Page of the colleague.
+        events: Numbers of the events.
+        robots: Labels of the robots.
+        note: Words for the colleague.
+        whole: True if it is all that the person had in hand.
+        at: Time of the offer [s].
+    """
+
+    sender: str
+    sender_client: str
+    to: str
+    client: str
+    events: tuple[int, ...]
+    robots: tuple[str, ...]
+    note: str
+    whole: bool
+    at: float
+
+    def described(self) -> str:
+        """Describe the work in words."""
+        parts = [f"event {number}" for number in self.events] + list(self.robots)
+        return ", ".join(parts) or "no event and no robot"
+
+
+class HandingOver:
+    """All offers, and the persons who answer for events that were handed over.
+
+    Attributes:
+        owners: Name of the person by event.
+    """
+
+    def __init__(self) -> None:
+        self.owners: dict[int, str] = {}
+        self._offers: dict[int, Offer] = {}
+        self._count = 0
+
+    def offer(self, offer: Offer) -> None:
+        """Somebody offers work; an older offer between the same two is replaced."""
+        pair = offer.sender_client, offer.client
+        for number, old in list(self._offers.items()):
+            if (old.sender_client, old.client) == pair and (
+                old.whole or old.events == offer.events
+            ):
+                del self._offers[number]
+        self._count += 1
+        self._offers[self._count] = offer
+        if len(self._offers) > MOST_OFFERS:
+            del self._offers[next(iter(self._offers))]
+
+    def answer(self, number: int, client: str) -> Offer:
+        """Take an offer that a page answers off the list.
+
+        Raises:
+            Refused: there is none for this page.
+        """
+        offer = self._offers.get(number)
+        if offer is None or offer.client != client:
+            raise Refused("that offer is over")
+        del self._offers[number]
+        return offer
+
+    def give(self, event: int, to: str) -> None:
+        """Somebody answers for an event from now on."""
+        self.owners[event] = to
+        if len(self.owners) > MOST_OWNERS:
+            del self.owners[next(iter(self.owners))]
+
+    def shown(self, present: Collection[str]) -> list[OfferShown]:
+        """Return the offers; those to pages that are gone are withdrawn."""
+        self._offers = {n: offer for n, offer in self._offers.items() if offer.client in present}
+        return [_shown(number, offer) for number, offer in self._offers.items()]
+
+    def owners_shown(self) -> list[OwnerShown]:
+        """Return who answers for which event."""
+        return [{"event": event, "label": label} for event, label in self.owners.items()]
+
+
+def _shown(number: int, offer: Offer) -> OfferShown:
+    return {
+        "number": number,
+        "sender": offer.sender,
+        "to": offer.to,
+        "client": offer.client,
+        "events": list(offer.events),
+        "robots": list(offer.robots),
+        "note": offer.note,
+        "whole": offer.whole,
+        "at_ms": moment_ms(offer.at),
+    }
+
+
+def client_named(name: str, people: Mapping[str, str]) -> str:
+    """Return the page of a person.
+
+    Raises:
+        Refused: nobody of that name is there.
+    """
+    for client, label in people.items():
+        if label == name:
+            return client
+    known = ", ".join(sorted(set(people.values()))) or "nobody"
+    raise Refused(f"{name!r} is not there; there: {known}")

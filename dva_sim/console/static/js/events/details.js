@@ -1,0 +1,71 @@
+/** Details of events: their history, and instructions with steps to tick. */
+import { html, signal, useEffect } from '../../vendor/preact.js';
+import { connection, mayDispatch, maySteer } from '../store.js';
+import { act, ask } from '../net/actions.js';
+import { ageOf } from '../net/world_time.js';
+import { ageText, capital, plain } from '../ui/words.js';
+
+/** @typedef {import('../lines.js').Details} Details */
+/** @typedef {import('../lines.js').Step} Step */
+
+const AGAIN_MS = 3000; // others tick steps, too
+
+const known = signal(/** @type {Details | null} */ (null));
+
+const WORDS = /** @type {Record<string, string>} */ ({
+  acknowledge: 'acknowledged', assign: 'sent', expire: 'expired', escalate: 'escalated', raise: 'raised here',
+  take_off: 'called off', false_alarm: 'false alarm', severity: 'severity', pending: 'waits again',
+});
+
+/** @param {number | null} event number; null: all events */
+async function load(event) {
+  const done = document.hidden ? null : await ask('event_details', event === null ? {} : { event });
+  if (done?.ok && done.details) known.value = done.details;
+}
+
+/** Keep the details of an event fresh while they are shown. @param {number | null} event @param {unknown} change */
+export function useDetails(event, change) {
+  useEffect(() => {
+    if (connection.peek() !== 'open') return undefined;
+    load(event);
+    const timer = window.setInterval(() => load(event), AGAIN_MS);
+    return () => window.clearInterval(timer);
+  }, [event, change, connection.value]);
+  return known.value?.event === event ? known.value : null;
+}
+
+/** Instructions of an event, with boxes to tick. @param {{event: number, details: Details | null}} props */
+export function Instructions({ event, details }) {
+  const lines = details?.instructions ?? [];
+  if (!lines.length) return null;
+  const steps = lines.filter((line) => line.step !== null);
+  const off = !mayDispatch.value || !maySteer.value;
+  const tick = async (/** @type {number | null} */ step, /** @type {boolean} */ done) => {
+    await act('event_tick', { event, step, done });
+    load(event);
+  };
+  return html`<details class="instructions" open><summary>Instructions
+    (${steps.filter((line) => line.done).length} of ${steps.length} done)</summary>
+    ${lines.map((line, place) => line.step === null
+      ? html`<p key=${place}>${line.text}</p>`
+      : html`<label key=${place} class="tick"><input type="checkbox" checked=${Boolean(line.done)} disabled=${off}
+          onInput=${(/** @type {any} */ typed) => tick(line.step, typed.currentTarget.checked)} />
+          <span>${line.text}${line.done && html` <small>${line.done.label}, ${ageText(ageOf(line.done.at_ms))} ago</small>`}</span></label>`)}
+  </details>`;
+}
+
+/** Steps in the order of their times. @param {{details: Details | null, numbered?: boolean}} props */
+export function History({ details, numbered = false }) {
+  const steps = details?.history ?? [];
+  if (!steps.length) return html`<p class="none">Nothing has happened.</p>`;
+  return html`<ol class="history">${steps.map((step) => html`<li key=${`${step.event} ${step.at_ms} ${step.what} ${step.device}`}>
+    <span class="figure">${ageText(ageOf(step.at_ms))} ago</span>
+    <span>${numbered && html`<b>Event ${step.event}</b> `}${stepText(step)}</span></li>`)}</ol>`;
+}
+
+/** @param {Step} step */
+function stepText(step) {
+  const what = WORDS[step.what] ?? plain(step.what);
+  const about = [step.device, step.reason].filter(Boolean).join(', ');
+  return `${capital(what)}${step.who ? ` by ${step.who}` : ''}${about ? `: ${about}` : ''}`;
+}
