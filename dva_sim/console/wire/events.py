@@ -1,6 +1,6 @@
 """Hazards, events, what is decided on them, alarms, and the story."""
 
-from typing import Literal
+from typing import Literal, NotRequired
 
 from typing_extensions import TypedDict
 
@@ -133,8 +133,8 @@ class ControlLine(TypedDict):
     t: int
     dispatch: DispatchShown | None
     rooms: list[RoomEntry]
-    offers: list[OfferShown]
-    owners: list[OwnerShown]
+    offers: NotRequired[list[OfferShown]]
+    owners: NotRequired[list[OwnerShown]]
 
 
 class StepShown(TypedDict):

@@ -111,11 +111,13 @@ def test_an_alarm_is_seen_and_one_is_shelved_and_comes_back(both):
     for each in (page, other):
         cell(each, number, "supervise-")
     expect(unseen).to_have_count(0)
-    page.get_by_role("button", name="Shelve", exact=True).click()
+    panel = page.get_by_role("region", name="Event in hand")
+    panel.get_by_role("button", name=re.compile("^Shelve: ")).click()
+    panel.get_by_label("Why").fill("a drill")
+    panel.get_by_role("button", name="Shelve it").click()
     for each in lists:
         expect(each.get_by_text("Shelved (1)")).to_be_visible()
     expect(row_of(other, number)).to_have_count(0)
-    lists[0].get_by_text("Shelved (1)").click()
     lists[0].get_by_role("button", name="Unshelve").click()
     expect(lists[0].get_by_text("Shelved (1)")).to_have_count(0)
     expect(row_of(other, number)).to_be_visible()

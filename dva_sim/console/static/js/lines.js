@@ -179,7 +179,7 @@
 /**
  * Dispatch mode, who decides, and what they hand over to each other.
  * @typedef {{k: 'control', t: number, dispatch: Dispatch | null, rooms: RoomEntry[],
- *   offers: Offer[], owners: Owner[]}} Control
+ *   offers?: Offer[], owners?: Owner[]}} Control
  */
 /**
  * A row of the list of alarms.
