@@ -46,16 +46,7 @@ class ConsoleActions:
         holders = self, driving, decisions, desk, alarms, pages.fakes, server
         dispatcher = ActionDispatcher(
             place,
-            holders=(
-                self,
-                driving,
-                decisions,
-                desk,
-                alarms,
-                pages.fakes,
-                server,
-                *self.holders(driving),
-            ),
+            holders=(*holders, *self.holders(driving)),
             tell=self._tell,
             elsewhere=elsewhere,
             audited=lambda: pages.audited,
