@@ -189,6 +189,7 @@ class DrivenBy(NamedTuple):
         link_delay_s: One-way delay of the link, as it was last set during the drive [s].
         tour_time: Time for the leg of the guided tour that this drive ended, as its page measured
             it [s].
+        contacts: Contacts of the robot during the drive; nan: not counted.
     """
 
     person: str = ""
@@ -197,6 +198,7 @@ class DrivenBy(NamedTuple):
     sensor_hz: float = math.nan
     link_delay_s: float = math.nan
     tour_time: float = math.nan
+    contacts: float = math.nan
 
 
 SIMULATED = DrivenBy()

@@ -27,6 +27,7 @@ from dva_sim.simulation.measures import trials as of_task
 from dva_sim.simulation.measures import workload
 from dva_sim.simulation.measures.commands import Row
 from dva_sim.simulation.measures.drives import COMMAND_COLUMNS, DRIVE_COLUMNS
+from dva_sim.simulation.measures.reported import REPORTED_COLUMNS
 from dva_sim.simulation.middleware import MiddlewareScenario
 from dva_sim.simulation.run_measures import RunMeasure, values_of
 from dva_sim.simulation.scenario import Scenario, contradictions
@@ -150,6 +151,7 @@ class _Full(_Operated[Scenario]):
         "tracks": of_full.TRACK_COLUMNS,
         "drives": DRIVE_COLUMNS,
         "commands": COMMAND_COLUMNS,
+        "reported": REPORTED_COLUMNS,
     }
     is_recorded = True
     build = staticmethod(scenarios.build)

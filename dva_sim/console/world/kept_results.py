@@ -56,7 +56,7 @@ class KeptResults:
             raise ConfigError(f"{out} holds something already: give the name of a folder")
         part = {"scenario": scenario, "changes": dict(parse_changes(changes))}
         asked = {"persons": 1, "replications": 1, "seed": seed, "parts": {PART: part}}
-        question = f"What did people do who drove in {scenario!r} at a console?"
+        question = f"What did people do in {scenario!r} at a console?"
         self._out = out
         self._study = Study.model_validate({"question": question} | asked)
         self._plan = StudyPlan.of(self._study)
@@ -64,7 +64,9 @@ class KeptResults:
         assert isinstance(self._job.scenario, Scenario)
         self.scenario = self._job.scenario
         self.seed = self._job.seed
-        self._persons: dict[str, int] = {}  # numbers by device, as they began to drive
+        self._persons: dict[str, int] = {}  # numbers by page or device, as they took part
+        self._rooms: dict[str, int] = {}  # numbers by control room
+        self._contacts: dict[int, int] = {}  # of robots before a drive, by the drive's identity
         self._world: ConsoleWorld | None = None
         self._kept: KeptRun | None = None
         self._problem = ""
@@ -99,7 +101,7 @@ class KeptResults:
             DvaSimError: the folder cannot be written.
         """
         manifest = manifest_of(self._plan)
-        manifest |= {"runs": 1, "stopped": None, "failures": []}
+        manifest |= {"runs": 1, "stopped": None, "failures": [], "by_people": True}
         self._kept = KeptRun(self._out, manifest, self.scenario, self.seed)
         self._world, self._journal = world, RunJournal(world.run, self._label_of)
         world.recorder.on_ordered = self._attribute  # one that is over soon is never looked at
@@ -110,6 +112,8 @@ class KeptResults:
     def _label_of(self, id_tag: str) -> str:
         """The label of a device, unless a person may have given it."""
         assert self._world is not None
+        if id_tag in self._rooms:
+            return f"person-{self._rooms[id_tag]}"
         if kind_of(id_tag)[0] in PEOPLES:
             return name_of(id_tag)
         return self._world.run.stage.labels.get(id_tag, id_tag)
@@ -126,9 +130,25 @@ class KeptResults:
 
     def _look(self) -> None:
         assert self._world is not None
+        for client, room in self._world.rooms.by_client.items():
+            self._rooms.setdefault(room.device.id_tag, self._number(client))
         for log in self._world.recorder.drives:
             if log.ended is None:
                 self._attribute(log)
+            elif id(log) in self._contacts:
+                self._count_contacts(log)
+                del self._contacts[id(log)]
+
+    def _number(self, person: str) -> int:
+        """Return the number of a person, by their page, or by their device if they have none."""
+        return self._persons.setdefault(person, len(self._persons) + 1)
+
+    def _count_contacts(self, log: DriveLog) -> None:
+        assert self._world is not None
+        robot = self._world.run.field.robots.get(log.robot)
+        if robot is not None:
+            before = self._contacts.setdefault(id(log), robot.body.contacts)
+            log.by = log.by._replace(contacts=float(robot.body.contacts - before))
 
     def _attribute(self, log: DriveLog) -> None:
         """Say which person drives, and with what; nothing of a simulated one."""
@@ -140,7 +160,11 @@ class KeptResults:
         at_page = {person.device.id_tag for person in world.seating.persons.values()}
         if phone is None and log.operator not in at_page:
             return
-        number = self._persons.setdefault(log.operator, len(self._persons) + 1)
+        clients = {
+            person.device.id_tag: world.seating.client_of.get(seat)
+            for seat, person in world.seating.persons.items()
+        }
+        number = self._number(clients.get(log.operator) or log.operator)
         pattern = world.feed.pattern_of(log.robot)
         delay = float(world.sliders.line().get("delay_s", math.nan))
         by = log.by._replace(person=f"person-{number}", pattern=pattern, link_delay_s=delay)
@@ -149,6 +173,7 @@ class KeptResults:
                 pipeline=phone.settings.pipeline, sensor_hz=phone.rate_hz or by.sensor_hz
             )
         log.by = by
+        self._count_contacts(log)
 
     def write(self) -> None:
         """Write all; nothing where nothing was followed.

@@ -37,6 +37,7 @@ from dva_sim.simulation.full.dva_trace import OWN_CODE
 from dva_sim.simulation.full.run_journal import JournalLine, recording_of
 from dva_sim.simulation.measures import episodes
 from dva_sim.simulation.measures.drives import command_rows, drive_rows
+from dva_sim.simulation.measures.reported import reported_rows
 from dva_sim.simulation.models import Tables
 from dva_sim.simulation.scenario import Scenario
 
@@ -45,7 +46,11 @@ Missing = dict[str, str]  # reasons, by table
 KEPT_RUN: Final = "console.sqlite"  # the journal
 AGAIN: Final = 1.0  # after so long a full disk is tried again [s]
 _FORMAT: Final = 1
-_TABLES: Final = episodes.TABLES | {"drives": drive_rows, "commands": command_rows}
+_TABLES: Final = episodes.TABLES | {
+    "drives": drive_rows,
+    "commands": command_rows,
+    "reported": reported_rows,
+}
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS run (id INTEGER PRIMARY KEY CHECK (id = 1), format INTEGER NOT NULL,
   manifest TEXT NOT NULL, scenario TEXT NOT NULL, seed INTEGER NOT NULL);

@@ -264,8 +264,9 @@ def _figures(reading: Reading, drawn: Sequence[Drawn]) -> Iterator[Block]:
 
 def _tables(reading: Reading) -> Iterator[Block]:
     if reading.by_people:
-        yield Heading("Drives by person, messaging pattern and link")
-        yield from map(Printed, reading.cells)
+        for table in reading.cells:
+            yield Heading(table.part)
+            yield Printed(table)
         return
     yield Heading("Every configuration")
     if not reading.cells:

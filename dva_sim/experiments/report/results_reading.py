@@ -30,11 +30,10 @@ from dva_sim.experiments.analysis.study_view import (
 from dva_sim.experiments.report.model_page import (
     MiddlewarePage,
     ModelPage,
-    PeoplePage,
     TransportPage,
-    people_drove,
 )
 from dva_sim.experiments.report.outcome_table import EventOutcomes, outcomes_of
+from dva_sim.experiments.report.people_page import PeoplePage, people_drove
 from dva_sim.experiments.report.shift_page import ShiftPage
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.parts import REPEATS
@@ -139,15 +138,15 @@ class ResultsReading:
         """Report page for the study's model. Requires at least one run."""
         assert self.view is not None
         if self.by_people:
-            return PeoplePage(self.view, self.table("drives"))
+            return PeoplePage(self.view, self.table("drives"), self.table("reported"))
         page = page_of(self.scenarios.values())
         fitting = page if page.fits(self.view) else ModelPage
         return fitting(self.view, self.table("events") or None)
 
     @cached_property
     def by_people(self) -> bool:
-        """Return True if people drove the robots, not simulated persons."""
-        return people_drove(self.table("drives"))
+        """Return True if people drove the robots or decided, not simulated persons."""
+        return bool(self.manifest.get("by_people")) or people_drove(self.table("drives"))
 
     @property
     def cluster(self) -> str:
@@ -167,7 +166,7 @@ class ResultsReading:
     @cached_property
     def events(self) -> EventOutcomes | None:
         """Outcomes of the events of all runs; None for a study without events."""
-        return outcomes_of(self.table("events"))
+        return None if self.table("reported") else outcomes_of(self.table("events"))
 
     @cached_property
     def robustness(self) -> RepeatedAnswer | None:

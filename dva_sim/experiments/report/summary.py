@@ -143,7 +143,8 @@ class Reading(ResultsReading):
         if self.view is None:
             return []
         parts = parts_of(self.study, self.runs)
-        return [self._cells_of(part, self.view) for part in parts if len(part)]
+        own = [self._cells_of(part, self.view) for part in parts if len(part)]
+        return [table for table in (*own, *self.page.beside()) if table.rows]
 
     def _cells_of(self, part: RunGrid, view: StudyView) -> CellTable:
         page = self.page

@@ -15,6 +15,7 @@ from dva_sim.agents.device import (
     HEARTBEAT_PERIOD,
     STATUS,
     AgentDevice,
+    do_nothing,
 )
 from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.core.audit import MOST_KEPT
@@ -75,7 +76,7 @@ class DvaAgent:
         self.core = core
         self.events: dict[int, Event] = {}
         self.facts: deque[Fact] = deque(maxlen=None if keep_events else MOST_KEPT)
-        self.on_fact: Callable[[Fact], object] = self.facts.append
+        self.on_fact: Callable[[Fact], object] = do_nothing
         self._asks = core.dispatcher.questions.asks
         self._memory = memory
         self._keep_events = keep_events
@@ -358,6 +359,7 @@ class DvaAgent:
         now = self.device.clock.now
         facts = self.core.trail.take()
         for fact in facts:
+            self.facts.append(fact)
             self.on_fact(fact)
         if not self._is_public and not any(core.registry.of_type(CONTROL_ROOM)):
             return

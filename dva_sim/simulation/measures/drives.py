@@ -45,6 +45,7 @@ DRIVE_COLUMNS = (
     ROUND_TRIP_P50,
     ROUND_TRIP_P95,
     Measure("stop_share", "share of the driving time without a command in force"),
+    Measure("contacts", "contacts of the robot during the drive; empty: not counted"),
     Measure("tour_time_s", "time of the tour's leg that ended in this drive; empty: none did"),
 )
 COMMAND_COLUMNS = (
@@ -98,6 +99,7 @@ def _drive(recording: Recording, number: int, log: DriveLog) -> Row:
         **percentiles("command_age", [a.time - a.issued for a in done.applied], (50, 95)),
         **percentiles("round_trip", log.round_trips, (50, 95)),
         "stop_share": 1.0 - float(done.hold.sum()) / lasted if lasted > 0.0 else NAN,
+        "contacts": by.contacts,
         "tour_time_s": by.tour_time,
     }
 

@@ -144,14 +144,85 @@ def test_its_report_shows_the_drives_of_people_by_pattern_and_link_and_compares_
     reports = [reading.answer.lead, size_of(reading)]
     assert unnamed(" ".join(reports), "1 person", "4 drives", "2 robots", "people drove") == []
     (table,) = reading.cells
-    assert [row[:4] for row in table.rows] == [
-        ["person-1", "latest-wins PUB/SUB", "0.10\N{NO-BREAK SPACE}s", "3"],
-        ["person-1", "REQ/REP", "0.10\N{NO-BREAK SPACE}s", "1"],
+    delay = "0.10\N{NO-BREAK SPACE}s"
+    assert [row[:5] for row in table.rows] == [
+        ["person-1", "robot-1", "latest-wins PUB/SUB", delay, "1"],
+        ["person-1", "robot-2", "latest-wins PUB/SUB", delay, "2"],
+        ["person-1", "robot-1", "REQ/REP", delay, "1"],
     ]
     assert (reading.finding, reading.endings) == (None, None)
     printed = [block.table for block in blocks_of(reading, []) if isinstance(block, Printed)]
     assert table in printed  # and not folded
     assert list(whole.table("drives")["link_delay_s"]) == [0.1] * 4
+
+
+@pytest.fixture(scope="module")
+def decided(tmp_path_factory):
+    """Results of a person who drove nothing: who raised an event, saw it, and sent a robot."""
+    out = tmp_path_factory.mktemp("decided") / "out"
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        results, page = begun(monkeypatch, out, "dispatch.mode=ask_first")
+        assert page.do("room_join", name="Jane", role="supervise")[0]
+        about = {"kind": "flood", "severity": "high", "x_m": 20.0, "y_m": 12.0}
+        assert page.do("event_raise", **about)[0]
+        page.let(3.0)
+        assert page.do("event_acknowledge", event=1)[0]
+        page.let(2.0)
+        assert page.do("mission", robot="robot-1", event=1, role="supervise")[0]
+        page.let(1.0)
+        assert page.do("mission_found", event=1, finding="refuted")[0]
+        page.let(1.0)
+        results.write()
+        results.close()
+        yield Results.load(out)
+
+
+def test_a_raised_event_is_a_row_with_what_people_did_and_how_long_it_took(decided):
+    reported = decided.table("reported")
+    row = {name: reported[name][0] for name in reported}
+    who = [row[by] for by in ("raised_by", "acknowledged_by", "decided_by", "sent_by")]
+    assert who == ["person-1"] * 4
+    assert (row["kind"], row["sent"], row["ended"]) == ("flood", "robot-1", "refuted")
+    assert row["acknowledge_s"] == pytest.approx(3.0, abs=0.2)
+    assert row["decide_s"] == row["send_s"] == pytest.approx(5.0, abs=0.3)
+    assert row["t_closed_s"] > row["t_reported_s"]
+    assert [c.name for c in decided.columns("reported") if not c.meaning] == []
+
+
+def test_its_report_says_who_decided_and_how_each_event_ended_though_nobody_drove(decided):
+    reading = Reading(decided)
+    lead = reading.answer.lead
+    assert unnamed(lead, "Nobody drove", "1 person decided", "1 event: 1 refuted") == []
+    people, events = reading.cells
+    assert people.rows == [["person-1", "1", "3.0", "1", "5.0", "1", "5.0"]]
+    assert [row[0] for row in events.rows] == ["1"]
+    assert events.rows[0][-1] == "refuted"
+
+
+def test_the_name_of_a_person_who_decides_is_in_no_table(decided):
+    for table in decided.tables:
+        assert b"Jane" not in decided.path_of(table).read_bytes()
+
+
+def test_contacts_are_counted_drive_by_drive(monkeypatch, tmp_path):
+    results, page = begun(monkeypatch, tmp_path / "out")
+    page.let(1.0)
+    assert page.do("take", robots=[0])[0]
+    body = page.robot(0).body
+    hits = []
+    for seconds in (40.0, 2.0):
+        before = body.contacts
+        assert page.do("start")[0]
+        page.want(1.0)
+        page.let(seconds)
+        page.let_go()
+        assert page.do("stop")[0]
+        page.let(2.0)
+        hits.append(body.contacts - before)
+    results.write()
+    results.close()
+    assert hits[0] > 0
+    assert list(Results.load(tmp_path / "out").table("drives")["contacts"]) == hits
 
 
 def test_every_column_says_what_it_means(whole):
@@ -309,7 +380,8 @@ def test_a_table_that_cannot_be_made_costs_no_other_and_is_made_later(
             assert call([command, str(cut_off)]) == ExitCode.OK
         assert reason in " ".join(capsys.readouterr().out.split())
         found = Results.load(cut_off)
-        assert set(found.tables) == set(kept_run._TABLES) - {name}
+        made = set(kept_run._TABLES) - {name, "reported"}  # nothing was reported by then
+        assert set(found.tables) == made
     found = load_so_far(cut_off)
     assert (found.partial, found.has("runs"), (cut_off / KEPT_RUN).exists()) == ("", True, False)
 

@@ -29,7 +29,7 @@ SHORT = {
 
 
 # Filled where people drive alone: console/world/test_kept_results.py holds their columns to these.
-OF_PEOPLE = {"full": {"drives", "commands"}}
+OF_PEOPLE = {"full": {"drives", "commands", "reported"}}
 
 
 def columns_of(model):
