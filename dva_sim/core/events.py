@@ -122,7 +122,7 @@ class Event:
         number: The DVA's number for it.
         kind: `fire`, `gas_leak` or `flood`.
         position: Position in the first report.
-        severity: 0 to 1, the highest reported.
+        severity: 0 to 1, the highest reported, or more where the rules let it rise.
         needs_containment: True if it is over only once somebody has contained it.
         reports: Number of merged reports.
         sources: Confidence of each device that reported it and has not taken that back.

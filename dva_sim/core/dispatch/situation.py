@@ -26,7 +26,7 @@ class Task:
         stage: `confirm`: go and look. `contain`: a person goes and deals with it.
         due: True if it can be done now. A `contain` task before the confirmation is not due: its
             responder stands by outside until then.
-        severity: 0 (harmless) to 1, the highest reported.
+        severity: 0 (harmless) to 1, the highest reported, or more where the rules let it rise.
         confidence: Confidence that the event is real, 0 to 1.
         detected: Time of the first report [s].
         waiting_since: Start of the wait for a responder [s].

@@ -70,7 +70,7 @@ CHECKED: Final = {
     f"it; slack of sensors: {OBEYS_WITHIN:g} s and ten messages",
     "S6": "every report becomes an event, every event is in one state and the counts agree; none "
     "waits, or is in one pair of hands, beyond its limit, nor is given more time to wait by a "
-    "restart; its severity is the highest reported; who takes one up sets out and moves in "
+    "restart; its severity is no lower than reported; who takes one up sets out and moves in "
     "time; nothing is found but by who was sent; "
     f"slack: {PENDING_SLACK:g} s, and how far one sees an event",
     "S7": "the times of every event are in order, and those at which they were noted; nobody is "
