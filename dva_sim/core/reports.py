@@ -95,6 +95,9 @@ class Reports:
                 return DvaAnswer(m.NOT_PERMITTED, refusal)
         answer = self._sighted(device.id_tag, body, now)
         event = self.events.near(body.kind, body.position)
+        if event is None:  # reports are not merged
+            own = self.events.reported_by(device.id_tag, body.kind, body.position)
+            event = own[-1] if own else None
         if event is None:
             return answer
         if is_room:

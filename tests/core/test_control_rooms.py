@@ -150,6 +150,14 @@ def test_people_who_report_an_event_get_its_number_and_state(office, kind, follo
         assert (reply.code, reply.content) == (m.OK, None)
 
 
+def test_where_reports_are_not_merged_who_raises_a_second_event_gets_its_number_and_a_row():
+    office = staffed(rules=Rules(merge_distance=0.0))
+    report = m.EventReport(None, "flood", east(30), 0.5, 0.9, "detected")
+    replies = [decide(office, report, now)[0] for now in (1.0, 2.0)]
+    assert [reply.content.event_id for reply in replies] == [1, 2]
+    assert [fact.event for fact in facts(office) if fact.action == "raise"] == [1, 2]
+
+
 @pytest.mark.parametrize(("role", "code"), [("dispatch", m.NOT_PERMITTED), ("supervise", m.BUSY)])
 def test_only_who_supervises_takes_a_robot_without_asking(role, code):
     office = staffed(role)
