@@ -60,18 +60,18 @@ export function waysOf(who) {
 export const chooseCandidate = (place) => (wanted.value = candidates.peek()[place]?.label ?? wanted.peek());
 
 /**
- * Assign a responder; an event decided on by somebody else in the meantime is left unchanged.
+ * Assign a responder, to a confirmed event to contain it; an event decided on by somebody else in
+ * the meantime is left unchanged.
  * @param {SiteEvent} event
  * @param {string} whom
- * @param {string} [task]
  */
-export async function assignTo(event, whom, task) {
+export async function assignTo(event, whom) {
   const done = await act('event_assign', {
     event: event.number,
     device: whom,
     reason: reason.peek(),
     decisions: event.decisions ?? null,
-    ...(task ? { task } : {}),
+    ...(event.state === 'confirmed' ? { task: 'contain' } : {}),
   });
   if (done.ok) reason.value = '';
   return done;
