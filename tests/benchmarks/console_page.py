@@ -12,13 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from benchmarks.console_visits import FAKE, Console, console, load, visit
+from benchmarks.console_visits import Console, console, load, visit
 from benchmarks.goals import goal
 from helpers.console.chromium import chromium
 from playwright.sync_api import Page, expect
 
 STEPS, STEP_MS, WARM_UP_MS = 300, 130, 2000  # of keys pressed in turn
 WATCH_S = 10.0
+EVENTS = "[{kind: fire, at_s: 5, latest_s: 5}]"
 MOST_MS = {0: 30.0, 250: 280.0}  # from a key to the set point, by the delay [ms]
 DRAWN = """() => { const canvas = document.querySelectorAll('.map-canvas')[0];
   if (!canvas?.width) return false;
@@ -106,8 +107,15 @@ def a_page_of_two_hundred_robots(folder: Path) -> None:
 
 def page_cost(folder: Path, robots: int, people: int, site: str) -> None:
     """Share of the main thread, frames and bytes while somebody looks at the map."""
-    words = ("--robots", str(robots), "--people", str(people), "--site", site)
-    with console(folder, *words, program=FAKE) as running, chromium() as browser:
+    keys = {
+        "robot.count": robots,
+        "bystander.count": people,
+        "site.name": site,
+        "events": EVENTS,
+        "robot.way_m": "null",
+    }
+    words = [f"--set={key}={value}" for key, value in keys.items()]
+    with console(folder, *words) as running, chromium() as browser:
         page = visit(browser, f"{running.address}#/map")
         page.wait_for_function(DRAWN)
         page.wait_for_timeout(WARM_UP_MS)

@@ -6,17 +6,15 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from helpers.paths import TESTS
 from helpers.processes.patience import PATIENCE_S, becomes
 from playwright.sync_api import Browser, Page
 
-REAL = ("-m", "dva_sim.cli", "console", "--no-open", "--port", "0")
-FAKE = (str(TESTS / "console" / "fake_world.py"),)
+PROGRAM = ("-m", "dva_sim.cli", "console", "--no-open", "--port", "0")
 ADDRESS = r"^Console: +(\S+)\n()"
 ADDRESSES = r"^Console: +(\S+)\n.*^Phone: \S+token=(\S+)$.*trust this machine"
 TICK_S = 1 / os.sysconf("SC_CLK_TCK")
@@ -87,12 +85,12 @@ def _children(pid: int) -> list[int]:
 
 
 @contextmanager
-def console(folder: Path, *words: str, program: Sequence[str] = REAL) -> Iterator[Console]:
+def console(folder: Path, *words: str) -> Iterator[Console]:
     """A console from its first word until it is not needed any more."""
     out = folder / "console.out"
     environment = {**os.environ, "DVA_SIM_NO_BROWSER": "1", "XDG_DATA_HOME": str(folder)}
     with out.open("wb") as file:
-        command = [sys.executable, *program, *words]
+        command = [sys.executable, *PROGRAM, *words]
         process = subprocess.Popen(command, stdout=file, stderr=file, env=environment)
     try:
         wanted = re.compile(ADDRESSES if "--phones" in words else ADDRESS, re.M | re.S)

@@ -1,21 +1,18 @@
-"""A browser, and worlds to look at with it."""
+"""A browser, and consoles to look at with it."""
 
-import re
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from functools import cache, partial
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import pytest
 from helpers.console.chromium import chromium
-from helpers.processes.patience import PATIENCE_S, becomes
+from helpers.console.console_program import Addresses, addresses_of
+from helpers.processes.patience import PATIENCE_S
+from helpers.processes.programs import all_gone_after
 from playwright.sync_api import Browser, BrowserContext, Dialog, Page, Response, expect
 
 ENDED = "ERR_INCOMPLETE_CHUNKED_ENCODING", "ERR_CONNECTION_REFUSED"  # with a page's world
-FAKE = Path(__file__).parents[1] / "fake_world.py"
-
 MOMENT_MS = 1000 * PATIENCE_S / 2
 expect.set_options(timeout=MOMENT_MS)
 
@@ -26,77 +23,19 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("browser")
 
 
-class World(NamedTuple):
-    """Addresses of a running console.
-
-    Attributes:
-        drive: Address with the token for driving.
-        look: Address for looking only.
-        phones: Address for phones, by https; empty without one.
-    """
-
-    drive: str
-    look: str
-    phones: str = ""
-
-    @property
-    def phone(self) -> str:
-        """The phone's page at the console's own address, as by `adb reverse`."""
-        return f"{self.base}phone?{self.phones.partition('?')[2]}"
-
-    @property
-    def base(self) -> str:
-        """Without a token."""
-        return self.drive.partition("?")[0]
-
-
-@contextmanager
-def running(folder: Path, command: list[str]) -> Iterator[World]:
-    """A world from its first word until the test is over."""
-    out = folder / f"world-{len(list(folder.iterdir()))}.out"
-    with out.open("wb") as file:
-        process = subprocess.Popen([sys.executable, *command], stdout=file, stderr=file)
-    try:
-        reported = re.compile(r"^(Console|Look only|Phone): +(https?:\S+)", re.MULTILINE)
-        becomes(lambda: "Console:" in out.read_text() or process.poll() is not None)
-        becomes(lambda: "Phone:" in out.read_text() or process.poll() is not None)
-        becomes(lambda: out.read_text().endswith("\n"))
-        found = dict(reported.findall(out.read_text()))
-        assert "Console" in found, out.read_text()
-        look = found.get("Look only", found["Console"])
-        yield World(found["Console"], look, found.get("Phone", ""))
-    finally:
-        process.terminate()
-        process.wait(PATIENCE_S)
-
-
 @pytest.fixture(scope="module")
-def fake(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., World]]:
-    """Invented worlds, each started once for all tests of a file that want it."""
-    known: dict[tuple[str, ...], tuple[Any, World]] = {}
-    folder = tmp_path_factory.mktemp("worlds")
-
-    def start(*words: str) -> World:
-        if words not in known:
-            manager = running(folder, [str(FAKE), *words])
-            known[words] = manager, manager.__enter__()
-        return known[words][1]
-
-    yield start
-    for manager, _ in known.values():
-        manager.__exit__(None, None, None)
+def console(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Addresses]]:
+    """Consoles of the small office, each started once for all tests of a file that want it."""
+    for programs in all_gone_after(tmp_path_factory.mktemp("consoles")):
+        yield cache(partial(addresses_of, programs))
 
 
-@pytest.fixture
-def own_world(tmp_path: Path) -> Iterator[Callable[..., tuple[World, Callable[[], None]]]]:
-    """Worlds that nobody else looks at, and how each is ended."""
-    with ExitStack() as all_of_them:
-
-        def start(*words: str) -> tuple[World, Callable[[], None]]:
-            one = all_of_them.enter_context(ExitStack())
-            return one.enter_context(running(tmp_path, [str(FAKE), *words])), one.close
-
-        yield start
+@pytest.fixture(scope="session", autouse=True)
+def _own_certificates(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep those of consoles for phones where no others are."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_DATA_HOME", str(tmp_path_factory.mktemp("data")))
+        yield
 
 
 @pytest.fixture(scope="session", name="browser")  # while it runs, no other test has asyncio
@@ -209,8 +148,8 @@ class Tabs:
 
 
 @pytest.fixture(scope="module")
-def _tabs(browser: Browser, fake: Callable[..., World]) -> Iterator[Tabs]:
-    """Closed before the worlds end."""
+def _tabs(browser: Browser, console: Callable[..., Addresses]) -> Iterator[Tabs]:
+    """Closed before the consoles end."""
     tabs = Tabs(browser)
     yield tabs
     tabs.close()

@@ -1,13 +1,13 @@
 """Access to the page: entry, foreign pages, and the message when the world has ended."""
 
 import http.server
+import signal
 import threading
 from collections.abc import Iterator
 
 import pytest
+from helpers.console.console_program import OFFICE, started
 from playwright.sync_api import expect
-
-SMALL = ("--robots", "2", "--people", "3", "--site", "office-block")
 
 
 @pytest.fixture
@@ -31,8 +31,8 @@ def foreign() -> Iterator[str]:
     server.server_close()
 
 
-def test_the_token_leaves_the_address_and_a_reload_still_gets_in(fake, visit):
-    page = visit.open(fake(*SMALL).drive, "network")
+def test_the_token_leaves_the_address_and_a_reload_still_gets_in(console, visit):
+    page = visit.open(console().drive, "network")
 
     assert "token" not in page.url
     page.reload()
@@ -40,10 +40,10 @@ def test_the_token_leaves_the_address_and_a_reload_still_gets_in(fake, visit):
 
 
 @pytest.mark.parametrize("query", ["", "?token=wrong"])
-def test_without_the_right_token_there_is_a_page_of_words(fake, visits, query):
+def test_without_the_right_token_there_is_a_page_of_words(console, visits, query):
     guest = visits()
     page = guest.context.new_page()
-    answer = page.goto(f"{fake(*SMALL).base}{query}")
+    answer = page.goto(f"{console().base}{query}")
 
     assert answer is not None
     assert answer.status == 401
@@ -58,24 +58,24 @@ POST = """url => fetch(url, {method: 'POST', credentials: 'include',
   .then(a => a.status, () => 'refused')"""
 
 
-def test_a_foreign_page_reaches_nothing_though_the_browser_has_the_cookie(fake, visit, foreign):
-    world = fake(*SMALL)
-    visit.open(world.drive)
+def test_a_foreign_page_reaches_nothing_though_the_browser_has_the_cookie(console, visit, foreign):
+    running = console()
+    visit.open(running.drive)
     page = visit.context.new_page()
     page.goto(foreign)
-    socket = world.base.replace("http", "ws")
+    socket = running.base.replace("http", "ws")
 
     assert page.evaluate(SOCKET, f"{socket}ws/state") == "refused"
-    assert page.evaluate(POST, f"{world.base}api/emergency") in ("refused", 401, 403)
-    assert page.evaluate(FETCH, f"{world.base}api/state") == "refused"
+    assert page.evaluate(POST, f"{running.base}api/emergency") in ("refused", 401, 403)
+    assert page.evaluate(FETCH, f"{running.base}api/state") == "refused"
 
 
-def test_a_page_says_so_when_the_world_has_ended(own_world, browser):
-    world, end = own_world(*SMALL)
+def test_a_page_says_so_when_the_simulation_has_ended(programs, browser):
+    program, address = started(programs, OFFICE)
     page = browser.new_context().new_page()
-    page.goto(f"{world.drive}#/map")
+    page.goto(f"{address}#/map")
     expect(page.get_by_role("region", name="Map")).to_be_visible()
-    end()
+    program.send(signal.SIGINT)
 
     expect(page.locator(".warnings")).to_contain_text("The simulation has ended")
     page.wait_for_timeout(600)  # longer than the first try to reach it again

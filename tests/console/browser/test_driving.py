@@ -4,20 +4,24 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
+from helpers.console.driving_page import free_all, release, start, take
 from helpers.processes.patience import becomes
 from playwright.sync_api import Locator, Page, expect
 
-WORLD = ("--robots", "3", "--people", "4", "--site", "office-block")
-
 
 @pytest.fixture
-def page(fake, shared) -> Iterator[Page]:
+def page(console, shared) -> Iterator[Page]:
     """The page for driving, its robot taken and started."""
-    page = shared(fake(*WORLD).drive, "drive")
+    page = shared(console().drive, "drive")
     listen(page)
-    take(page)
+    begin(page)
     yield page
     release(page)
+
+
+def begin(page: Page) -> None:
+    take(page)
+    start(page)
 
 
 def listen(page: Page) -> None:
@@ -29,22 +33,6 @@ def listen(page: Page) -> None:
         WebSocket.prototype.send = function (text) {
           window.sent.push(JSON.parse(text)); return send.call(this, text); }; }"""
     )
-
-
-def take(page: Page) -> None:
-    """Take control and start."""
-    page.get_by_role("button", name="Take control").click()
-    start(page)
-
-
-def start(page: Page) -> None:
-    page.get_by_role("button", name="Start", exact=True).click()
-    expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
-
-
-def release(page: Page) -> None:
-    page.get_by_role("button", name="Release control").click()
-    expect(page.get_by_role("button", name="Take control")).to_be_enabled()
 
 
 def dragged(page: Page, slider: Locator) -> tuple[float, float, float]:
@@ -195,10 +183,10 @@ def test_keys_of_a_slider_spring_back_too(page):
     assert becomes(lambda: inputs(page)[-1]["held"] is False)
 
 
-def test_a_second_key_does_not_wait_for_the_next_turn_to_send(fake, visit):
-    page = visit.open(fake(*WORLD).drive, "drive")
+def test_a_second_key_does_not_wait_for_the_next_turn_to_send(console, visit):
+    page = visit.open(console().drive, "drive")
     listen(page)
-    take(page)
+    begin(page)
     page.clock.install()
     page.clock.pause_at("2030-01-01")
     page.evaluate(
@@ -254,7 +242,8 @@ def test_emergency_stop_and_its_key_stop_all_robots(page):
             press()
         assert answer.value.json()["ok"]
         assert '"all"' in (answer.value.request.post_data or "")
-        expect(page.get_by_role("status", name="Mode")).to_have_text("Idle")
+        expect(page.get_by_role("status", name="Mode")).to_have_text("Emergency")
+        free_all(page)
         start(page)
 
 
@@ -267,6 +256,8 @@ def test_a_key_held_since_before_a_stop_does_not_drive_at_the_next_start(page, e
         else:
             name = "Stop" if end == "stop" else "Emergency stop"
             page.get_by_role("button", name=name, exact=True).click()
+        if end != "stop":
+            free_all(page)
         expect(page.get_by_role("status", name="Mode")).to_have_text("Idle")
         expect(page.get_by_role("slider", name="Turn rate")).to_have_value("0")
         count = len(inputs(page))
@@ -282,26 +273,25 @@ def test_a_slider_dragged_since_before_a_stop_stays_at_zero_until_it_is_let_go(p
     slider = page.get_by_role("slider", name="Speed")
     x, width, y = dragged(page, slider)
     page.keyboard.press("Shift+Escape")
-    expect(page.get_by_role("status", name="Mode")).to_have_text("Idle")
+    expect(page.get_by_role("status", name="Mode")).to_have_text("Emergency")
     count = len(inputs(page))
     page.mouse.move(x + 0.7 * width, y)
     page.mouse.move(x + 0.9 * width, y)
     expect(slider).to_have_value("0")
     assert [line for line in inputs(page)[count:] if line["held"]] == []
     page.mouse.up()
+    free_all(page)
     slider.click()
     assert becomes(lambda: any(line["held"] for line in inputs(page)[count:]))
 
 
-def test_two_robots_get_the_same_hand_under_two_patterns(fake, shared):
-    page = shared(fake(*WORLD).drive, "drive")
+def test_two_robots_get_the_same_hand_under_two_patterns(console, shared):
+    page = shared(console().drive, "drive")
     listen(page)
     page.get_by_role("button", name="robot-2 beside it").click()
     page.get_by_label("Pattern of robot-1").select_option("req-rep")
     page.get_by_label("Pattern of robot-2").select_option("latest-wins")
-    page.get_by_role("button", name="Take control").click()
-    page.get_by_role("button", name="Start", exact=True).click()
-
+    begin(page)
     mode = page.get_by_role("status", name="Mode")
     expect(mode).to_have_text("robot-1 Teleoperation, robot-2 Teleoperation")
     taken = [line for line in page.evaluate("window.sent") if line.get("do") == "take"]
@@ -310,7 +300,7 @@ def test_two_robots_get_the_same_hand_under_two_patterns(fake, shared):
         for place in (0, 1):
             expect(page.locator(".stop-reason").nth(place)).to_contain_text("Set point 0.50 m/s")
     expect(page.get_by_role("img", name="What robot-2 sees")).to_be_visible()
-    page.get_by_role("button", name="Release control").click()
+    release(page)
     expect(mode).not_to_contain_text("Teleoperation")
 
 

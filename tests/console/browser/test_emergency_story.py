@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from helpers.console.console_program import started
+from helpers.console.console_program import PHONES, started
 from helpers.processes.patience import PATIENCE_S, becomes
 from playwright.sync_api import expect
 
@@ -33,7 +33,7 @@ def seconds(page):
 def test_everybody_sees_an_emergency_and_nothing_drives_until_a_dispatcher_releases_it(
     visits, programs, presser
 ):
-    words = ["campus-patrol", "--set", "bystander.count=0", "--phones", "--host", "127.0.0.1"]
+    words = ["campus-patrol", "--set", "bystander.count=0", *PHONES]
     console, _ = started(programs, *words)
     console.wait_to_say("Phone:")
     said = dict(re.findall(r"^(Console|Look only|Phone): +(\S+)$", console.output, re.MULTILINE))

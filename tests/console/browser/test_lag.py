@@ -2,27 +2,11 @@
 
 import json
 import re
-from typing import Any
 
 import pytest
+from helpers.console.changed_lines import sockets_of
 from helpers.processes.patience import becomes
-from playwright.sync_api import Page, WebSocketRoute, expect
-
-SMALL = ("--robots", "2", "--people", "3", "--site", "office-block")
-
-
-def sockets_of(page: Page, name: str, change: Any = lambda text: text, asked: Any = str) -> list:
-    """The sockets that a page opens; each line is changed first, one that becomes None is lost."""
-    sockets: list[WebSocketRoute] = []
-
-    def route(socket: WebSocketRoute) -> None:
-        server = socket.connect_to_server()
-        sockets.append(socket)
-        server.on_message(lambda text: None if (new := change(text)) is None else socket.send(new))
-        socket.on_message(lambda text: (asked(str(text)), server.send(text)))
-
-    page.route_web_socket(f"**/ws/{name}*", route)
-    return sockets
+from playwright.sync_api import Page, expect
 
 
 def lagging(text: str) -> str:
@@ -37,9 +21,9 @@ def page(visit) -> Page:
     return visit.context.new_page()
 
 
-def test_a_world_that_lags_holds_robots_and_the_page_says_why(fake, page):
+def test_a_world_that_lags_holds_robots_and_the_page_says_why(console, page):
     sockets_of(page, "state", lagging)
-    page.goto(f"{fake(*SMALL).drive}#/drive")
+    page.goto(f"{console().drive}#/drive")
 
     warning = page.locator(".warnings")
     expect(warning).to_contain_text("Robots were stopped")
@@ -48,10 +32,10 @@ def test_a_world_that_lags_holds_robots_and_the_page_says_why(fake, page):
     expect(page.locator(".hint")).to_contain_text("behind real time")
 
 
-def test_silence_makes_the_page_look_old(fake, page):
+def test_silence_makes_the_page_look_old(console, page):
     silent: list[bool] = []
     sockets_of(page, "state", lambda text: None if silent else text)
-    page.goto(f"{fake(*SMALL).drive}#/map")
+    page.goto(f"{console().drive}#/map")
     expect(page.locator(".map-canvas")).to_have_count(3)
     expect(page.locator(".age")).to_have_text(re.compile(r"^data \d+\.\d s old$"))
     silent.append(True)
@@ -60,10 +44,10 @@ def test_silence_makes_the_page_look_old(fake, page):
     expect(page.locator(".age.old")).to_be_visible()
 
 
-def test_a_picture_that_still_comes_is_hatched_when_all_else_is_silent(fake, page):
+def test_a_picture_that_still_comes_is_hatched_when_all_else_is_silent(console, page):
     silent: list[bool] = []
     sockets_of(page, "state", lambda text: None if silent else text)
-    page.goto(f"{fake(*SMALL).drive}#/drive")
+    page.goto(f"{console().drive}#/drive")
     expect(page.locator(".picture-age")).to_contain_text("s old")
     expect(page.locator(".veil")).not_to_have_class("veil hatched")
     silent.append(True)
@@ -72,7 +56,7 @@ def test_a_picture_that_still_comes_is_hatched_when_all_else_is_silent(fake, pag
     expect(page.locator(".picture-age")).to_have_text(re.compile(r"s old, no data for \d+\.\d+ s$"))
 
 
-def test_a_hole_in_what_was_heard_is_filled_by_asking_again(fake, page):
+def test_a_hole_in_what_was_heard_is_filled_by_asking_again(console, page):
     asked, skipped = list[str](), list[str]()
 
     def hole(text: str) -> str | None:
@@ -82,15 +66,15 @@ def test_a_hole_in_what_was_heard_is_filled_by_asking_again(fake, page):
         return None
 
     sockets_of(page, "state", hole, asked.append)
-    page.goto(f"{fake(*SMALL).drive}#/map")
+    page.goto(f"{console().drive}#/map")
 
     assert becomes(lambda: (page.wait_for_timeout(50), any("resync" in text for text in asked))[1])
     expect(page.locator(".map-canvas")).to_have_count(3)
 
 
-def test_a_lost_socket_is_opened_again_under_the_same_name(fake, page):
+def test_a_lost_socket_is_opened_again_under_the_same_name(console, page):
     sockets = sockets_of(page, "state")
-    page.goto(f"{fake(*SMALL).drive}#/map")
+    page.goto(f"{console().drive}#/map")
     expect(page.get_by_role("region", name="Map")).to_be_visible()
     who = page.evaluate("sessionStorage.getItem('dva-sim-client')")
     sockets[0].close()
@@ -100,9 +84,9 @@ def test_a_lost_socket_is_opened_again_under_the_same_name(fake, page):
     assert page.evaluate("sessionStorage.getItem('dva-sim-client')") == who
 
 
-def test_nothing_can_be_asked_for_until_the_socket_for_driving_is_open(fake, page):
+def test_nothing_can_be_asked_for_until_the_socket_for_driving_is_open(console, page):
     sockets = sockets_of(page, "drive")
-    page.goto(f"{fake(*SMALL).drive}#/drive")
+    page.goto(f"{console().drive}#/drive")
     button = page.get_by_role("button", name="Take control")
     expect(button).to_be_enabled()
     page.clock.install()

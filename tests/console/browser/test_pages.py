@@ -4,7 +4,6 @@ import pytest
 from helpers.console.accessibility import faults
 from playwright.sync_api import expect
 
-WORLD = ("--robots", "3", "--people", "6")
 PAGES = {
     "map": "Map",
     "main": "Main",
@@ -18,10 +17,10 @@ PAGES = {
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [360, 1280])
-def test_axe_finds_nothing_serious(fake, shared, width, scheme):
+def test_axe_finds_nothing_serious(console, shared, width, scheme):
     found = {}
     for name, heading in PAGES.items():
-        page = shared(fake(*WORLD).drive, name, width=width, scheme=scheme)
+        page = shared(console().drive, name, width=width, scheme=scheme)
         expect(page.get_by_role("heading", name=heading, level=1)).to_be_attached()
         page.get_by_text("Legend").first.click() if name == "map" else None
         found[name] = faults(page)
@@ -29,8 +28,8 @@ def test_axe_finds_nothing_serious(fake, shared, width, scheme):
     assert not any(found.values()), found
 
 
-def test_axe_finds_a_fault_that_is_planted(fake, shared):
-    page = shared(fake(*WORLD).drive)
+def test_axe_finds_a_fault_that_is_planted(console, shared):
+    page = shared(console().drive)
     page.evaluate("document.querySelector('.map-buttons button').removeAttribute('aria-label')")
     page.evaluate("document.querySelector('.map-buttons button').removeAttribute('title')")
 
@@ -39,8 +38,8 @@ def test_axe_finds_a_fault_that_is_planted(fake, shared):
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [360, 1280])
-def test_axe_finds_nothing_serious_in_help_and_tour(fake, shared, scheme, width):
-    page = shared(fake(*WORLD).drive, "drive", width=width, scheme=scheme)
+def test_axe_finds_nothing_serious_in_help_and_tour(console, shared, scheme, width):
+    page = shared(console().drive, "drive", width=width, scheme=scheme)
     page.get_by_role("button", name="Help").click()
     expect(page.get_by_role("dialog", name="Help")).to_be_visible()
     assert faults(page) == []
@@ -54,9 +53,9 @@ def test_axe_finds_nothing_serious_in_help_and_tour(fake, shared, scheme, width)
 
 
 @pytest.mark.parametrize("width", [360, 740, 1280, 2560, 3840])
-def test_nothing_is_wider_than_the_screen(fake, shared, width):
+def test_nothing_is_wider_than_the_screen(console, shared, width):
     for name, heading in PAGES.items():
-        page = shared(fake(*WORLD).drive, name, width=width, height=740)
+        page = shared(console().drive, name, width=width, height=740)
         expect(page.get_by_role("heading", name=heading, level=1)).to_be_attached()
 
         assert page.evaluate("document.documentElement.scrollWidth") <= width, name
@@ -72,8 +71,8 @@ IN_SIGHT = """e => { const {left, right, top, bottom} = e.getBoundingClientRect(
     document.elementFromPoint(x + (x < right ? 9 : -9), y + (y < bottom ? 9 : -9)))); }"""
 
 
-def test_on_a_small_screen_the_bar_has_two_rows_and_lies_below_nothing(fake, shared):
-    page = shared(fake(*WORLD).drive, "drive", width=360, height=640)
+def test_on_a_small_screen_the_bar_has_two_rows_and_lies_below_nothing(console, shared):
+    page = shared(console().drive, "drive", width=360, height=640)
     page.get_by_role("button", name="Take the tour").click()
     expect(page.get_by_role("button", name="Begin again")).to_be_visible()
 
@@ -86,8 +85,8 @@ def test_on_a_small_screen_the_bar_has_two_rows_and_lies_below_nothing(fake, sha
     page.get_by_role("button", name="End the tour").click()
 
 
-def test_public_names_are_on_their_pages_once(fake, shared):
-    page = shared(fake(*WORLD).drive, "drive")
+def test_public_names_are_on_their_pages_once(console, shared):
+    page = shared(console().drive, "drive")
 
     for link in PAGES.values():
         expect(page.get_by_role("link", name=link)).to_have_count(1)
@@ -99,13 +98,13 @@ def test_public_names_are_on_their_pages_once(fake, shared):
         expect(page.get_by_role("status", name=status)).to_have_count(1)
     for region in ("Camera", "Map", "Latency"):
         expect(page.get_by_role("region", name=region)).to_have_count(1)
-    page = shared(fake(*WORLD).drive, "network")
+    page = shared(console().drive, "network")
     for slider in ("Delay", "Jitter", "Loss", "Bandwidth", "Time factor"):
         expect(page.get_by_role("slider", name=slider)).to_have_count(1)
 
 
-def test_colours_change_by_a_button_and_stay(fake, visits):
-    page = visits(color_scheme="light").open(fake(*WORLD).drive)
+def test_colours_change_by_a_button_and_stay(console, visits):
+    page = visits(color_scheme="light").open(console().drive)
 
     def background() -> str:
         return str(page.evaluate("getComputedStyle(document.body).backgroundColor"))
@@ -118,8 +117,8 @@ def test_colours_change_by_a_button_and_stay(fake, visits):
     assert background() == "rgb(22, 25, 29)"
 
 
-def test_focus_can_be_seen_on_everything_that_tab_reaches(fake, shared):
-    page = shared(fake(*WORLD).drive, "drive")
+def test_focus_can_be_seen_on_everything_that_tab_reaches(console, shared):
+    page = shared(console().drive, "drive")
     reached = set()
     for _ in range(40):
         page.keyboard.press("Tab")
@@ -133,8 +132,8 @@ def test_focus_can_be_seen_on_everything_that_tab_reaches(fake, shared):
     assert {"Emergency stop", "Drive", "Take control", "slider-speed", "slider-delay"} <= reached
 
 
-def test_a_robot_is_taken_and_released_by_keys(fake, shared):
-    page = shared(fake(*WORLD).drive, "drive")
+def test_a_robot_is_taken_and_released_by_keys(console, shared):
+    page = shared(console().drive, "drive")
 
     page.get_by_role("button", name="Take control").focus()
     page.keyboard.press("Enter")
@@ -143,16 +142,16 @@ def test_a_robot_is_taken_and_released_by_keys(fake, shared):
     expect(page.get_by_role("button", name="Take control")).to_be_enabled()
 
 
-def test_the_page_weighs_less_than_700_kb_and_asks_nobody_else(fake, visit):
-    weights = visit.weighs(f"{fake(*WORLD).drive}#/map", "region", "Map")
+def test_the_page_weighs_less_than_700_kb_and_asks_nobody_else(console, visit):
+    weights = visit.weighs(f"{console().drive}#/map", "region", "Map")
 
-    assert all(url.startswith(fake(*WORLD).base) for url in weights)
+    assert all(url.startswith(console().base) for url in weights)
     assert any("leaflet.js" in url for url in weights)
     assert sum(weights.values()) < 700_000
 
 
-def test_pages_are_reached_by_their_links_and_obey_their_content_security_policy(fake, visit):
-    page = visit.open(fake(*WORLD).drive)
+def test_pages_are_reached_by_their_links_and_obey_their_content_security_policy(console, visit):
+    page = visit.open(console().drive)
     for name in reversed(PAGES.values()):
         page.get_by_role("link", name=name).click()
         expect(page.get_by_role("heading", name=name, level=1)).to_be_attached()

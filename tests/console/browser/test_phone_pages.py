@@ -5,9 +5,10 @@ from typing import Any
 
 from helpers.console.accessibility import faults
 from helpers.console.browser_phone import Hand
+from helpers.console.console_program import PHONES
 from playwright.sync_api import Page, expect
 
-WORLD = ("--phones", "--robots", "3", "--people", "4", "--site", "office-block")
+WORDS = *PHONES, "--set", "guard.kind=person"
 SIZES = {"smallest": (320, 568), "across": (740, 360), "tablet": (820, 1180)}
 LOOKS = [(size, scheme) for size in SIZES for scheme in ("light", "dark")]
 TALLEST = 48  # of what is tapped, at least [px]
@@ -49,8 +50,8 @@ def look(page: Page, size: str, scheme: Any) -> tuple[int, int]:
     return width, height
 
 
-def test_every_screen_fits_and_axe_finds_nothing_serious(fake, visits):
-    hand = Hand(visits(320, 568, has_touch=True, is_mobile=True), fake(*WORLD).phone)
+def test_every_screen_fits_and_axe_finds_nothing_serious(console, visits):
+    hand = Hand(visits(320, 568, has_touch=True, is_mobile=True), console(*WORDS).phone)
     for name, show in screens(hand):
         show()
         for each in LOOKS:
@@ -65,9 +66,9 @@ def test_every_screen_fits_and_axe_finds_nothing_serious(fake, visits):
     hand.leave()
 
 
-def test_the_guards_page_fits_and_axe_finds_nothing_serious(fake, visits):
+def test_the_guards_page_fits_and_axe_finds_nothing_serious(console, visits):
     page = visits(320, 568).tab()
-    page.goto(fake(*WORLD).phone.replace("/phone?", "/guard?"))
+    page.goto(console(*WORDS).guard)
     expect(page.get_by_role("heading", name="Who are you?")).to_be_visible()
     for each in LOOKS:
         look(page, *each)
@@ -83,16 +84,16 @@ def test_the_guards_page_fits_and_axe_finds_nothing_serious(fake, visits):
     expect(page.get_by_role("heading", name="Who are you?")).to_be_visible()
 
 
-def test_how_to_trust_the_console_can_be_read_by_everybody(fake, visits):
+def test_how_to_trust_the_console_can_be_read_by_everybody(console, visits):
     page = visits(320, 568).tab()
-    page.goto(f"{fake(*WORLD).base}trust")
+    page.goto(f"{console(*WORDS).base}trust")
     expect(page.get_by_role("heading", name="Trust this console")).to_be_visible()
     assert page.evaluate("document.documentElement.scrollWidth") <= 320
     assert faults(page) == []
 
 
-def test_public_names_are_there(fake, visits):
-    hand = Hand(visits(360, 740, has_touch=True, is_mobile=True), fake(*WORLD).phone)
+def test_public_names_are_there(console, visits):
+    hand = Hand(visits(360, 740, has_touch=True, is_mobile=True), console(*WORDS).phone)
     page = hand.page
     hand.go("Authentication")
     for field in ("Server IP", "Port", "Device label", "Device type", "Device", "Permission level"):
@@ -106,10 +107,10 @@ def test_public_names_are_there(fake, visits):
     expect(hand.status("Link")).to_have_count(1)
 
 
-def test_a_phones_pages_weigh_less_than_200_kb_and_ask_nobody_else(fake, visits):
-    world = fake(*WORLD)
-    weights = visits(360, 740).weighs(world.phone, "link", "Authentication")
+def test_a_phones_pages_weigh_less_than_200_kb_and_ask_nobody_else(console, visits):
+    running = console(*WORDS)
+    weights = visits(360, 740).weighs(running.phone, "link", "Authentication")
 
-    assert all(url.startswith(world.base) for url in weights)
+    assert all(url.startswith(running.base) for url in weights)
     assert not any("leaflet" in url or "uplot" in url for url in weights)
     assert sum(weights.values()) < 200_000, sum(weights.values())

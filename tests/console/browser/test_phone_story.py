@@ -2,28 +2,19 @@
 
 import re
 import signal
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from helpers.console.browser_phone import FORWARDS, Hand
+from helpers.console.console_program import PHONES, started
 from helpers.processes.patience import becomes
-from helpers.processes.programs import Programs, all_gone_after
 from playwright.sync_api import expect
 
 from dva_sim.experiments.results.results import Results
 
 SCREEN = {"width": 360, "height": 740, "has_touch": True, "is_mobile": True}
 UNTRUSTED = {"ignore_https_errors": True}  # a certificate of this machine
-WORDS = ("--port", "0", "--phones", "--phones-host", "127.0.0.1", "--phones-port", "0")
 ROBOT = "robot-1"
 STATE = "fetch('/api/state').then((answer) => answer.json())"
-
-
-@pytest.fixture
-def programs(tmp_path: Path, monkeypatch) -> Iterator[Programs]:
-    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
-    yield from all_gone_after(tmp_path)
 
 
 def mode(hand: Hand) -> str:
@@ -49,7 +40,7 @@ def start(hand: Hand) -> None:
 def test_a_phone_registers_drives_by_tilt_and_is_a_row(visits, programs, tmp_path, links):
     record, out, motion = tmp_path / "run.mcap", tmp_path / "out", tmp_path / "motion"
     words = ("--record", record, "-o", out, "--keep-motion", motion, "--links", links)
-    console = programs.start("console", "--no-open", *WORDS, *words)
+    console, _ = started(programs, *PHONES, *words)
     console.wait_to_say("Each phone must trust this computer once")
     phone = re.findall(r"^Phone: (\S+)", console.output, re.MULTILINE)[0]
 
@@ -80,7 +71,7 @@ def test_a_phone_registers_drives_by_tilt_and_is_a_row(visits, programs, tmp_pat
     assert 20 < drives["sensor_hz"][-1] < 80
     assert sum(drives["commands_applied"]) > 5
     token = phone.rpartition("token=")[2]
-    kept = [path for path in tmp_path.rglob("*") if path.is_file() and "data" not in path.parts]
+    kept = [path for path in tmp_path.rglob("*") if path.is_file()]
     printed = {path for path in kept if token.encode() in path.read_bytes()}
     assert all(path.suffix == ".out" for path in printed), printed  # what the terminal showed
     assert not any(b"BEGIN" in path.read_bytes() and b"KEY" in path.read_bytes() for path in kept)

@@ -1,20 +1,23 @@
 """The emergency stop of every address, and refusals: each is shown at once, and asked for once."""
 
 import json
+import re
 from collections.abc import Callable
 from typing import Any
 
 import pytest
+from helpers.console.console_program import PHONES, Addresses
+from helpers.console.driving_page import free_all, release, start, take
 from playwright.sync_api import Page, Route, WebSocketRoute, expect
 
-WORLD = ("--phones", "--robots", "3", "--people", "5", "--site", "office-block")
+WORDS = *PHONES, "--set", "guard.kind=person"
 WHY = "the reason of the server"
 # Where each role's page is, and words on it once the world is there.
-ADDRESSES: dict[str, tuple[Callable[[Any], str], str]] = {
-    "look": (lambda world: f"{world.look}#/map", "you may look"),
-    "supervise": (lambda world: f"{world.drive}#/map", "you may supervise"),
-    "phone": (lambda world: world.phone, "Authentication"),
-    "guard": (lambda world: world.phone.replace("/phone?", "/guard?"), "Who are you?"),
+ADDRESSES: dict[str, tuple[Callable[[Addresses], str], str]] = {
+    "look": (lambda at: f"{at.look}#/map", "you may look"),
+    "supervise": (lambda at: f"{at.drive}#/map", "you may supervise"),
+    "phone": (lambda at: at.phone, "Authentication"),
+    "guard": (lambda at: at.guard, "Who are you?"),
 }
 RED = "rgb(163, 0, 0)"
 ALL = "robot-1, robot-2, robot-3 at 0:"
@@ -27,7 +30,7 @@ def press(page: Page) -> None:
 @pytest.mark.parametrize("path", ["request", "socket"])
 @pytest.mark.parametrize("role", ADDRESSES)
 def test_every_address_stops_robots_and_says_which_stand(
-    fake: Callable[..., Any], visit: Any, role: str, path: str
+    console: Callable[..., Any], visit: Any, role: str, path: str
 ) -> None:
     page = visit.tab()
     if path == "socket":
@@ -35,7 +38,7 @@ def test_every_address_stops_robots_and_says_which_stand(
     else:
         refuse_over_socket(page, lambda _: None, "emergency")
     address, words = ADDRESSES[role]
-    page.goto(address(fake(*WORLD)))
+    page.goto(address(console(*WORDS)))
     expect(page.get_by_text(words, exact=True)).to_be_visible()
     press(page)
     expect(page.locator(".stopped")).to_contain_text(ALL)
@@ -47,19 +50,22 @@ def test_every_address_stops_robots_and_says_which_stand(
 
 
 def test_a_confirmation_stays_until_its_robot_is_ordered_again(
-    fake: Callable[..., Any], visit: Any
+    console: Callable[..., Any], visit: Any
 ) -> None:
-    page = visit.open(fake(*WORLD).drive, "drive")
-    page.get_by_role("button", name="Take control").click()
-    page.get_by_role("button", name="Start", exact=True).click()
-    mode = page.get_by_role("status", name="Mode")
-    expect(mode).to_have_text("Teleoperation")
+    page = visit.open(console(*WORDS).drive, "drive")
     press(page)
-    expect(page.locator(".stopped")).to_contain_text(ALL)
-    expect(mode).to_have_text("Idle")
-    page.get_by_role("button", name="Start", exact=True).click()
-    expect(page.locator(".stopped")).to_contain_text("confirmed: robot-2, robot-3 at 0:")
-    page.get_by_role("button", name="Release control").click()
+    free_all(page)
+    take(page)
+    start(page)
+    press(page)
+    stopped = page.locator(".stopped")
+    expect(stopped).to_have_text(re.compile("confirmed: .*robot-1.* at 0:"))
+    expect(page.get_by_role("status", name="Mode")).to_have_text("Emergency")
+    free_all(page)
+    expect(stopped).to_contain_text("robot-1")
+    start(page)
+    expect(stopped).to_contain_text("confirmed: robot-2, robot-3 at 0:")
+    release(page)
 
 
 def refuse_over_socket(page: Page, heard: Callable[[str], object], *actions: str) -> None:
@@ -93,7 +99,7 @@ def refuse_request(page: Page, status: int, asked: list[str]) -> None:
 
 @pytest.mark.parametrize("status", [401, 403, 400, 415])
 def test_a_refused_emergency_request_is_shown_and_not_repeated(
-    fake: Callable[..., Any], visits: Callable[..., Any], status: int
+    console: Callable[..., Any], visits: Callable[..., Any], status: int
 ) -> None:
     visit = visits()
     page = visit.tab()
@@ -101,7 +107,7 @@ def test_a_refused_emergency_request_is_shown_and_not_repeated(
     refuse_request(page, status, asked)
     refuse_over_socket(page, lambda _: None, "emergency")  # of which nothing is heard
     page.clock.install()
-    page.goto(f"{fake(*WORLD).look}#/map")
+    page.goto(f"{console(*WORDS).look}#/map")
     expect(page.get_by_text("you may look", exact=True)).to_be_visible()
     press(page)
     expect(page.locator(".unconfirmed-stop")).to_contain_text(f"refused: {WHY}")
@@ -123,7 +129,7 @@ ASKED: dict[str, tuple[str, str, Callable[[Page], object]]] = {
 
 @pytest.mark.parametrize("action", ASKED)
 def test_a_refusal_over_the_socket_is_shown_and_not_repeated(
-    fake: Callable[..., Any], visit: Any, action: str
+    console: Callable[..., Any], visit: Any, action: str
 ) -> None:
     name, place, ask = ASKED[action]
     page = visit.tab()
@@ -131,7 +137,7 @@ def test_a_refusal_over_the_socket_is_shown_and_not_repeated(
     page.route("**/api/emergency", lambda _: None)
     refuse_over_socket(page, lambda what: asked.append(what) or True, action)
     page.clock.install()
-    page.goto(f"{fake(*WORLD).drive}#/{name}")
+    page.goto(f"{console(*WORDS).drive}#/{name}")
     expect(page.locator("main.page:not(.waiting)")).to_be_visible()
     ask(page)
     expect(page.locator(place).filter(has_text=WHY)).to_be_visible()
@@ -142,14 +148,14 @@ def test_a_refusal_over_the_socket_is_shown_and_not_repeated(
 
 
 def test_a_socket_that_is_closed_for_what_was_sent_is_told_with_its_reason(
-    fake: Callable[..., Any], visit: Any
+    console: Callable[..., Any], visit: Any
 ) -> None:
     page = visit.tab()
 
     def close(socket: WebSocketRoute) -> None:
         socket.on_message(lambda _: socket.close(code=1008, reason=WHY))
 
-    page.goto(f"{fake(*WORLD).drive}#/map")
+    page.goto(f"{console(*WORDS).drive}#/map")
     expect(page.get_by_role("button", name="Pause")).to_be_enabled()
     page.route_web_socket("**/ws/drive*", close)
     page.reload()

@@ -1,19 +1,19 @@
 """Pages that hear nothing more: each age counts on, and all else that was reported is greyed."""
 
 import re
+import secrets
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-from helpers.console.console_program import started
+from helpers.console.console_program import PHONES, Addresses
+from helpers.console.driving_page import start, take
 from helpers.console.stopped_network import StoppableNetwork, network_to
-from helpers.processes.programs import all_gone_after
 from playwright.sync_api import Page, expect
 
-WORLD = ("--phones", "--robots", "3", "--people", "5", "--site", "office-block")
-ALONE = ("--set", "guard.count=0", "--set", "bystander.count=0", "--set", "operator.count=1")
+WORDS = *PHONES, "--set", "guard.kind={6: person}"
 SILENCE_MS = 9000
 SOMETHING = re.compile(r"\S")
 # At least as old as the silence: the page's clock runs on while it is looked at.
@@ -57,13 +57,6 @@ FROZEN = """() => window.watched.filter(([one, before]) => {
 }).map(([one, before]) => `${one.className}: ${before}`)"""
 
 
-@pytest.fixture(scope="module")
-def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Address of a console whose robots have windows."""
-    for programs in all_gone_after(tmp_path_factory.mktemp("consoles")):
-        yield started(programs, *ALONE)[1]
-
-
 class Cut:
     """Opens pages over a network that can be cut."""
 
@@ -87,44 +80,53 @@ def cut() -> Iterator[Cut]:
 
 
 @pytest.fixture
-def address_of(fake: Callable[..., Any], request: pytest.FixtureRequest) -> Callable[[str], str]:
-    """Address of each page, in a world that has something in all its places."""
-
-    def address(name: str) -> str:
-        document, _, screen = name.partition("#")
-        if screen == "/teleoperation":  # as the console's operator, who needs no registration
-            world = fake(*WORLD)
-            return f"{world.base}phone?{world.drive.partition('?')[2]}#/authentication"
-        if name.startswith(("phone", "guard")):
-            return f"{fake(*WORLD).phone.replace('/phone?', f'/{document}?')}#{screen}"
-        of_robot = name.startswith("robots/")
-        return f"{request.getfixturevalue('real') if of_robot else fake(*WORLD).drive}#/{name}"
-
-    return address
+def at(console: Callable[..., Addresses]) -> Addresses:
+    """A console that has something in all places of all pages."""
+    return console(*WORDS)
 
 
-def opened(page: Page, cut: Cut, address: str, name: str) -> None:
+def address_of(at: Addresses, name: str) -> str:
+    """Return the address of a page."""
+    document, _, screen = name.partition("#")
+    if screen == "/teleoperation":  # as the console's operator, who needs no registration
+        return f"{at.base}phone?{at.drive.partition('?')[2]}#/authentication"
+    if name.startswith(("phone", "guard")):
+        return f"{at.phone.replace('/phone?', f'/{document}?')}#{screen}"
+    return f"{at.drive}#/{name}"
+
+
+def act(browser: Any, at: Addresses, action: str, arguments: dict[str, Any]) -> None:
+    """Do something at the console as a program beside the page."""
+    context = browser.new_context()
+    context.request.get(at.drive)
+    body = {"id": secrets.token_hex(8), "action": action, "arguments": arguments}
+    answer = context.request.post(f"{at.base}api/actions", data=body)
+    assert answer.ok, answer.text()
+    context.close()
+
+
+def opened(page: Page, cut: Cut, at: Addresses, name: str) -> None:
     """Show a page of the world, with a value in each of its places."""
     page.clock.install()
-    cut.open(page, address)
+    cut.open(page, address_of(at, name))
     if name == "guard":
-        page.get_by_role("button", name="guard-1").click()
+        page.get_by_role("button", name="guard-6").click()
+        expect(page.get_by_role("heading", name="guard-6")).to_be_visible()
+        beside = {"kind": "flood", "severity": "low", "x_m": 50.5, "y_m": 16.0}
+        act(page.context.browser, at, "event_raise", beside)
     if name == "phone#/teleoperation":
         # The DVA may have given the robot away just before; a person asks again.
-        goes_on, take = (
-            page.get_by_role("link", name="Go on"),
-            page.get_by_role("button", name="Take control"),
-        )
+        goes_on = page.get_by_role("link", name="Go on")
+        button = page.get_by_role("button", name="Take control")
         while not goes_on.is_visible():
-            take.or_(goes_on).first.wait_for()
-            if take.is_visible():
-                take.tap()
+            button.or_(goes_on).first.wait_for()
+            if button.is_visible():
+                button.tap()
             page.wait_for_timeout(1000)
         page.evaluate("location.hash = '#/teleoperation'")
     if name == "drive":
-        page.get_by_role("button", name="Take control").click()
-        page.get_by_role("button", name="Start", exact=True).click()
-        expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+        take(page)
+        start(page)
     if name == "map":
         page.get_by_role("region", name="Robots").get_by_role("button", name="robot-1").click()
     for selector in PAGES[name]:
@@ -135,11 +137,11 @@ def opened(page: Page, cut: Cut, address: str, name: str) -> None:
 
 @pytest.mark.parametrize("name", PAGES)
 def test_on_a_network_that_falls_silent_nothing_stands_as_if_it_were_live(
-    address_of: Callable[[str], str], cut: Cut, visits: Callable[..., Any], name: str
+    at: Addresses, cut: Cut, visits: Callable[..., Any], name: str
 ) -> None:
     is_small = name.startswith(("phone", "guard"))
     page = visits(**HAND if is_small else {"width": 1440, "height": 900}).tab()
-    opened(page, cut, address_of(name), name)
+    opened(page, cut, at, name)
     assert page.locator("[data-stale]").count() == 0
     cut.now()
     texts = page.evaluate(TEXTS, list(PAGES[name]))
@@ -173,14 +175,14 @@ AGES = """() => [Date.now() / 1000, ...[...document.querySelectorAll(
 
 @pytest.mark.parametrize(("pace", "factor"), PACES)
 def test_ages_of_alarms_and_events_follow_the_time_of_the_world(
-    address_of: Callable[[str], str],
+    at: Addresses,
     cut: Cut,
     visit: Any,
     pace: dict[str, Any],
     factor: int,
 ) -> None:
     page = visit.tab()
-    opened(page, cut, address_of("events"), "events")
+    opened(page, cut, at, "events")
     page.evaluate(CHANGE, pace)
     expect(page.locator(".bar .time .soft")).to_have_text(
         "paused" if pace["paused"] else f"×{pace['factor']}"
@@ -197,10 +199,6 @@ def test_ages_of_alarms_and_events_follow_the_time_of_the_world(
 
 
 @pytest.fixture(autouse=True)
-def _usual_pace(fake: Callable[..., Any], browser: Any) -> Iterator[None]:
+def _usual_pace(at: Addresses, browser: Any) -> Iterator[None]:
     yield
-    context = browser.new_context()
-    body = {"id": "usual", "action": "pace", "arguments": {"paused": False, "factor": 1}}
-    context.request.get(fake(*WORLD).drive)
-    context.request.post(f"{fake(*WORLD).base}api/actions", data=body)
-    context.close()
+    act(browser, at, "pace", {"paused": False, "factor": 1})

@@ -9,8 +9,8 @@ TUTORIAL = (ROOT / "docs/tutorials/drive.md").read_text(encoding="utf-8")
 LESSON = TUTORIAL.partition("## Drive\n")[2].partition("## Tilt your phone")[0]
 
 
-def test_everything_that_the_tutorial_names_in_bold_is_on_the_page(fake, shared):
-    page = shared(fake("--robots", "2", "--people", "4", "--site", "caparica").drive, "drive")
+def test_everything_that_the_tutorial_names_in_bold_is_on_the_page(console, shared):
+    page = shared(console().drive, "drive")
     named = set(re.findall(r"\*\*([^*]+)\*\*", LESSON)) - {"REQ/REP"}
     assert len(named) > 10
     page.get_by_role("button", name="robot-2 beside it").click()

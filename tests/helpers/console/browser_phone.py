@@ -21,7 +21,8 @@ WebSocket.prototype.send = function (text) {
   window.shaken = []; navigator.vibrate = (what) => window.shaken.push(what); }"""
 HIDE = """Object.defineProperty(document, 'hidden', {value: true, configurable: true});
 document.dispatchEvent(new Event('visibilitychange'));
-Object.defineProperty(document, 'hidden', {value: false, configurable: true});"""
+Object.defineProperty(document, 'hidden', {value: false, configurable: true});
+document.dispatchEvent(new Event('visibilitychange'));"""
 
 
 class Hand:

@@ -5,7 +5,8 @@ import time
 from typing import Any
 
 import numpy as np
-from helpers.processes.patience import PATIENCE_S, becomes
+from helpers.console.driving_page import start
+from helpers.processes.patience import PATIENCE_S
 from playwright.sync_api import Page
 
 from dva_sim.worlds.planning import Planner
@@ -85,26 +86,11 @@ class Driver:
 
     def _press(self, keys: set[str], seconds: float) -> None:
         """Hold keys for a while, then see what has come of it."""
-        self.start()
+        start(self._page, 1000 * (4 * self._delay + 0.5))
         self._hold(keys)
         self._page.wait_for_timeout(1000 * seconds)
         self._hold(set())
         self._page.wait_for_timeout(1000 * (2 * self._delay + 0.5))
-
-    def start(self) -> None:
-        """Begin to drive; on a machine that does much else, robots are held now and then."""
-        mode = self._page.get_by_role("status", name="Mode")
-        button = self._page.get_by_role("button", name="Start", exact=True)
-
-        def is_driven() -> bool:
-            if mode.inner_text() == "Teleoperation":
-                return True
-            if button.is_enabled():
-                button.click()
-            self._page.wait_for_timeout(1000 * (4 * self._delay + 0.5))
-            return False
-
-        assert becomes(is_driven)
 
     def _hold(self, keys: set[str]) -> None:
         for key in self._down - keys:
