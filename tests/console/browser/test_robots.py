@@ -276,7 +276,7 @@ def test_a_model_car_shows_its_motor_in_per_cent_and_three_ways_to_steer(program
 def test_a_name_that_is_hostile_is_shown_as_text(visit, console):
     sockets_of(visit.context, "state", renamed("robot-2"))
     page = visit.open(console, "robots")
-    page.get_by_role("table", name="Robots").get_by_role("link", name=HOSTILE).click()
+    page.get_by_role("list", name="Robots").get_by_role("link", name=HOSTILE).click()
     expect(page.get_by_role("heading", level=1)).to_have_text(HOSTILE)
     page.evaluate(
         "address => { location.hash = address; }", "#/robots/%3Cimg%20src=x%20onerror=alert(2)%3E"
@@ -292,5 +292,5 @@ def test_axe_finds_nothing_serious_and_nothing_is_too_wide(opened, shared, conso
     assert faults(page) == []
     assert page.evaluate("document.querySelector('.body').scrollWidth") <= width
     page = shared(console, "robots", width=width, scheme=scheme)
-    expect(page.get_by_role("table", name="Robots")).to_be_visible()
+    expect(page.get_by_role("list", name="Robots")).to_be_visible()
     assert faults(page) == []
