@@ -49,6 +49,7 @@ from dva_sim.protocol.missions import (
     Patrol,
     ReturnToBase,
 )
+from dva_sim.protocol.peers import HandOver, PeerBody, PeerStatus, Replicate, ServedRegion
 from dva_sim.protocol.places import Position
 from dva_sim.protocol.reply_codes import (
     BAD_MESSAGE,
@@ -334,6 +335,7 @@ class EventReport:
         severity: 0 (harmless) to 1.
         confidence: Confidence of the sender, 0 to 1.
         finding: `detected`, `confirmed`, `refuted` or `contained`.
+        origin: Id of the device that has reported it to another DVA, which passes it on.
     """
 
     event_id: int | None
@@ -342,6 +344,7 @@ class EventReport:
     severity: float
     confidence: float
     finding: str
+    origin: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -572,6 +575,7 @@ Body = (
     | TaskAward
     | Relocation
     | ControlRoomBody
+    | PeerBody
     | Reply
 )
 

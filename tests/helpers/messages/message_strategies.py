@@ -30,8 +30,8 @@ ids = st.from_regex(r"\A[0-9A-F]{2}(:[0-9A-F]{2}){5}\Z")
 clocks = st.from_regex(r"\A([01][0-9]|2[0-3])(:[0-5][0-9]){2}(\.[0-9]{1,9})?\Z")
 numbers = st.integers(1, UINT32)
 STRATEGIES: dict[str, st.SearchStrategy[Any]] = {
-    "actor advised author device holder id_tag operator responder stopped_by": ids,
-    "action activity device_type label name policy sensor sensors unit": characters(1, 64),
+    "actor advised author device dva holder id_tag operator origin responder stopped_by": ids,
+    "action activity device_type label name policy region sensor sensors unit": characters(1, 64),
     "note reason text": characters(0, 256),
     "age ago advised_in arrival_in bid_within closed_for decide_within held_for": real(0, 1e6),
     "service_time state_for stopped_for": real(0, 1e6),
@@ -42,8 +42,9 @@ STRATEGIES: dict[str, st.SearchStrategy[Any]] = {
     "latitude": real(-90, 90),
     "longitude": real(-180, 180),
     "values": real(-1e8, 1e8),
-    "event_id request_number": numbers,
-    "answers decisions mission_id newest size": st.integers(0, UINT32),
+    "epoch event_id fact request_number": numbers,
+    "answers decisions device_count free_responders": st.integers(0, UINT32),
+    "mission_id newest open_events size": st.integers(0, UINT32),
     "code": st.integers(0, 999),
     "laps": st.integers(0, 1000),
     "request": st.binary(max_size=300).map(lambda data: b64encode(data).decode()),
