@@ -32,6 +32,7 @@ HOLDER = "holder|"
 EMERGENCY = "emergency|"
 EVENT = "event|"
 AUDIT = "audit|"
+PEER_STATUS = "peer|"
 HEARTBEAT_PERIOD = 2.0  # design: [s]
 FIRST_WORD = 2.0  # design: after it a DVA that people have named is said not to answer [s]
 REGISTER_AGAIN = 2.0  # design: pause after a registration that was not answered, or refused [s]
@@ -39,7 +40,7 @@ REPORT_AGAIN = 5.0  # design: pause after a finding that the DVA could not keep 
 LONGEST_BID = 1e6  # design: no offer to go somewhere is longer [s]
 RENEW_PERIOD = 10.0  # design: from one registration to the next [s]
 
-Handler = Callable[[m.Message], m.Reply]
+Handler = Callable[[m.Message], m.Reply | None]
 
 
 def urgent(message: m.Message) -> bool:
@@ -60,7 +61,8 @@ class AgentDevice:
         label: Its name for people, as in `robot-1`.
         device_type: Type in its registration.
         address: Address in its registration.
-        dva: Id of the DVA.
+        dva: Id of the DVA that it is registered with, and obeys.
+        dvas: Ids of all DVAs that it knows, that of its region first; empty: the one.
         network: Transport of the messages.
         clock: The run's clock.
         recorder: Recorder of the run.
@@ -76,6 +78,8 @@ class AgentDevice:
         other_id: Description of how to give it another id, if its own is in use.
         dva_address: Address at which it looks for the DVA; empty if people need not know it.
         dva_watch: Watch on the DVA's heartbeats.
+        on_dva: Callback for another DVA, by id, that the device obeys from then on.
+        is_engaged: Predicate: True while the device has to stay with its DVA.
     """
 
     id_tag: str
@@ -96,7 +100,10 @@ class AgentDevice:
     meanwhile: str = ""
     other_id: str = ""
     dva_address: str = ""
+    dvas: tuple[str, ...] = ()
     dva_watch: DvaWatch = field(default_factory=DvaWatch)
+    on_dva: Callable[[str], object] = do_nothing
+    is_engaged: Callable[[], bool] = lambda: False
     clock: Clock = field(init=False)
     outbox: Outbox = field(init=False)
     _refusal: str = ""  # why it was not registered, as was told last
@@ -106,6 +113,7 @@ class AgentDevice:
     _replies: ReplyCache = field(default_factory=ReplyCache)
     _nuisances: Nuisances = field(default_factory=Nuisances)
     _dva_beats: Subscription | None = None
+    _turns: bool = False  # asks another DVA to register it
 
     def __post_init__(self) -> None:
         self.clock = self.network.clock
@@ -126,8 +134,13 @@ class AgentDevice:
             then: Called when the DVA has answered for the first time.
             hears_dva: True to listen to the DVA's heartbeats.
         """
-        self._register(then, self._life)
+        self._register(then, self._bond)
         self._begin_to_beat(hears_dva)
+
+    @property
+    def _bond(self) -> tuple[int, str]:
+        """The life and the DVA that a registration is of."""
+        return self._life, self.dva
 
     def _begin_to_beat(self, hears_dva: bool = True) -> None:
         """Publish heartbeats, and listen to those of the DVA."""
@@ -153,7 +166,7 @@ class AgentDevice:
 
         def answered(reply: m.Reply) -> None:
             if reply.code == m.OK:
-                self.clock.call_after(RENEW_PERIOD, self._register, do_nothing, self._life)
+                self.clock.call_after(RENEW_PERIOD, self._register, do_nothing, self._bond)
                 self._begin_to_beat()
             on_reply(reply)
 
@@ -193,15 +206,15 @@ class AgentDevice:
         """Have a new life, and be registered nowhere as yet."""
         self.silent = False
 
-    def _register(self, then: Callable[[], object], life: int) -> None:
-        if life != self._life:
+    def _register(self, then: Callable[[], object], bond: tuple[int, str]) -> None:
+        if bond != self._bond:
             return
 
         def answered(reply: m.Reply) -> None:
             if reply.code == m.OK:
                 self._refusal = ""
                 then()
-                self.clock.call_after(RENEW_PERIOD, self._register, do_nothing, life)
+                self.clock.call_after(RENEW_PERIOD, self._register, do_nothing, bond)
                 return
             refusal = self.why_refused(reply)
             if refusal != self._refusal:  # report a repeated refusal once
@@ -210,12 +223,59 @@ class AgentDevice:
             failed()
 
         def failed() -> None:
-            self.clock.call_after(REGISTER_AGAIN, self._register, then, life)
+            self.clock.call_after(REGISTER_AGAIN, self._register, then, bond)
 
         if self.withdrawn:
             failed()
             return
         self.ask(self.dva, self._registration, answered, failed)
+
+    def turn_to(self, dva: str) -> None:
+        """Register with another DVA; from its confirmation on, obey that one and no other (S12)."""
+        if self._turns:
+            return
+        self._turns = True
+        life = self._life
+
+        def answered(reply: m.Reply) -> None:
+            self._turns = False
+            if reply.code == m.OK and life == self._life:
+                self._obey(dva)
+
+        def failed() -> None:
+            self._turns = False
+
+        self.ask(dva, self._registration, answered, failed)
+
+    def _obey(self, dva: str) -> None:
+        """Belong to another DVA; what the last one was asked has failed."""
+        before = self.dva
+        self.dva = dva
+        self.dva_watch = DvaWatch()
+        self.dva_watch.answered(self.clock.now)
+        if self._dva_beats is not None:
+            self._dva_beats.close()
+            hear = self._on_dva_beat
+            self._dva_beats = self.network.subscribe(self.id_tag, dva, HEARTBEAT, hear)
+        self.clock.call_after(RENEW_PERIOD, self._register, do_nothing, self._bond)
+        own = self.label_of(dva)
+        self.tell(f"is registered with {own} instead of {self.label_of(before)}", "link")
+        self.on_dva(dva)
+        self.give_up(before)
+
+    def _handed_over(self, message: m.Message, body: m.HandOver) -> m.Reply:
+        """Turn to another DVA, if the own one asks for that, and nothing holds the device back."""
+        number = message.message_id
+        if message.source != self.dva:
+            return m.Reply(number, m.NOT_PERMITTED, "only the DVA hands its devices over")
+        if body.dva not in self.dvas:
+            return m.Reply(number, m.UNKNOWN_DEVICE, f"no DVA {body.dva} is known here")
+        if self.is_engaged():
+            return m.Reply(number, m.BUSY, "has something to do for this DVA")
+        if body.address is not None:
+            self.introduce(body.dva, body.address)
+        self.clock.call_after(0.0, self.turn_to, body.dva)
+        return m.Reply(number, m.OK, "")
 
     def why_refused(self, reply: m.Reply) -> str:
         """Return why it was not registered, and what people can do about it."""
@@ -286,12 +346,16 @@ class AgentDevice:
         for requester in self._requesters.values():
             requester.timeout = timeout
 
-    def forget(self, peer: str) -> None:
-        """A peer is there no more: what it was asked has failed."""
+    def give_up(self, peer: str) -> None:
+        """Treat whatever a peer was asked as failed."""
         for key in [(peer, False), (peer, True)]:
             requester = self._requesters.pop(key, None)
             if requester is not None:
                 requester.give_up()
+
+    def forget(self, peer: str) -> None:
+        """A peer is there no more: what it was asked has failed."""
+        self.give_up(peer)
         self._addresses.pop(peer, None)
         self.network.forget(peer)
 
@@ -398,7 +462,10 @@ class AgentDevice:
         key = key_of(request.sender, request.data)
         reply = self._replies.get(key)
         if reply is None:
-            body = handler(message)
+            if isinstance(message.body, m.HandOver):
+                body: m.Reply | None = self._handed_over(message, message.body)
+            else:
+                body = handler(message)
             if body is None:
                 return
             if body.code != m.OK:
@@ -515,7 +582,12 @@ class AgentDevice:
         """Say when the DVA has fallen silent, and when it is back."""
         now = self.clock.now
         watch = self.dva_watch
-        if not watch.look(now) or self.silent:
+        has_changed = watch.look(now)
+        if self.silent:
+            return
+        if watch.silent and len(self.dvas) > 1:
+            self.turn_to(self.dvas[(self.dvas.index(self.dva) + 1) % len(self.dvas)])
+        if not has_changed:
             return
         if watch.silent:
             self.recorder.counters["the DVA was silent to a device"] += 1

@@ -354,6 +354,7 @@ class EventTable:
         open: Open events by number, oldest first.
         closed: The last that were closed.
         total: Number of events ever opened.
+        first: Number before that of the first event, where several DVAs number events.
         counts: Number of events in each state; they add up to `total` (S6).
     """
 
@@ -361,6 +362,7 @@ class EventTable:
     open: dict[int, Event] = field(default_factory=dict)
     closed: OrderedDict[int, Event] = field(default_factory=OrderedDict)
     total: int = 0
+    first: int = 0
     counts: dict[State, int] = field(default_factory=lambda: dict.fromkeys(State, 0))
     waiting: dict[int, Event] = field(default_factory=dict)
     _changed: dict[int, Event] = field(default_factory=dict)
@@ -412,7 +414,8 @@ class EventTable:
     ) -> Event:
         """A new event."""
         self.total += 1
-        event = Event(self.total, kind, position, severity, contain, waiting_since=now)
+        number = self.first + self.total
+        event = Event(number, kind, position, severity, contain, waiting_since=now)
         event.times["detected"] = now
         self.counts[event.state] += 1
         self.open[event.number] = self.waiting[event.number] = event

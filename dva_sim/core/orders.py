@@ -40,6 +40,7 @@ class Orders:
         counters: Counters by name.
         trail: Trail of decisions.
         emergencies: Robots that cannot be sent, as an emergency holds them.
+        unwatched: Devices that answer for others, and whose own moves say nothing.
     """
 
     rules: Rules
@@ -50,6 +51,7 @@ class Orders:
     counters: Counter[str] = field(default_factory=Counter)
     trail: AuditTrail = field(default_factory=AuditTrail)
     emergencies: Emergencies = field(default_factory=Emergencies)
+    unwatched: set[str] = field(default_factory=set)
     _pauses: list[float] = field(default_factory=list)
     _from_afar: set[tuple[str, int]] = field(default_factory=set)  # who said so, of which event
     _promises: Promises = field(init=False)
@@ -317,7 +319,7 @@ class Orders:
         for device in self.engaged:
             event, *others = self.engaged.all(device)
             owes = self._owes(device, event)
-            if owes == MOVE and others:
+            if owes == MOVE and (others or device in self.unwatched):
                 continue
             who = device if device == event.actor else event.responder
             if owes and who is not None:

@@ -90,6 +90,10 @@ class SituationBuilder:
         self.auctions.forget_useless(team.idle())
         return PolicyView(self._situation(events, team, now), events, team)
 
+    def idle(self, now: float) -> set[str]:
+        """Ids of guards and robots that could be sent somewhere now."""
+        return self._team(now).idle()
+
     # --- who is on the way to wait somewhere ---------------------------------------------
 
     def sends_to_wait(self, guard: str, station: int, eta: float, now: float) -> None:

@@ -45,7 +45,7 @@ def keep_run(run: Run, kept: LiveRecorder) -> None:
         kept.observe,
         robots=field.robots,
         look=lambda robot: motion_of(field.robots[robot]),
-        page=lambda: page_of(run.dva),
+        page=lambda _: page_of(run.dva),
         keeps_sent=False,
     )
     facts()

@@ -121,10 +121,16 @@ class DvaPart:
         agent = self.agent
         clock = stage.clock
         agent.on_fact = lambda fact: recorder.put("fact", fact.row())
-        page = partial(page_of, agent)
-        log = FactLog(recorder.observe, (), lambda _: STATIONARY, page, keeps_sent=False)
+        log = FactLog(
+            recorder.observe,
+            (),
+            lambda _: STATIONARY,
+            lambda _: page_of(agent),
+            dvas={agent.device.id_tag},
+            keeps_sent=False,
+        )
         recorder.log = log
-        clock.every(WATCH_PERIOD, lambda: log.shows(clock.now, page()))
+        clock.every(WATCH_PERIOD, lambda: log.shows(clock.now, page_of(agent)))
 
     def keep(self, recorder: LiveRecorder) -> None:
         """See `LivePart`: how the events stand."""

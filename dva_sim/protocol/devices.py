@@ -11,6 +11,7 @@ OPERATOR: Final = "TeleOp"
 DETECTOR: Final = "Sensor"
 REMOTE: Final = "Remote Control"  # may drive robots, and is sent no orders
 CONTROL_ROOM: Final = "ControlRoom"  # sees and decides; may drive as its role allows
+PEER: Final = "DVA"  # another DVA, which serves other regions
 
 FORGET_AFTER: Final = 60.0  # without a word of it [s]
 

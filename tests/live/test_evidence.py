@@ -225,7 +225,7 @@ def test_registrations_of_strangers_without_an_order_are_no_facts(has_order):
     recorder = LiveRecorder(Clock(), PipeEnd(writes), keeps=False)
     recorder.is_own = {DVA}.__contains__
     recorder.log = FactLog(
-        recorder.observe, (), lambda _: STATIONARY, lambda: PAGE, keeps_sent=False
+        recorder.observe, (), lambda _: STATIONARY, lambda _: PAGE, keeps_sent=False
     )
     stranger = "AA:BB:CC:DD:EE:01"
     if has_order:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from dva_sim.agents.control_room.history import EventHistory
 from dva_sim.agents.device import AUDIT, EVENT, AgentDevice, do_nothing
+from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
 REFRESH = 10.0  # design: from one look at the whole list to the next, as news may be lost [s]
@@ -41,6 +42,7 @@ class ControlRoomAgent:
 
     def __init__(self, device: AgentDevice) -> None:
         self.device = device
+        self._listening: list[Subscription] = []
         self.events: dict[int, m.EventStatus] = {}
         self.received_at: dict[int, float] = {}
         self.histories: dict[int, EventHistory] = {}
@@ -60,10 +62,19 @@ class ControlRoomAgent:
         """Register, listen to the DVA, and ask it for the whole list now and then."""
         device = self.device
         device.serve(self._on_request)
-        for topic in (EVENT, AUDIT):
-            device.network.subscribe(device.id_tag, device.dva, topic, self._on_published)
+        self._listen(device.dva)
+        device.on_dva = self._listen
         device.register(self.refresh)
         device.clock.every(REFRESH, self.refresh, start=device.clock.now + REFRESH)
+
+    def _listen(self, dva: str) -> None:
+        """Listen to a DVA, and to no other."""
+        for subscription in self._listening:
+            subscription.close()
+        device = self.device
+        heard = self._on_published
+        topics = EVENT, AUDIT
+        self._listening = [device.network.subscribe(device.id_tag, dva, t, heard) for t in topics]
 
     def refresh(self) -> None:
         """Ask for the whole list, who is there, and how orders are given, if it takes part."""

@@ -79,6 +79,8 @@ class GuardAgent(OnFoot):
         self._contain = contain
         self._smoke = smoke
         self._protocol = GuardProtocol(device.dva, walker.mobilisation, self._is_at)
+        device.on_dva = self._protocol.obey
+        device.is_engaged = lambda: self._protocol.order is not None
         self.exposure.start(self._felt)
         device.serve(self._on_request)
 

@@ -72,6 +72,10 @@ class GuardProtocol:
         default_factory=OrderedDict
     )
 
+    def obey(self, dva: str) -> None:
+        """Take orders of another DVA from now on; the one in hand goes on."""
+        self.dva = dva
+
     @property
     def order(self) -> m.Order | None:
         """The order that the guard has."""

@@ -79,6 +79,8 @@ class PersonGuard(OnFoot):
         self._stage = ""  # of the order: departed, arrived
         self._order_at: Point = walking.place
         self._protocol = GuardProtocol(device.dva, 0.0, self._is_at)
+        device.on_dva = self._protocol.obey
+        device.is_engaged = lambda: self._protocol.order is not None
         self.exposure.start(self._felt)
         device.serve(self._on_request)
 

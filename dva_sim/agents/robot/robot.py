@@ -144,6 +144,8 @@ class RobotAgent:
         self.device = device
         self.controller = controller
         device.meanwhile = "it obeys its driver as before"
+        device.on_dva = self._obeys
+        device.is_engaged = lambda: controller.mode is not Mode.IDLE
         device.clock.on_suspended(self._woke)
         self.body = body
         self._world = world
@@ -290,6 +292,11 @@ class RobotAgent:
         self.device.register()
         self.device.connect(self.device.dva)
         self._confirmations.ask()
+
+    def _obeys(self, dva: str) -> None:
+        """Believe another DVA from now on; who drives the robot goes on."""
+        self.controller.dva = dva
+        self.device.connect(dva)
 
     def withdraw(self, why: str) -> None:
         """Stand idle, and take no order until `return_to_service`: nobody can drive it safely.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -24,6 +25,8 @@ from dva_sim.core.dispatch import load_policy
 from dva_sim.core.dispatcher import Patrols
 from dva_sim.core.dva import Dva
 from dva_sim.core.permissions import Access, AccessRule
+from dva_sim.core.regions.division import Division
+from dva_sim.core.regions.regional_dva import RegionalDva
 from dva_sim.core.roles import Roles
 from dva_sim.core.sensing import Sensing, SensorAlarm
 from dva_sim.core.sessions import Permissions, Sessions
@@ -35,7 +38,8 @@ from dva_sim.network.patterns import Pattern
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.simulation.full.dva_server import DvaAgent
-from dva_sim.simulation.full.stage import DVA, Stage, control_rooms_of, middle_of
+from dva_sim.simulation.full.regional_agent import RegionalDvaAgent
+from dva_sim.simulation.full.stage import Stage, control_rooms_of, id_of, middle_of
 from dva_sim.simulation.scenario import (
     Scenario,
     command_timeout_s,
@@ -53,6 +57,7 @@ def add_dva(
     permissions: Permissions | None = None,
     memory: Store | None = None,
     keep_events: bool = True,
+    number: int = 1,
 ) -> DvaAgent:
     """The DVA; sessions are drawn by the run's seed where no other `permissions` are given.
 
@@ -60,24 +65,38 @@ def add_dva(
         permissions: Permissions, if not drawn by the seed.
         memory: State that survives the DVA.
         keep_events: True to keep all past events, for a recording.
+        number: Number among the DVAs of the regions.
 
     Raises:
         ConfigError: a policy that cannot be loaded.
     """
-    draw = stage.streams["dva/sessions"]
+    device = stage.device("dva", number)
+    draw = stage.streams[f"{_stream_of(number)}/sessions"]
     permissions = permissions or Permissions(lambda: int(draw.integers(2**LOW_BITS)))
-    core = make_core(stage, permissions)
-    return DvaAgent(stage.device("dva", 1), core, memory, keep_events, is_public=stage.attended)
+    core = make_core(stage, permissions, number)
+    if isinstance(core, RegionalDva):
+        kept = {"memory": memory, "keep_events": keep_events}
+        return RegionalDvaAgent(device, core, is_public=stage.attended, **kept)
+    return DvaAgent(device, core, memory, keep_events, is_public=stage.attended)
 
 
-def make_core(stage: Stage, permissions: Permissions) -> Dva:
+def _stream_of(number: int) -> str:
+    return "dva" if number == 1 else f"dva-{number}"
+
+
+def make_core(stage: Stage, permissions: Permissions, number: int = 1) -> Dva:
     """Build the DVA that a scenario wants.
+
+    Args:
+        stage: The stage.
+        permissions: Permissions.
+        number: Number among the DVAs of the regions.
 
     Raises:
         ConfigError: a policy that cannot be loaded.
     """
     dispatch = stage.scenario.dispatch
-    permissions.own = DVA
+    permissions.own = id_of("dva", number)
     rate_hz = stage.scenario.dva.sensor_rate_hz
     policy = load_policy(dispatch.policy, dispatch.options)
     ids = {label: id_tag for id_tag, label in stage.labels.items()}
@@ -92,7 +111,9 @@ def make_core(stage: Stage, permissions: Permissions) -> Dva:
         )
         for rule in stage.scenario.access
     ]
-    return Dva(
+    division = None if stage.regions is None else _division(stage, permissions.own)
+    kind = Dva if division is None else partial(RegionalDva, division=division)
+    return kind(
         policy,
         _Ways(stage),
         replace(
@@ -101,7 +122,7 @@ def make_core(stage: Stage, permissions: Permissions) -> Dva:
             arrived_within=at_event_m(stage.scenario),
             severity_moves=stage.follows_severity,
         ),
-        rng=stage.streams["dva/policy"],
+        rng=stage.streams[f"{_stream_of(number)}/policy"],
         sessions=Sessions(permissions),
         ground=_ground(stage) if policy.relocates else SiteKnowledge(),
         access=Access(rules) if rules else Access(),
@@ -112,6 +133,19 @@ def make_core(stage: Stage, permissions: Permissions) -> Dva:
         ask_first=dispatch.mode == "ask_first",
         policy_name=dispatch.policy.rpartition(":")[2],
         release=stage.release,
+    )
+
+
+def _division(stage: Stage, own: str) -> Division:
+    """Return the division of the site, as the DVA with this id knows it at first."""
+    plan = stage.regions
+    assert plan is not None, "one DVA serves everything"
+    to_xy = stage.site.frame.to_xy
+    return Division(
+        own,
+        {name: stage.dvas_for(name) for name in plan.names},
+        lambda place: plan.region_at(*to_xy(place.latitude, place.longitude)),
+        lambda region, place: plan.outside(region, *to_xy(place.latitude, place.longitude)),
     )
 
 

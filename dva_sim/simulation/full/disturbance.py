@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from dva_sim.agents.device import AgentDevice
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
@@ -16,13 +18,13 @@ class Disturbance:
     """Waits for the first drive, and then ends its permission, or what else the scenario says.
 
     Args:
-        dva: DVA that grants and revokes permissions.
+        dva_of: Function that returns the DVA that grants and revokes permissions for a robot.
         field: The robots.
     """
 
-    def __init__(self, stage: Stage, dva: DvaAgent, field: Field) -> None:
+    def __init__(self, stage: Stage, dva_of: Callable[[str], DvaAgent], field: Field) -> None:
         self._stage = stage
-        self._dva = dva
+        self._dva_of = dva_of
         self._field = field
         self._config = stage.scenario.disturbance
         if self._config.kind == "take_over":
@@ -51,4 +53,4 @@ class Disturbance:
             self._field.robots[drive.robot].refuses = m.NOT_PERMITTED
             return
         takes = self._other.id_tag if self._config.kind == "take_over" else None
-        self._dva.revoke(drive.robot, takes, self._config.holder_told)
+        self._dva_of(drive.robot).revoke(drive.robot, takes, self._config.holder_told)

@@ -13,6 +13,7 @@ from dva_sim.agents.device import (
     EVENT,
     HEARTBEAT,
     HEARTBEAT_PERIOD,
+    PEER_STATUS,
     STATUS,
     AgentDevice,
     do_nothing,
@@ -28,7 +29,7 @@ from dva_sim.core.store import Store
 from dva_sim.network.messaging import Request, Subscription
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, decode_if_valid
-from dva_sim.protocol.devices import CONTROL_ROOM, DETECTOR, GUARD, ROBOT
+from dva_sim.protocol.devices import CONTROL_ROOM, DETECTOR, GUARD, PEER, ROBOT
 from dva_sim.protocol.facts import Fact
 
 MOST_REPORTED = 20_000  # events whose last word is remembered, so that none is said twice
@@ -58,6 +59,7 @@ class DvaAgent:
         beats: Heartbeats heard, by device.
         leave_after: Time that a silent device is still listened to before it leaves [s].
         events: Every event there ever was, by number, where `keep_events`.
+        copies: Numbers of those that it looked at for another DVA.
         facts: Decisions; only the latest ones, unless `keep_events`.
         on_fact: Callback for each fact as it is taken from the core.
         is_gone: True once it has crashed; another one may take its place.
@@ -75,6 +77,7 @@ class DvaAgent:
         self.device = device
         self.core = core
         self.events: dict[int, Event] = {}
+        self.copies: set[int] = set()
         self.facts: deque[Fact] = deque(maxlen=None if keep_events else MOST_KEPT)
         self.on_fact: Callable[[Fact], object] = do_nothing
         self._asks = core.dispatcher.questions.asks
@@ -204,7 +207,7 @@ class DvaAgent:
         else:
             self.device.take(request, self._on_request)
 
-    def _on_request(self, message: m.Message) -> m.Reply:
+    def _on_request(self, message: m.Message) -> m.Reply | None:
         reply, sends = self.core.handle(message, self.device.clock.now)
         if isinstance(message.body, m.Registration) and reply.code != m.OK:
             self._tell_refused(message.source, message.body, reply.text)
@@ -282,6 +285,8 @@ class DvaAgent:
             return
         self._leave(source)
         topics = [] if device.device_type == DETECTOR else [HEARTBEAT]
+        if device.device_type == PEER:
+            topics.append(PEER_STATUS)
         if device.device_type in (ROBOT, GUARD):
             topics.append(STATUS)
         if device.device_type == ROBOT:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
@@ -123,6 +123,7 @@ class EventLedger:
         place_of: True position of a device.
         at_event: Distance within which a device may have seen the event [m].
         name: Function that returns the name of a device by its id.
+        books: Ledgers of all DVAs: an event may be in the book of another one.
 
     Attributes:
         knows_places: True if true positions are known; otherwise devices are believed.
@@ -135,7 +136,9 @@ class EventLedger:
         place_of: Callable[[str], m.Position | None],
         at_event: float,
         name: Callable[[str], str],
+        books: Collection[EventLedger] = (),
     ) -> None:
+        self._books = books
         self._events = EventTable()
         self._rules = rules
         self._dva = dva
@@ -284,8 +287,8 @@ class EventLedger:
             word.found.add(finding)
 
     def _is_near(self, device: str, event: Event) -> bool:
-        if not self.knows_places:
-            return True
+        if not self.knows_places or any(device == book._dva for book in self._books):
+            return True  # another DVA has its own ledger, by which whom it sends is judged
         place = self._place_of(device)
         return place is not None and apart(place, event.position) <= self._at_event
 
@@ -344,7 +347,8 @@ class EventLedger:
                     yield "S6", f"{count} events are {state}, but {events.counts[state]} counted"
         for number in events.open.keys() & events.closed.keys():
             yield "S6", f"event {number} is open and closed"
-        for number in self._open.keys() - events.open.keys() - events.closed.keys():
+        gone = self._open.keys() - events.open.keys() - events.closed.keys()
+        for number in [n for n in gone if not self._is_elsewhere(n)]:
             yield "S6", f"event {number} was open, but the DVA does not list it"
         self._promised = {n: at for n, at in self._promised.items() if n in events.open}
         for number in self._lost.keys() & events.open.keys():
@@ -361,6 +365,8 @@ class EventLedger:
         self._seen = {}
         for event in every:
             old = seen.get(event.number)
+            if old is None and last > -math.inf and self._is_elsewhere(event.number):
+                old = self._adopted(event, now)
             if old is not None and old.is_over and not event.open and old.times == event.times:
                 self._seen[event.number] = old
             else:
@@ -404,7 +410,8 @@ class EventLedger:
         """Yield the events, open or closed, that fit a report."""
         near = max(self._rules.merge_distance, SAME_SPOT)
         kind = report.kind
-        known = (*self._events.open.values(), *self._events.closed.values())
+        tables = [self._events, *(book._events for book in self._books if book is not self)]
+        known = (e for t in tables for e in (*t.open.values(), *t.closed.values()))
         same = (e for e in known if e.kind == kind)
         return (e for e in same if apart(e.position, report.position) < near)
 
@@ -414,14 +421,21 @@ class EventLedger:
         Their responders count as ordered there, although no order was heard here.
         """
         for event in (*self._events.open.values(), *self._events.closed.values()):
-            word = self._word(event.number)
-            sent = {event.operator: event.responder, event.responder: event.responder}
-            sent[event.actor] = event.actor
-            self._promised[event.number] = 0.0
-            word.ordered.update((who, goes or who) for who, goes in sent.items() if who)
-            word.went.update(word.ordered.items())
-            found = FOUND.intersection((*event.times, event.state.value))
-            self._seen[event.number] = Seen(found, _in_hand(event), now, now, now)
+            self._seen[event.number] = self._adopted(event, now)
+
+    def _adopted(self, event: Event, now: float) -> Seen:
+        word = self._word(event.number)
+        sent = {event.operator: event.responder, event.responder: event.responder}
+        sent[event.actor] = event.actor
+        self._promised[event.number] = 0.0
+        word.ordered.update((who, goes or who) for who, goes in sent.items() if who)
+        word.went.update(word.ordered.items())
+        found = FOUND.intersection((*event.times, event.state.value))
+        return Seen(found, _in_hand(event), now, now, now, times=dict(event.times))
+
+    def _is_elsewhere(self, number: int) -> bool:
+        """Return True for an event that another DVA has had."""
+        return any(number in book._seen for book in self._books if book is not self)
 
     def _let_no_time_pass(self, passed: float) -> None:
         """Shift all deadlines: a DVA that was silenced decides nothing meanwhile."""

@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 from dva_sim.kernel.recorder import Accepted, ByHand
 from dva_sim.protocol.messages import Position
 from dva_sim.simulation.full import observations as o
+from dva_sim.simulation.full.stage import DVA
 
 DIGITS = 5  # of what is measured: ticks of the motors and slacks of the rules are far longer
 
@@ -118,13 +119,16 @@ def _read_places(time: float, content: Mapping[str, Any]) -> o.PlaceNews:
 
 def _write_events(fact: o.BookNews) -> Plain:
     rights = None if fact.rights is None else [right._asdict() for right in fact.rights]
-    return _EVENTS.write(fact) | {"rights": rights}
+    written = _EVENTS.write(fact) | {"rights": rights}
+    if fact.dva == DVA and not fact.copies:  # as it was written before there were several
+        del written["dva"], written["copies"]
+    return written
 
 
 def _read_events(time: float, content: Mapping[str, Any]) -> o.BookNews:
     rights = content["rights"] and [o.Right(**right) for right in content["rights"]]
-    news: o.BookNews = _EVENTS.read(time, content)
-    return news._replace(rights=rights)
+    news: o.BookNews = _EVENTS.read(time, {"dva": DVA, "copies": ()} | dict(content))
+    return news._replace(rights=rights, copies=tuple(news.copies))
 
 
 _EVENTS: Final = _as_named(o.BookNews)

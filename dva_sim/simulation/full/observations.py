@@ -8,8 +8,8 @@ sent a message, and its body shows whether it has stopped.
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections import OrderedDict, defaultdict
+from collections.abc import Callable, Collection, Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, Protocol
 
@@ -18,11 +18,12 @@ from dva_sim.agents.robot.emergency_latch import DRIVE
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import Event, EventTable, State
+from dva_sim.core.regions.regional_dva import RegionalDva
 from dva_sim.kernel.recorder import Accepted, ByHand, Sent
 from dva_sim.protocol.messages import Position, ReleasedBy
 from dva_sim.simulation.full.control_room import at_event_m
 from dva_sim.simulation.full.dva_server import DvaAgent
-from dva_sim.simulation.full.stage import DVA, id_of, label_of, release_of
+from dva_sim.simulation.full.stage import DVA, dvas_of, id_of, label_of, release_of
 from dva_sim.simulation.scenario import Scenario, robot_profiles
 from dva_sim.worlds.bodies import GRIP
 
@@ -48,7 +49,7 @@ class SafetyTerms:
         processing: Mean time that a message takes a robot's computer [s].
         motors: Limits of the robots by id.
         labels: Names by id, for what is said of somebody.
-        dva: Id of the DVA.
+        dvas: Ids of the DVAs.
         release: Rule by which robots are released after an emergency; None: as the DVA says.
     """
 
@@ -59,7 +60,7 @@ class SafetyTerms:
     processing: float = 0.0
     motors: dict[str, MotorLimits] = field(default_factory=dict)
     labels: dict[str, str] = field(default_factory=dict)
-    dva: str = DVA
+    dvas: tuple[str, ...] = (DVA,)
     release: ReleasedBy | None = DRIVE
 
     def about_robots(self) -> dict[str, Any]:
@@ -84,7 +85,8 @@ def terms_of(
     """
     rules = replace(scenario.dispatch.rules(), operator_span=scenario.operator.span)
     limits = scenario.robot.watchdog_s, scenario.robot.max_age_s
-    terms = SafetyTerms(*limits, rules, at_event_m(scenario), labels={DVA: label_of("dva", 1)})
+    labels = dvas_of(scenario)
+    terms = SafetyTerms(*limits, rules, at_event_m(scenario), labels=labels, dvas=tuple(labels))
     terms.release = release_of(scenario, attended)
     for kind in ("robot", "guard", "operator"):
         count = getattr(scenario, kind).count
@@ -167,18 +169,23 @@ class Page(NamedTuple):
         events: The events.
         rights: Permissions to act on robots.
         works: False while the DVA is silenced: then it decides nothing.
+        dva: Id of the DVA.
+        copies: Events that it looks at for another DVA.
     """
 
     events: EventTable
     rights: Sequence[Right]
     works: bool
+    dva: str = DVA
+    copies: Collection[int] = ()
 
 
 def page_of(dva: DvaAgent) -> Page:
     """Return the present page of a DVA's book."""
     grants = dva.core.sessions.permissions.grants.values()
     rights = [Right(grant.robot, grant.holder, grant.session) for grant in grants]
-    return Page(dva.core.events, rights, not dva.device.silent)
+    copies = dva.core.help.copies if isinstance(dva.core, RegionalDva) else ()
+    return Page(dva.core.events, rights, not dva.device.silent, dva.device.id_tag, copies)
 
 
 class Listener(Protocol):
@@ -292,6 +299,8 @@ class BookNews(NamedTuple):
         counts: Number of events in each state; None: as before.
         rights: Permissions to act on robots; None: as before.
         works: False while the DVA is silenced.
+        dva: Id of the DVA.
+        copies: Events that it looks at for another DVA.
     """
 
     time: float
@@ -301,6 +310,8 @@ class BookNews(NamedTuple):
     counts: dict[str, int] | None
     rights: list[Right] | None
     works: bool
+    dva: str = DVA
+    copies: tuple[int, ...] = ()
 
 
 class Deafened(NamedTuple):
@@ -346,9 +357,10 @@ class FactLog:
     Args:
         put: Callback for facts, in order.
         robots: Ids of the robots whose facts are kept.
-        dva: Id of the DVA.
+        dvas: Ids of the DVAs.
         look: Function that returns the motion of a robot now, by its id.
-        page: Function that returns the current page of the DVA's book; None: the DVA is elsewhere.
+        page: Function that returns the current page of a DVA's book, by its id; None: the DVA is
+            elsewhere.
         keeps_sent: Keep sent messages, too; else the caller does that.
     """
 
@@ -357,21 +369,21 @@ class FactLog:
         put: Put,
         robots: Container[str],
         look: Callable[[str], RobotMotion],
-        page: Callable[[], Page] | None = None,
+        page: Callable[[str], Page] | None = None,
         *,
-        dva: str = DVA,
+        dvas: Container[str] = (DVA,),
         keeps_sent: bool = True,
     ) -> None:
         self._put = put
         self._robots = robots
-        self._dva = dva
+        self._dvas = dvas
         self._look = look
         self._page = page
         self._keeps_sent = keeps_sent
         self._motions: dict[str, RobotMotion] = {}
         self._places: dict[str, Position] = {}
         self._heard: dict[str, None] = {}
-        self._events = _EventTableDiff()
+        self._events: defaultdict[str, _EventTableDiff] = defaultdict(_EventTableDiff)
 
     @property
     def sees_dva(self) -> bool:
@@ -392,18 +404,18 @@ class FactLog:
         if isinstance(payload, bytes):
             if source in self._robots and b"<reply>" in payload:
                 self._note_motions(now, {source: self._look(source)})
-            elif source == self._dva and self._page is not None and b"<Order>" in payload:
-                self._put(self._events.news(now, self._page()))
+            elif source in self._dvas and self._page is not None and b"<Order>" in payload:
+                self._put(self._events[source].news(now, self._page(source)))
         if self._keeps_sent:
             self._put(Sent(now, source, to, 0, payload))
 
     def delivered(self, now: float, source: str, to: str, payload: Any) -> None:
         """Implement `Observer`."""
-        if not isinstance(payload, bytes) or not (to == self._dva or to in self._robots):
+        if not isinstance(payload, bytes) or not (to in self._dvas or to in self._robots):
             return
         if not any(quiet in payload for quiet in _QUIET):
             self._put(Arrived(now, source, to, payload))
-        elif to == self._dva:
+        elif to in self._dvas:
             self.heard(source)
 
     def accepted(self, command: Accepted) -> None:
@@ -440,7 +452,7 @@ class FactLog:
         if self._heard:
             self._put(Heard(now, tuple(self._heard)))
             self._heard.clear()
-        self._put(self._events.news(now, page))
+        self._put(self._events[page.dva].news(now, page))
 
     def deafened(self, now: float, robot: str, deaf: bool) -> None:
         """Implement `Observer`."""
@@ -509,6 +521,8 @@ class _EventTableDiff:
             counts=counts if counts != self._counts else None,
             rights=rights if rights != self._rights else None,
             works=page.works,
+            dva=page.dva,
+            copies=tuple(page.copies),
         )
         self._counts = counts
         self._rights = rights
@@ -541,7 +555,7 @@ class EventTableCopy:
             events.counts = {State(state): count for state, count in news.counts.items()}
         if news.rights is not None:
             self._rights = news.rights
-        return Page(events, self._rights, news.works)
+        return Page(events, self._rights, news.works, news.dva, news.copies)
 
     def _put(self, facts: Mapping[str, Any]) -> None:
         number = facts["number"]

@@ -17,7 +17,7 @@ from dva_sim.kernel.recorder import TrackPoint
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.event_kinds import severity_word
 from dva_sim.simulation.full.hazards import Danger, Hearsay, RunHazard, RunHazards
-from dva_sim.simulation.full.stage import DVA, Stage
+from dva_sim.simulation.full.stage import Stage
 from dva_sim.simulation.full.team import TeamBuilder
 from dva_sim.worlds.hazards import Conditions
 from dva_sim.worlds.physics import World
@@ -138,9 +138,9 @@ class Field(RunHazards):
 
     def _let_report(self, number: int, label: str, what: Hearsay, incident: RunHazard) -> None:
         stage = self.stage
-        device = stage.device("detector", number)
+        device = stage.device("detector", number, what.position)
         device.label = stage.labels[device.id_tag] = label
-        device.register(hears_dva=False)
+        device.register(hears_dva=len(device.dvas) > 1)
         stage.clock.call_at(what.time, self._report, device, incident, what.position)
 
     def _report(self, device: AgentDevice, incident: RunHazard, place: tuple[float, float]) -> None:
@@ -175,7 +175,7 @@ class Field(RunHazards):
         def again() -> None:
             self.stage.clock.call_after(REPORT_AGAIN, self._say, device, body)
 
-        device.ask(DVA, body, lambda reply: None if reply.code == m.OK else again(), again)
+        device.ask(device.dva, body, lambda reply: None if reply.code == m.OK else again(), again)
 
     def _sound_alarm(self) -> None:
         """Sound the alarm that everybody in the building hears after a report."""

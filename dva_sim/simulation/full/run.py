@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 from dva_sim.agents.observation import OVER_ZMQ, Cameras
 from dva_sim.agents.people.bystander import ALARMED, EVACUATING, SAFE, BystanderAgent
+from dva_sim.core.events import Event
 from dva_sim.core.store import Store
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Accepted, ByHand, Recorder
@@ -28,12 +29,15 @@ from dva_sim.network.link.link import Reception, make_link
 from dva_sim.network.messaging import Transport
 from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.protocol.exchange import NOON
+from dva_sim.protocol.facts import Fact
 from dva_sim.simulation.full.control_room import add_dispatcher, add_dva, add_operator
 from dva_sim.simulation.full.disturbance import Disturbance
+from dva_sim.simulation.full.dva_server import DvaAgent
 from dva_sim.simulation.full.observations import (
     FactLog,
     Listener,
     Observer,
+    Page,
     RobotMotion,
     motion_of,
     page_of,
@@ -48,8 +52,9 @@ from dva_sim.simulation.full.recording import (
     log_of,
 )
 from dva_sim.simulation.full.safety_checks import SafetyAudit
-from dva_sim.simulation.full.stage import Stage, id_of
+from dva_sim.simulation.full.stage import DVA, Stage, dvas_of, id_of
 from dva_sim.simulation.scenario import Scenario, request_timeout_s
+from dva_sim.simulation.scenario.parts import DvaDeath
 
 # Beside pictures and commands: heartbeats, status, sensors, orders, replies; assumed, and ample.
 OTHERS_HZ = 20.0
@@ -148,6 +153,7 @@ class Run:
         watched: Options of a run that people watch and join.
 
     Attributes:
+        dvas: The DVAs by id: the one, or one for each region.
         persons: Numbers of the operators who are people.
     """
 
@@ -173,7 +179,11 @@ class Run:
         lan = Link(LAN, ConstantRate(LAN.rate_bps), self.stage.streams, "lan")
         self._lan = lan, lan
         self._keeps_events = watched.keeps
-        self.dva = add_dva(self.stage, None, watched.memory, watched.keeps)
+        self._dead: list[DvaAgent] = []  # in whose place others were started
+        self.dvas = {
+            id_of("dva", number): add_dva(self.stage, None, memory, watched.keeps, number)
+            for number, memory in enumerate(self._memories(watched.memory), 1)
+        }
         self.field = Field(self.stage)
         self.field.populate()
         count = scenario.operator.count
@@ -198,8 +208,11 @@ class Run:
             self.observe(self._log)
         if watched.real is not None:
             watched.real.watch(self)
-        Disturbance(self.stage, self.dva, self.field)
-        self.dva.start()
+        Disturbance(self.stage, self._dva_of, self.field)
+        for dva in self.dvas.values():
+            dva.start()
+        for death in scenario.dva.deaths:
+            self._schedule_death(death)
         self.clock.every(WATCH_PERIOD, self._watch)
         if watched.keeps:
             self.clock.every(FILM_PERIOD if keep_traffic else WATCH_PERIOD, self._sample)
@@ -236,6 +249,23 @@ class Run:
         )
         return real.network, stage
 
+    def _memories(self, memory: Store | None) -> list[Store | None]:
+        """Return the memory of each DVA; only one that is alone keeps any here."""
+        return [memory] + [None] * (len(dvas_of(self.scenario)) - 1)
+
+    @property
+    def dva(self) -> DvaAgent:
+        """The DVA, or that of the first region."""
+        return self.dvas[DVA]
+
+    @dva.setter
+    def dva(self, dva: DvaAgent) -> None:
+        self.dvas[DVA] = dva
+
+    def _dva_of(self, robot: str) -> DvaAgent:
+        """Return the DVA that a robot obeys."""
+        return self.dvas[self.field.robots[robot].device.dva]
+
     def run(self) -> Recording:
         """Let time pass until all is settled or the horizon is reached."""
         now = 0.0
@@ -256,7 +286,7 @@ class Run:
             self._sample()
         stage = self.stage
         field = self.field
-        events = list(self.dva.events.values())
+        events = self._events()
         return Recording(
             scenario=self.scenario,
             seed=stage.seed,
@@ -277,8 +307,23 @@ class Run:
             people=self._people(),
             depth=self._connector.deepest,
             persons=self.persons,
-            facts=list(self.dva.facts),
+            facts=sorted(self._facts(), key=lambda fact: fact.time),
         )
+
+    def _events(self) -> list[Event]:
+        """Return every event once: of one that was taken over the state that is newest."""
+        events: dict[int, Event] = {}
+        for dva in sorted(self._ever, key=lambda dva: not dva.is_gone):
+            events |= {n: event for n, event in dva.events.items() if n not in dva.copies}
+        return [events[number] for number in sorted(events)]
+
+    def _facts(self) -> list[Fact]:
+        return [fact for dva in self._ever for fact in dva.facts]
+
+    @property
+    def _ever(self) -> list[DvaAgent]:
+        """All DVAs that there have been."""
+        return [*self._dead, *self.dvas.values()]
 
     def _people(self) -> list[PersonLog]:
         logs = []
@@ -295,7 +340,7 @@ class Run:
 
     def _settled(self) -> bool:
         """Return True if all incidents are known and closed, and nobody drives or is leaving."""
-        events = list(self.dva.events.values())
+        events = self._events()
         return (
             bool(events)
             and not any(e.open for e in events)
@@ -312,6 +357,34 @@ class Run:
         """Start another DVA in place of the one that has crashed, from what that has kept."""
         self.dva = add_dva(self.stage, None, memory, self._keeps_events)
         self.dva.start()
+
+    def _schedule_death(self, death: DvaDeath) -> None:
+        """End the own DVA of a region at its time, and start it again where that is wanted."""
+        number = 1 + list(self.scenario.dva.regions).index(death.region)
+        self.clock.call_at(death.at_s, self.end_dva, number)
+        if death.back_after_s is not None:
+            back_s = death.at_s + death.back_after_s
+            self.clock.call_at(back_s, self.start_region_again, number)
+
+    def end_dva(self, number: int) -> None:
+        """End the DVA of a region without a word, as by kill -9."""
+        dva = self.dvas[id_of("dva", number)]
+        if not dva.is_gone and isinstance(self.network, VirtualNetwork):
+            dva.device.tell("is killed", "link")
+            self.network.leave(dva.device.id_tag)
+            dva.crash()
+
+    def start_region_again(self, number: int) -> None:
+        """Start the DVA of a region again, with nothing kept."""
+        id_tag = id_of("dva", number)
+        if not isinstance(self.network, VirtualNetwork):
+            return
+        self.stage.devices.remove(self.dvas[id_tag].device)
+        self._dead.append(self.dvas[id_tag])
+        self.network.come_back(id_tag)
+        self.dvas[id_tag] = add_dva(self.stage, None, None, self._keeps_events, number)
+        self.dvas[id_tag].device.tell("is started again", "link")
+        self.dvas[id_tag].start()
 
     def be_patient(self, scenario: Scenario) -> None:
         """From now on everybody waits for answers as long as another scenario's link needs."""
@@ -376,7 +449,12 @@ class Run:
     def _keep_facts(self) -> FactLog:
         """Return an observer that keeps the facts of the run for its recording."""
         facts = self.recorder.facts = []
-        return FactLog(facts.append, self.field.robots, self._motion_of, lambda: page_of(self.dva))
+        robots = self.field.robots
+        look = self._motion_of
+        return FactLog(facts.append, robots, look, self._page, dvas=self.dvas)
+
+    def _page(self, dva: str) -> Page:
+        return page_of(self.dvas[dva])
 
     def _motion_of(self, robot: str) -> RobotMotion:
         return motion_of(self.field.robots[robot])
@@ -437,9 +515,9 @@ class Run:
 
     def show_page(self) -> None:
         """Let all observers see the DVA's book as it is now."""
-        page = page_of(self.dva)
-        for observer in self._observers:
-            observer.shows(self.clock.now, page)
+        for page in map(page_of, self.dvas.values()):
+            for observer in self._observers:
+                observer.shows(self.clock.now, page)
 
     def _sample(self) -> None:
         """Note where everybody is who is on the site."""

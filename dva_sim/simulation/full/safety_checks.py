@@ -397,13 +397,16 @@ class SafetyAudit:
         self._hears_dva = False
         self._told_stopped: dict[str, StopTold] = {}
         self._orders_sent: deque[int] = deque(maxlen=MOST_KEPT)  # hashes; each may be sent again
-        self._dva = terms.dva
+        self._dvas = frozenset(terms.dvas)
         self._obeys_within = OBEYS_WITHIN + 10 * terms.processing
         self._motion_of = motion_of
         self._deaf = set[str]()
-        self._ledger = EventLedger(terms.rules, terms.dva, place_of, terms.at_event, self._name_of)
+        self._ledgers: dict[str, EventLedger] = {}
+        for dva in terms.dvas:
+            what = terms.rules, dva, place_of, terms.at_event, self._name_of
+            self._ledgers[dva] = EventLedger(*what, self._ledgers.values())
         self._witnesses: dict[str, Witness] = {}
-        self._takeovers = Takeovers()
+        self._takeovers = {dva: Takeovers() for dva in terms.dvas}
 
     def _name_of(self, device: str) -> str:
         return self._labels.get(device, device)
@@ -435,25 +438,28 @@ class SafetyAudit:
         if to in self._motors:
             if to not in self._deaf:
                 self._reaches_robot(now, source, to, payload)
-        elif to == self._dva and isinstance(payload, bytes):
+        elif to in self._dvas and isinstance(payload, bytes):
             message = decode_if_valid(payload)
             self._hears_dva = True
-            self._ledger.hears(source, message, now)
+            self._ledgers[to].hears(source, message, now)
             if message is not None and message.source == source:
-                self._takeovers.hears(source, message)
+                self._takeovers[to].hears(source, message)
                 self._dva_hears_of_stops(message, now)
 
     def knows_places(self, known: bool) -> None:
         """Note whether places are known; without them, any finding is taken as made there."""
-        self._ledger.knows_places = known
+        for ledger in self._ledgers.values():
+            ledger.knows_places = known
 
     def heard(self, now: float, device: str) -> None:
-        """Note that the DVA has heard a device."""
-        self._ledger.is_heard(device, now)
+        """Note that a DVA has heard a device."""
+        for ledger in self._ledgers.values():
+            ledger.is_heard(device, now)
 
     def kept_nothing_for(self, seconds: float) -> None:
         """Implement `EventLedger.kept_nothing_for`; what robots said is forgotten, too."""
-        self._ledger.kept_nothing_for(seconds)
+        for ledger in self._ledgers.values():
+            ledger.kept_nothing_for(seconds)
         if seconds > 0.0:
             for told in self._told_stopped.values():
                 told.at = -math.inf
@@ -464,9 +470,9 @@ class SafetyAudit:
         if message is None or isinstance(message.body, m.Heartbeat):
             return
         if isinstance(message.body, m.Reply):
-            if source == self._dva:
+            if source in self._dvas:
                 self._report([*self._released(robot, witness, message.body)], now, source)
-            if source == self._dva and message.body.answers == witness.question:
+            if source in self._dvas and message.body.answers == witness.question:
                 found = [*_confirms_as_given(witness, message.body.content)]
                 self._report(found, now, source)
                 self._confirms(witness, message.body.content, now)
@@ -480,7 +486,7 @@ class SafetyAudit:
                 witness.arrivals.popitem(last=False)
             return
         witness.unanswered.setdefault(key, Unanswered(message, now, source))
-        if source == self._dva and isinstance(message.body, m.PermissionGrant):
+        if source in self._dvas and isinstance(message.body, m.PermissionGrant):
             grant = message.body
             witness.given(grant.session, Held(grant.holder, grant.level, grant.sensors))
 
@@ -522,15 +528,20 @@ class SafetyAudit:
 
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:
         """Implement `Observer`."""
-        if source == self._dva:
+        if source in self._dvas:
             if isinstance(payload, bytes) and _ORDERS_ROBOT.search(payload) is not None:
                 self._report([*self._sends_stopped(to, payload, now)], now, source)
-            if isinstance(payload, bytes) and self._ledger.waits_for(payload):
-                self._ledger.says(decode_if_valid(payload))
-            if self._takeovers.waits and isinstance(payload, bytes) and b"<reply>" in payload:
+            ledger = self._ledgers[source]
+            if isinstance(payload, bytes) and ledger.waits_for(payload):
+                ledger.says(decode_if_valid(payload))
+            if (
+                self._takeovers[source].waits
+                and isinstance(payload, bytes)
+                and b"<reply>" in payload
+            ):
                 answer = decode_if_valid(payload)
                 if answer is not None and isinstance(answer.body, m.Reply):
-                    self._takeovers.says(answer.destination, answer.body, now)
+                    self._takeovers[source].says(answer.destination, answer.body, now)
             return
         if source not in self._motors:
             return
@@ -594,7 +605,7 @@ class SafetyAudit:
         match body:
             case m.Emergency():  # it acts whenever it comes, though its bytes never change
                 witness.note_stop(now, self._release)
-            case m.PermissionRevocation() if asked.source == self._dva:
+            case m.PermissionRevocation() if asked.source in self._dvas:
                 _end(witness, body.session, now)
         if code != m.OK:
             return
@@ -746,12 +757,12 @@ class SafetyAudit:
 
     def shows(self, now: float, page: Page) -> None:
         """Implement `Observer`."""
-        self._report([*self._ledger.check(now, page)], now, self._dva)
-        self._report([*self._hands_over(page, now)], now, self._dva)
+        self._report([*self._ledgers[page.dva].check(now, page)], now, page.dva)
+        self._report([*self._hands_over(page, now)], now, page.dva)
 
     def _hands_over(self, page: Page, now: float) -> Iterator[Broken]:
         """Yield robots that are handed over before they stand and know that they are."""
-        for right, session in self._takeovers.given(page.rights, now, page.works):
+        for right, session in self._takeovers[page.dva].given(page.rights, now, page.works):
             witness = self.witness(right.robot)
             motion = self._motion_of(right.robot)
             to = f"hands {right.robot} over to {right.holder}"
@@ -792,7 +803,7 @@ class SafetyAudit:
             if isinstance(body, m.Emergency):
                 if not witness.has_stood_since(at):
                     witness.note_stop(by, self._release)
-            elif source != self._dva:
+            elif source not in self._dvas:
                 pass
             elif isinstance(body, m.PermissionRevocation):
                 _end(witness, body.session, by)

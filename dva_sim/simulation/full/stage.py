@@ -33,7 +33,13 @@ from dva_sim.protocol.devices import (
 )
 from dva_sim.protocol.exchange import NOON
 from dva_sim.protocol.messages import ReleasedBy
-from dva_sim.simulation.scenario import Scenario, request_timeout_s, robot_profiles, site_of
+from dva_sim.simulation.scenario import (
+    Scenario,
+    plan_of,
+    request_timeout_s,
+    robot_profiles,
+    site_of,
+)
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import FOOTPRINT, Site
 
@@ -72,10 +78,18 @@ def team_of(scenario: Scenario) -> Iterator[str]:
         "operator": scenario.operator.count,
         "detector": sum(event.reports for event in scenario.events),
     }
-    yield DVA
+    yield from dvas_of(scenario)
     for kind, count in counts.items():
         yield from (id_of(kind, number) for number in range(1, count + 1))
     yield from control_rooms_of(scenario)
+
+
+def dvas_of(scenario: Scenario) -> dict[str, str]:
+    """Return the labels of the DVAs of a scenario by id: of the one, or one for each region."""
+    names = scenario.dva.regions
+    if not names:
+        return {DVA: label_of("dva", 1)}
+    return {id_of("dva", number): f"dva-{name}" for number, name in enumerate(names, 1)}
 
 
 def control_rooms_of(scenario: Scenario) -> dict[str, ControlRoomRole]:
@@ -144,6 +158,7 @@ class Stage:
         devices: Devices that take part.
         pattern_names: Pattern of the commands for a robot, by its id, where it was changed.
         attended: True if people may join, who could release a robot after an emergency.
+        regions: Division of the site, with a DVA for each region; None: there is one DVA.
 
     Raises:
         ConfigError: a map that cannot be read, or that the team does not fit on.
@@ -164,6 +179,7 @@ class Stage:
     def __post_init__(self) -> None:
         self.streams = Streams(self.seed)
         self.site = site_of(self.scenario, self.seed)
+        self.regions = plan_of(self.scenario.dva.regions, self.site)
         self.robots = robot_profiles(self.scenario)
         self.pattern = load_pattern(self.scenario.pattern, self.scenario.pattern_options)
         # One map of ways for all: what the largest robot fits through, people and others do.
@@ -178,7 +194,7 @@ class Stage:
             id_of("robot", number): profile.drive_spec()
             for number, profile in enumerate(self.robots, 1)
         }
-        self.labels[DVA] = label_of("dva", 1)
+        self.labels |= dvas_of(self.scenario)
         for kind, count in counts.items():
             for number in range(1, count + 1):
                 self.labels[id_of(kind, number)] = label_of(kind, number)
@@ -209,14 +225,41 @@ class Stage:
         spec = self._specs.get(robot) or next(iter(self._specs.values()))
         return Reach(spec.max_speed, spec.max_turn_rate, spec.drive(spec).turning_radius)
 
-    def device(self, kind: str, number: int) -> AgentDevice:
-        """A new device: its identity and ways to talk."""
+    def dvas_for(self, region: str) -> tuple[str, ...]:
+        """Return the ids of the DVAs that serve a region in turn, its own first."""
+        assert self.regions is not None, "one DVA serves everything"
+        numbers = {name: number for number, name in enumerate(self.regions.names, 1)}
+        return tuple(id_of("dva", numbers[name]) for name in self.regions.line_of(region))
+
+    def _dvas_known_to(
+        self, kind: str, number: int, at: tuple[float, float] | None
+    ) -> tuple[str, ...]:
+        """Return the DVAs that a device knows; operators go round the regions."""
+        if self.regions is None:
+            return (DVA,)
+        names = self.regions.names
+        if kind == "dva":
+            return (id_of(kind, number),)
+        turn = number - 1 if kind == "operator" else 0
+        region = names[turn % len(names)] if at is None else self.regions.region_at(*at)
+        return self.dvas_for(region)
+
+    def device(self, kind: str, number: int, at: tuple[float, float] | None = None) -> AgentDevice:
+        """A new device: its identity and ways to talk.
+
+        Args:
+            kind: Such as `robot`.
+            number: Number among those of its kind, from 1.
+            at: Its first place [m], if it has one.
+        """
+        dvas = self._dvas_known_to(kind, number, at)
         device = AgentDevice(
             id_tag=id_of(kind, number),
-            label=label_of(kind, number),
+            label=self.labels[dvas[0]] if kind == "dva" else label_of(kind, number),
             device_type=TYPES[kind],
             address=self.address(kind, number),
-            dva=DVA,
+            dva=dvas[0],
+            dvas=dvas,
             network=self.network,
             recorder=self.recorder,
             frame=self.site.frame,

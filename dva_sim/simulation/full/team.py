@@ -31,7 +31,7 @@ from dva_sim.agents.robot.sensors import make_ports, sources_of
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.full.hazards import RunHazards
-from dva_sim.simulation.full.stage import DVA, Stage
+from dva_sim.simulation.full.stage import Stage
 from dva_sim.simulation.scenario import bystander_profile, guard_profile
 from dva_sim.worlds.bodies import GRIP, RobotBody
 from dva_sim.worlds.geo import Pose
@@ -90,11 +90,11 @@ class TeamBuilder:
         config = self._stage.scenario.robot
         profile = stage.robots[number - 1]
         base = self._start("robot", number)
-        device = stage.device("robot", number)
+        device = stage.device("robot", number, (base.x, base.y))
         body = self._world.add_robot(device.label, profile.drive_spec(), base)
         controller = RobotController(
             device.id_tag,
-            DVA,
+            device.dva,
             Limits(config.watchdog_s, config.max_age_s),
             camera_url=stage.cameras.url(device.label, device.address),
             clock_offset=float(stage.streams[f"{device.label}/clock"].uniform(10.0, 100_000.0)),
@@ -179,7 +179,7 @@ class TeamBuilder:
         stage = self._stage
         hazards = self._hazards
         post = self._start("guard", number)
-        device = stage.device("guard", number)
+        device = stage.device("guard", number, (post.x, post.y))
         walker = Walker.draw(guard_profile(stage.scenario), stage.streams[f"{device.label}/walker"])
         body = self._world.add_person(device.label, post, radius=walker.habits.walking.radius_m)
         legs = self._legs(body, walker.speed, walker.habits)

@@ -169,7 +169,8 @@ class Judge:
     def __init__(self, terms: o.SafetyTerms) -> None:
         self.recorder = Recorder()
         self._terms = terms
-        self._events = o.EventTableCopy(terms.rules.merge_distance)
+        merge_distance = terms.rules.merge_distance
+        self._events = {dva: o.EventTableCopy(merge_distance) for dva in terms.dvas}
         self._motions: dict[str, o.RobotMotion] = {}
         self._places: dict[str, Position] = {}
         self._audit = SafetyAudit(self.recorder, terms, self._motion_of, self._places.get)
@@ -197,10 +198,10 @@ class Judge:
                 known = {r: of for r, of in fact.motions.items() if r in self._terms.motors}
                 self._motions |= known
                 audit.moves(now, self._motions)
-            case o.BookNews():
+            case o.BookNews() if fact.dva in self._events:
                 self._sees_dva = True
                 audit.knows_places(bool(self._places))
-                audit.shows(now, self._events.page(fact))
+                audit.shows(now, self._events[fact.dva].page(fact))
             case o.Heard():
                 for device in fact.devices:
                     audit.heard(now, device)

@@ -9,6 +9,7 @@ from dva_sim.simulation.scenario.parts import (
     PhoneConfig,
     RobotConfig,
 )
+from dva_sim.simulation.scenario.regions import RegionPlan, plan_of
 from dva_sim.simulation.scenario.scenario import (
     Scenario,
     bystander_profile,
@@ -34,6 +35,7 @@ __all__ = [
     "DispatchConfig",
     "EventConfig",
     "PhoneConfig",
+    "RegionPlan",
     "RobotConfig",
     "Scenario",
     "build",
@@ -46,6 +48,7 @@ __all__ = [
     "locate_files",
     "mean_processing_s",
     "phone_profile",
+    "plan_of",
     "population",
     "request_timeout_s",
     "robot_profiles",

@@ -17,6 +17,7 @@ from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml
 from dva_sim.simulation.scenario.alarms import table_of, why_not, with_events
 from dva_sim.simulation.scenario.instructions import read_instructions
 from dva_sim.simulation.scenario.parts import EventConfig
+from dva_sim.simulation.scenario.regions import check_regions
 from dva_sim.simulation.scenario.scenario import (
     Scenario,
     bystander_profile,
@@ -233,6 +234,8 @@ def _complete(scenario: Scenario, error: Fail) -> Scenario:
             raise error(problem.problem, ("site", "options")) from None
     check_phone(phone_profile(scenario, error), error)
     _check_draughts(scenario, error)
+    if scenario.dva.regions:
+        check_regions(scenario.dva.regions, site_of(scenario, seed=0), error)
     processing = {profile.processing_s for profile in robot_profiles(scenario)}
     if scenario.robot.processing_s is None and len(processing) == 1:
         robot = scenario.robot.model_copy(update={"processing_s": processing.pop()})

@@ -24,6 +24,7 @@ from dva_sim.core.permissions import LEVELS
 from dva_sim.kernel.assumed import OmitsUnset
 from dva_sim.kernel.config import AlsoCalled, Config, Key
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import unknown
 from dva_sim.protocol.messages import ReleasedBy
 from dva_sim.worlds.hazards import KINDS, make_hazard
 
@@ -33,6 +34,7 @@ OwnTraits = dict[str, NonNegative]
 """Medians of traits by name; whether they are known is judged where the profile is read."""
 CONTROL_ROOM = r"^(control-room-[1-9][0-9]?|[0-9A-F]{2}(:[0-9A-F]{2}){5})$"
 SUPERVISOR = r"^(operator-[1-9][0-9]*|[0-9A-F]{2}(:[0-9A-F]{2}){5})$"
+REGION = r"^[a-z][a-z0-9-]{0,31}$"
 AnyNumber = Annotated[float, Field(allow_inf_nan=True)]  # `make_hazard` says what is wrong with it
 
 
@@ -455,6 +457,44 @@ class AccessConfig(Config):
     until_s: Positive | None = None
 
 
+class RegionConfig(Config):
+    """A region of the site, which a DVA of its own serves.
+
+    Attributes:
+        rooms: Names of rooms, paths and grounds that belong to it.
+        polygon: Corners of an area that belongs to it, as `[x, y]` in metres on the site's plane.
+        rest: True for the region that has whatever no other has.
+        deputy: Region whose DVA takes over if this one's dies; left out: the next region.
+    """
+
+    rooms: tuple[str, ...] = ()
+    polygon: Annotated[tuple[tuple[float, float], ...], Field(max_length=256)] = ()
+    rest: bool = False
+    deputy: str | None = None
+
+    @model_validator(mode="after")
+    def _is_somewhere(self) -> RegionConfig:
+        if not (self.rooms or self.polygon or self.rest):
+            raise ValueError("a region needs rooms, a polygon, or rest: true")
+        if 0 < len(self.polygon) < 3:
+            raise ValueError("a polygon has at least three corners")
+        return self
+
+
+class DvaDeath(Config):
+    """The end of a DVA in a run, as by kill -9.
+
+    Attributes:
+        region: Region whose own DVA ends.
+        at_s: Time of its end.
+        back_after_s: Time until it is started again, with nothing kept; left out: never.
+    """
+
+    region: str
+    at_s: NonNegative
+    back_after_s: Positive | None = None
+
+
 class DvaConfig(Config):
     """Duties of the DVA besides giving orders.
 
@@ -468,6 +508,8 @@ class DvaConfig(Config):
             once. `followed`: it rises with repeated reports, sensors of robots and findings, too,
             and detectors and callers report again as it grows. Left out: `followed` at a console,
             else `reported`.
+        regions: Regions of the site by name, each with a DVA of its own; left out: one DVA.
+        deaths: DVAs of regions that end during a run in virtual time.
     """
 
     sensors: tuple[Literal["temperature", "smoke", "gas"], ...] = ()
@@ -477,6 +519,29 @@ class DvaConfig(Config):
         default_factory=dict
     )
     severity: Literal["reported", "followed"] | None = None
+    regions: Annotated[
+        dict[Annotated[str, Field(pattern=REGION)], RegionConfig], Field(max_length=16)
+    ] = Field(default_factory=dict)
+    deaths: tuple[DvaDeath, ...] = ()
+
+    @model_validator(mode="after")
+    def _regions_are_a_division(self) -> DvaConfig:
+        regions = self.regions
+        if len(regions) == 1:
+            raise ValueError("regions: one region is no division; name two, or leave it out")
+        if sum(each.rest for each in regions.values()) > 1:
+            raise ValueError("regions: only one region can have the rest")
+        for name, each in regions.items():
+            if each.deputy == name:
+                raise ValueError(f"regions.{name}.deputy: a region is not its own deputy")
+            if each.deputy is not None and each.deputy not in regions:
+                raise ValueError(
+                    f"regions.{name}.deputy: {unknown('region', each.deputy, regions)}"
+                )
+        for death in self.deaths:
+            if death.region not in regions:
+                raise ValueError(f"deaths: {unknown('region', death.region, regions)}")
+        return self
 
 
 class EmergencyConfig(Config):

@@ -1,0 +1,145 @@
+"""Help between DVAs: an order to another DVA, which sends somebody of its own.
+
+The DVA that needs help sends an `Order` as to a guard, and hears the same words in return. The DVA
+that gives it books a copy of the event, and lets its own dispatcher find somebody: so all rules
+about orders hold on both sides, and who was lent is free again with the end of the copy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+from dva_sim.core.dispatcher import Dispatcher
+from dva_sim.core.events import LOOKING, Cause, Event, State
+from dva_sim.core.regions.division import Division
+from dva_sim.core.sessions import DvaAnswer, Send
+from dva_sim.protocol import messages as m
+
+ASK_AFTER: Final = 5.0  # design: an event for which nobody was free for so long needs help [s]
+SEVERITY: Final = 0.5  # of a copy: an order does not say it
+_FINDINGS: Final = {State.CONFIRMED: "confirmed", State.REFUTED: "refuted"}
+
+
+class Lent(NamedTuple):
+    """A copy of an event of another DVA: who asked for help, and its number there."""
+
+    asker: str
+    number: int
+
+
+@dataclass
+class MutualHelp:
+    """Help that a DVA asks for and gives.
+
+    Attributes:
+        division: Division of the site, with the service of each region.
+        dispatcher: Dispatcher with all orders.
+        copies: Events of others that this DVA looks at for them, by its own number.
+        lent: Devices that have worked for others and may still be away.
+    """
+
+    division: Division
+    dispatcher: Dispatcher
+    copies: dict[int, Lent] = field(default_factory=dict)
+    lent: set[str] = field(default_factory=set)
+    _told: dict[int, list[str]] = field(default_factory=dict)
+
+    # --- asked for -----------------------------------------------------------------------
+
+    def ask(self, now: float) -> list[Send]:
+        """Ask other DVAs for help with what has waited and nobody here is free for."""
+        orders = self.dispatcher.orders
+        waiting = [e for e in orders.events.waiting.values() if self._needs_help(e, now)]
+        if not waiting or self.dispatcher.situations.idle(now):
+            return []
+        sends = []
+        for event in waiting:
+            helper = next((d for d in self.division.peers if self._may_help(d, event, now)), None)
+            if helper is not None:
+                orders.counters["help asked for"] += 1
+                sends.append(orders.confirm(event, helper, None, now))
+        return sends
+
+    def _needs_help(self, event: Event, now: float) -> bool:
+        is_own = event.number not in self.copies
+        return is_own and event.state is State.PENDING and now - event.waiting_since >= ASK_AFTER
+
+    def _may_help(self, dva: str, event: Event, now: float) -> bool:
+        registry = self.dispatcher.orders.registry
+        if not self.division.is_there(dva, registry) or dva in event.failed:
+            return False
+        return registry.entries[dva].free_from <= now and dva not in event.handling.taken_off
+
+    # --- given ---------------------------------------------------------------------------
+
+    def give(self, asker: str, order: m.Order, now: float) -> DvaAnswer:
+        """Take an order of another DVA, if somebody is free."""
+        if order.task != "confirm" or order.device is not None:
+            return DvaAnswer(m.NOT_SUPPORTED, "a DVA helps to look, by whom it chooses")
+        if self.copy_of(asker, order.event_id) is not None:
+            return DvaAnswer()
+        if not self.dispatcher.situations.idle(now):
+            return DvaAnswer(m.BUSY, "nobody is free here")
+        orders = self.dispatcher.orders
+        if orders.events.full:
+            return DvaAnswer(m.BUSY, "too many events are open here")
+        event = orders.events.add(order.kind, order.position, SEVERITY, now)
+        event.attempts = orders.rules.max_attempts - 1  # after one the asker may do better
+        self.copies[event.number] = Lent(asker, order.event_id)
+        orders.counters["help given"] += 1
+        return DvaAnswer(sends=self.dispatcher.decide(now))
+
+    def copy_of(self, asker: str, number: int) -> Event | None:
+        """Return the open copy of an event of another DVA."""
+        orders = self.dispatcher.orders
+        own = next((n for n, lent in self.copies.items() if lent == Lent(asker, number)), 0)
+        return orders.events.open.get(own)
+
+    def end(self, copy: Event, now: float) -> list[Send]:
+        """Let those go who were lent: the asker needs no help any longer."""
+        self.adopt(copy.number)
+        cause = Cause.SUPERSEDED if copy.state in LOOKING else Cause.WITHDRAWN
+        return self.dispatcher.orders.transition(copy, cause, now)
+
+    def adopt(self, number: int) -> None:
+        """Keep a copy as an event of one's own: the DVA that asked for help is gone."""
+        self.copies.pop(number)
+        self._told.pop(number, None)
+
+    def news(self) -> list[Send]:
+        """Return what askers have not been told yet of the events that are looked at for them."""
+        orders = self.dispatcher.orders
+        sends = []
+        for number, lent in list(self.copies.items()):
+            event = orders.events.get(number)
+            if event is not None and event.responder is not None:
+                self.lent.add(event.responder)
+            steps = (
+                [] if event is None else [s for s in ("departed", "arrived") if s in event.times]
+            )
+            told = self._told.setdefault(number, [])
+            news: list[m.Body] = [
+                m.OrderProgress(lent.number, step) for step in steps if step not in told
+            ]
+            told += [step for step in steps if step not in told]
+            if event is None or not event.open:
+                news += self._ends(event, lent)
+                del self.copies[number], self._told[number]
+            sends += [Send(lent.asker, body) for body in news]
+        return sends
+
+    @staticmethod
+    def _ends(event: Event | None, lent: Lent) -> list[m.Body]:
+        finding = None if event is None else _FINDINGS.get(event.state)
+        if event is None or finding is None:
+            return [m.OrderProgress(lent.number, "failed")]
+        report = m.EventReport(
+            lent.number,
+            event.kind,
+            event.position,
+            event.severity,
+            round(max(0.0, min(event.confidence, 1.0)), 6),
+            finding,
+        )
+        return [report, m.OrderProgress(lent.number, "done")]

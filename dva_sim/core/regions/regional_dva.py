@@ -1,0 +1,194 @@
+"""A DVA among others, each of which serves regions of one site."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+from dva_sim.core.dva import Dva
+from dva_sim.core.event_status import status_of
+from dva_sim.core.events import Event
+from dva_sim.core.regions.borders import Borders
+from dva_sim.core.regions.division import Claim, Division
+from dva_sim.core.regions.help import MutualHelp
+from dva_sim.core.regions.strays import Strays
+from dva_sim.core.regions.takeover import Deputy
+from dva_sim.core.registry import DeviceEntry
+from dva_sim.core.sessions import DvaAnswer, Send
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import PEER
+
+NUMBERS = 1_000_000  # of events that one DVA gives: no two give the same
+
+
+class RegionalDva(Dva):
+    """The core of a DVA among others; all else is as in `Dva`.
+
+    Args:
+        *args: Arguments of `Dva`.
+        division: Division of the site, with the service of each region.
+        **kwargs: Keyword arguments of `Dva`.
+
+    Attributes:
+        help: Help that it asks for and gives.
+        borders: Devices that cross a border.
+        deputy: Copies of the events of others.
+        strays: Events that belong to others.
+        peers: Latest status of the other DVAs, by id.
+    """
+
+    def __init__(self, *args: Any, division: Division, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.division = division
+        self._numbers = NUMBERS * [line[0] for line in division.lines.values()].index(division.own)
+        self.events.first = self._numbers
+        self.help = MutualHelp(division, self.dispatcher)
+        self.borders = Borders(division, self.orders, self.help)
+        self.deputy = Deputy(division, self.orders, self.help)
+        self.strays = Strays(division, self.orders, self.help)
+        self.peers: dict[str, m.PeerStatus] = {}
+        self.orders.unwatched |= set(division.peers)
+        self._strangers: set[str] = set()
+
+    # --- what the agent asks --------------------------------------------------------------
+
+    def passes_on(self, message: m.Message) -> str | None:
+        """Return the DVA that a report is for, if that is another one, and it is there."""
+        body = message.body
+        entry = self.registry.entries.get(message.source)
+        if not isinstance(body, m.EventReport) or body.event_id is not None or entry is None:
+            return None
+        if entry.kind == PEER:
+            return None
+        dva = self.division.dva_at(body.position)
+        is_there = self.division.is_there(dva, self.registry)
+        return dva if is_there and dva != self.division.own else None
+
+    def replica_of(self, event: Event, fact: int, now: float) -> tuple[str, m.Replicate] | None:
+        """Return the deputy and what it has to know of an event; None if nobody has to."""
+        region = self.division.region_at(event.position)
+        epoch, dva = self.division.claims[region]
+        deputy = self.division.deputy_of(region, self.registry)
+        if dva != self.division.own or deputy is None or event.number in self.help.copies:
+            return None
+        return deputy, m.Replicate(region, epoch, fact, status_of(event, None, now))
+
+    def peer_status(self, now: float) -> m.PeerStatus:
+        """Return what others have to know of this DVA."""
+        served = tuple(m.ServedRegion(*each) for each in self.division.served())
+        count = sum(not entry.silent for entry in self.registry.entries.values())
+        idle = len(self.dispatcher.situations.idle(now))
+        return m.PeerStatus(served, count, len(self.events.open), idle)
+
+    # --- what comes in --------------------------------------------------------------------
+
+    def note(self, message: m.Message, now: float) -> list[Send]:
+        """Take a published message, as in `Dva`; of other DVAs what they serve."""
+        body = message.body
+        if isinstance(body, m.PeerStatus):
+            return self._with_revocations(self._hears_of(message.source, body, now))
+        if isinstance(body, m.RobotStatus):
+            self._meet_stranger(message.source, body)
+        return super().note(message, now)
+
+    def delivered(self, send: Send, now: float, content: object = None) -> list[Send]:
+        """Handle the reply OK; a device that agrees to a hand-over is registered here no more."""
+        if isinstance(send.body, m.HandOver):
+            self.orders.counters["handed over"] += 1
+            return self.dismiss(send.to, now)
+        if isinstance(send.body, m.EventReport) and send.body.event_id is None:
+            return self._with_revocations(self.strays.taken(send, now))
+        return super().delivered(send, now, content)
+
+    def undelivered(self, send: Send, now: float) -> list[Send]:
+        """Handle a message that was not taken; others than orders are said again later."""
+        is_later = isinstance(send.body, m.HandOver | m.EventReport)
+        return [] if is_later else super().undelivered(send, now)
+
+    def dismiss(self, device: str, now: float) -> list[Send]:
+        """Forget a device at once, as in `Dva`."""
+        self.borders.forget(device)
+        return super().dismiss(device, now)
+
+    def tick(self, now: float) -> list[Send]:
+        """Handle the passing of time, as in `Dva`: the dead, borders, and help."""
+        self.deputy.take_over(now)
+        self.deputy.resume(now)
+        sends = super().tick(now)
+        sends += self.borders.cross(now)
+        sends += self.help.ask(now)
+        sends += self.strays.pass_on(now)
+        return self._with_revocations(sends)
+
+    def _answer(self, message: m.Message, now: float) -> DvaAnswer:
+        body = message.body
+        entry = self.registry.entries.get(message.source)
+        if isinstance(body, m.Registration) and entry is None:
+            self.deputy.came(message.source, now)
+        if isinstance(body, m.PermissionRequest) and self._is_a_strangers(body):
+            return DvaAnswer(m.BUSY, "it is driven under a session of another DVA")
+        if entry is None or entry.kind != PEER:
+            return super()._answer(message, now)
+        self.registry.heard(message.source, now)
+        return self._of_peer(message, entry, now)
+
+    def _of_peer(self, message: m.Message, entry: DeviceEntry, now: float) -> DvaAnswer:
+        """Answer another DVA."""
+        source = message.source
+        match message.body:
+            case m.EventReport(event_id=None, origin=str(origin)) as report:
+                reporter = replace(entry, device=replace(entry.device, id_tag=origin))
+                return self._reports.sighted(reporter, report, now)
+            case m.Order() as order:
+                return self.help.give(source, order, now)
+            case m.OrderProgress(event_id=number, state="done") if copy := self.help.copy_of(
+                source, number
+            ):
+                return DvaAnswer(sends=self.help.end(copy, now))
+            case m.OrderProgress(event_id=number, state="arrived"):
+                event = self.orders.engaged.find(source, number)
+                if event is not None:  # where it has sent somebody, it has seen him arrive
+                    self.registry.locate(entry, event.position)
+            case m.Replicate() as copied:
+                self._count_from(copied.event.event_id)
+                return self.deputy.keep(source, copied, now)
+        return super()._answer(message, now)
+
+    def _count_from(self, number: int) -> None:
+        """Give no number again that an earlier life of this DVA has given."""
+        if self._numbers < number <= self._numbers + NUMBERS:
+            self.events.first = max(self.events.first, number - self.events.total)
+
+    def _hears_of(self, peer: str, status: m.PeerStatus, now: float) -> list[Send]:
+        entry = self.registry.heard(peer, now)
+        if entry is None or entry.kind != PEER:
+            self.refused += 1
+            return []
+        self.peers[peer] = status
+        before = dict(self.division.served())
+        for each in status.regions:
+            self.division.learn(each.region, Claim(each.epoch, peer))
+        lost = before.keys() - dict(self.division.served()).keys()
+        self.orders.counters["region yielded"] += len(lost)
+        return self.strays.pass_on(now) if lost else []
+
+    # --- robots under sessions of others ---------------------------------------------------
+
+    def _meet_stranger(self, robot: str, status: m.RobotStatus) -> None:
+        """Keep a robot that acts under a session of another DVA from everybody until it is idle."""
+        held = robot in self.sessions.permissions.grants
+        known = robot in self.registry.entries
+        if known and status.mode != "Idle" and not held:
+            self._strangers.add(robot)
+            self.sessions.reserved.add(robot)
+        elif robot in self._strangers:
+            self._strangers.discard(robot)
+            self.sessions.reserved.discard(robot)
+
+    def _is_a_strangers(self, body: m.PermissionRequest) -> bool:
+        return body.device in self._strangers and body.level != "sensors"
+
+    def _with_revocations(self, sends: Iterable[Send]) -> list[Send]:
+        """Return the messages as `Dva` does, and the news for those who asked for help."""
+        return [*super()._with_revocations(sends), *self.help.news()]

@@ -1,0 +1,174 @@
+"""Deputies: copies of the events of another DVA, and their resumption when that one has died."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+from dva_sim.core.events import LOOKING, Event, State
+from dva_sim.core.orders import Orders
+from dva_sim.core.regions.division import Claim, Division
+from dva_sim.core.regions.help import MutualHelp
+from dva_sim.core.sessions import DvaAnswer
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import DETECTOR, PEER
+
+COME_WITHIN: Final = 4.0  # design: a responder that has not come by then is given up [s]
+MOST_COPIES: Final = 10_000  # of the events of one region
+
+
+class Copy(NamedTuple):
+    """Status of an event as its DVA has told it, and when [s]."""
+
+    status: m.EventStatus
+    told: float
+
+
+@dataclass
+class Deputy:
+    """Copies of the events of other regions, and what becomes of them.
+
+    Attributes:
+        division: Division of the site, with the service of each region.
+        orders: Current orders.
+        help: Help that is given: an event that is looked at already needs no second look.
+        copies: Copies of open events, by region and number.
+        taken_over: Time at which each region was taken over [s].
+    """
+
+    division: Division
+    orders: Orders
+    help: MutualHelp
+    copies: dict[str, dict[int, Copy]] = field(default_factory=dict)
+    taken_over: dict[str, float] = field(default_factory=dict)
+    _silent_since: dict[str, float] = field(default_factory=dict)
+    _came: dict[str, float] = field(default_factory=dict)
+
+    def keep(self, peer: str, body: m.Replicate, now: float) -> DvaAnswer:
+        """Keep a copy of an event, unless a newer claim to its region is known."""
+        known = self.division.claims.get(body.region)
+        if known is None:
+            return DvaAnswer(m.NOT_SUPPORTED, f"no region {body.region!r} is known here")
+        self.division.learn(body.region, Claim(body.epoch, peer))
+        if self.division.claims[body.region] != Claim(body.epoch, peer):
+            text = f"epoch {body.epoch} of {body.region} is over: it is {known.epoch}"
+            return DvaAnswer(m.STALE, text)
+        kept = self.copies.setdefault(body.region, {})
+        number = body.event.event_id
+        if body.event.closed_for is not None:
+            kept.pop(number, None)
+        elif number in kept or len(kept) < MOST_COPIES:
+            kept[number] = Copy(body.event, now)
+        return DvaAnswer()
+
+    def came(self, device: str, now: float) -> None:
+        """Note a device that was not registered here before."""
+        self._came[device] = now
+
+    def take_over(self, now: float) -> list[str]:
+        """Claim the regions of DVAs that have died, and whose devices come here; return them."""
+        registry = self.orders.registry
+        self._came = {d: at for d, at in self._came.items() if d in registry.entries}
+        taken = []
+        for region, claim in list(self.division.claims.items()):
+            entry = registry.entries.get(claim.dva)
+            if self.division.is_there(claim.dva, registry):
+                self._silent_since.pop(region, None)
+            else:
+                heard = now if entry is None else entry.last_heard
+                self._silent_since.setdefault(region, heard)
+            since = self._silent_since.get(region, now)
+            is_deputy = self.division.deputy_of(region, registry) == self.division.own
+            if now - since <= registry.silent_after or not is_deputy:
+                continue
+            if not self._has_come(region, since):
+                continue
+            self.division.learn(region, Claim(claim.epoch + 1, self.division.own))
+            self._silent_since.pop(region)
+            self.taken_over[region] = now
+            self.orders.counters["region taken over"] += 1
+            taken.append(region)
+        return taken
+
+    def _has_come(self, region: str, since: float) -> bool:
+        """Return True if a device has come that may have lost its DVA."""
+        entries = self.orders.registry.entries
+        late = (entries[device] for device, at in self._came.items() if at >= since)
+        return any(
+            entry.kind not in (PEER, DETECTOR)
+            and (entry.position is None or self.division.region_at(entry.position) == region)
+            for entry in late
+        )
+
+    def resume(self, now: float) -> None:
+        """Go on with the copied events of regions that were taken over."""
+        for region, since in self.taken_over.items():
+            kept = self.copies.get(region, {})
+            for number, copy in list(kept.items()):
+                sent = self._sent(copy.status)
+                there = all(self._is_there(device) for device in sent)
+                if there or now - since >= COME_WITHIN:
+                    del kept[number]
+                    self._go_on(copy, there, now)
+
+    @staticmethod
+    def _sent(status: m.EventStatus) -> list[str]:
+        every = status.responder, status.operator, status.actor
+        return [device for device in every if device is not None]
+
+    def _is_there(self, device: str) -> bool:
+        entry = self.orders.registry.entries.get(device)
+        return entry is not None and not entry.silent
+
+    def _go_on(self, copy: Copy, there: bool, now: float) -> None:
+        status = copy.status
+        if self._is_looked_at(status):
+            return
+        events = self.orders.events
+        state = State(status.event_state.replace("_", " "))
+        if not there and state in LOOKING:
+            state = State.PENDING
+        event = Event(
+            status.event_id,
+            status.kind,
+            status.position,
+            status.severity,
+            needs_containment=self.orders.rules.containment,
+            state=state,
+            sources={"": status.confidence},
+            times={"detected": copy.told - status.age},
+        )
+        began = copy.told - status.state_for
+        event.waiting_since = began if status.event_state == State.PENDING else now
+        event.handling.decisions = status.decisions
+        if state is not State.PENDING:
+            steps = {State.CONFIRMED: ["confirmed"], State.ON_SCENE: ["assigned", "arrived"]}
+            event.times |= dict.fromkeys(steps.get(state, ["assigned"]), began)
+        if there:
+            self._keep_at_it(event, status, began)
+        events.total += 1
+        events.first -= 1  # the next one that is new here is numbered as before
+        events.counts[event.state] += 1
+        events.restore(event)
+        self.orders.counters["event taken over"] += 1
+
+    def _is_looked_at(self, status: m.EventStatus) -> bool:
+        """Make a copy that this DVA looks at for the one that died an event of its own."""
+        for number, lent in list(self.help.copies.items()):
+            if lent.number == status.event_id:
+                self.help.adopt(number)
+                return True
+        return False
+
+    def _keep_at_it(self, event: Event, status: m.EventStatus, began: float) -> None:
+        event.responder = status.responder
+        event.operator = status.operator
+        event.actor = status.actor
+        event.taken_up = event.responder is not None
+        event.attempts = int(event.taken_up)
+        if event.actor is not None:
+            event.act_taken_up = True
+            event.times["act_assigned"] = began
+        for device in self._sent(status):
+            self.orders.engaged.begin(device, event)
+            event.sent.add(device)

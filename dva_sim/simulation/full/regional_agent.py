@@ -1,0 +1,198 @@
+"""A DVA of regions on the network: its peers, what it passes on, and what it waits for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from functools import partial
+from typing import Any, Final
+
+from dva_sim.agents.device import PEER_STATUS, REGISTER_AGAIN, RENEW_PERIOD, AgentDevice
+from dva_sim.core.events import Event
+from dva_sim.core.regions.regional_dva import RegionalDva
+from dva_sim.network.messaging import Request
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.devices import PEER
+from dva_sim.simulation.full.dva_server import DvaAgent
+
+PASS_WITHIN: Final = 3.0  # design: the other DVA takes a report by then, or this one does [s]
+COPY_WITHIN: Final = 0.3  # design: a report waits so long for its copy at the deputy [s]
+JOIN_AFTER: Final = 0.1  # design: from the start to the first registration with the others [s]
+STATUS_PERIOD: Final = 2.0  # design: [s]
+UNREPLICATED: Final = "unreplicated"
+NOT_COPIED: Final = "reports acknowledged without a copy at the deputy"
+
+
+class RegionalDvaAgent(DvaAgent):
+    """A DVA among others; its core is a `RegionalDva`.
+
+    Args:
+        device: As in `DvaAgent`, like all that follow.
+        core: Core of a DVA of regions.
+        **options: Keyword arguments of `DvaAgent`.
+    """
+
+    def __init__(self, device: AgentDevice, core: RegionalDva, **options: Any) -> None:
+        super().__init__(device, core, **options)
+        self._regional = core
+        self._request: Request | None = None  # that is being taken
+        self._facts = 0
+        self._copied: dict[int, int] = {}  # newest fact of each event that waits for its copy
+        self._held: dict[int, list[Callable[[str], object]]] = {}  # by fact
+        self._told: m.PeerStatus | None = None
+
+    def start(self) -> None:
+        """Begin as any DVA, and make oneself known to the others."""
+        super().start()
+        clock = self.device.clock
+        for peer in self._regional.division.peers:
+            clock.call_after(JOIN_AFTER, self._join, peer)
+        clock.every(STATUS_PERIOD, self._publish_status, start=clock.now + STATUS_PERIOD)
+
+    # --- the other DVAs --------------------------------------------------------------------
+
+    def _join(self, peer: str) -> None:
+        """Register with another DVA, again and again, as any device does with its own."""
+        if self.is_gone:
+            return
+        device = self.device
+
+        def answered(reply: m.Reply) -> None:
+            again = RENEW_PERIOD if reply.code == m.OK else REGISTER_AGAIN
+            device.clock.call_after(again, self._join, peer)
+
+        def failed() -> None:
+            device.clock.call_after(REGISTER_AGAIN, self._join, peer)
+
+        body = m.Registration(device.label, PEER, device.address)
+        device.ask(peer, body, answered, failed)
+
+    def _publish_status(self) -> bool:
+        if not self.is_gone and not self.device.silent:
+            self._tell_peers()
+        return not self.is_gone
+
+    def _tell_peers(self) -> None:
+        self._told = self._regional.peer_status(self.device.clock.now)
+        self.device.publish(PEER_STATUS, self._told)
+
+    def _tick(self) -> bool:
+        """Look at deadlines; a change of the regions that it serves goes out at once."""
+        goes_on = super()._tick()
+        for peer in self._regional.division.peers:
+            entry = self._regional.registry.entries.get(peer)
+            if entry is not None and entry.silent:
+                self.device.give_up(peer)
+        served = tuple(m.ServedRegion(*each) for each in self._regional.division.served())
+        if goes_on and self._told is not None and self._told.regions != served:
+            news = sorted({s.region for s in served} - {s.region for s in self._told.regions})
+            if news:
+                self.device.tell(f"takes over {', '.join(news)}", "link")
+            self._tell_peers()
+        return goes_on
+
+    # --- reports ---------------------------------------------------------------------------
+
+    def _take(self, request: Request) -> None:
+        self._request = request
+        super()._take(request)
+
+    def _on_request(self, message: m.Message) -> m.Reply | None:
+        request = self._request
+        assert request is not None
+        peer = self._regional.passes_on(message)
+        if peer is not None:
+            self._pass_on(request, message, peer)
+            return None
+        reply = super()._on_request(message)
+        is_new = isinstance(message.body, m.EventReport) and message.body.event_id is None
+        if not is_new or reply is None or reply.code != m.OK:
+            return reply
+        return self._held_back(request, message, reply)
+
+    def _pass_on(self, request: Request, message: m.Message, peer: str) -> None:
+        """Let another DVA take a report about its region; take it here if that one does not."""
+        assert isinstance(message.body, m.EventReport)
+        is_over = False
+
+        def conclude(reply: m.Reply | None) -> None:
+            nonlocal is_over
+            is_over = True
+            if reply is not None:
+                self.device.conclude(request, message, lambda _: reply)
+
+        def take_here() -> None:
+            if not is_over and not self.is_gone:
+                self.device.recorder.counters["reports kept for another DVA"] += 1
+                self._request = request
+                conclude(DvaAgent._on_request(self, message))
+
+        def answered(reply: m.Reply) -> None:
+            if is_over:
+                return
+            if reply.code in (m.OK, m.BUSY):
+                self.device.recorder.counters["reports passed on"] += 1
+                conclude(replace(reply, answers=message.message_id))
+            else:
+                take_here()
+
+        body = replace(message.body, origin=message.source)
+        self.device.ask(peer, body, answered, take_here)
+        self.device.clock.call_after(PASS_WITHIN, take_here)
+
+    def _held_back(self, request: Request, message: m.Message, reply: m.Reply) -> m.Reply | None:
+        """Return the reply to a report, or None while it waits for the copy at the deputy."""
+        assert isinstance(message.body, m.EventReport)
+        event = self._regional.events.near(message.body.kind, message.body.position)
+        if event is None:
+            return reply
+        fact = self._copied.get(event.number)
+        if fact is None:
+            has_deputy = self._regional.replica_of(event, 1, self.device.clock.now) is not None
+            return reply if has_deputy else self._unreplicated(reply)
+        is_over = False
+
+        def release(text: str) -> None:
+            nonlocal is_over
+            if not is_over and not self.is_gone:
+                is_over = True
+                said = self._unreplicated(reply) if text else reply
+                self.device.conclude(request, message, lambda _: said)
+
+        self._held.setdefault(fact, []).append(release)
+        self.device.clock.call_after(COPY_WITHIN, release, UNREPLICATED)
+        return None
+
+    def _unreplicated(self, reply: m.Reply) -> m.Reply:
+        self.device.recorder.counters[NOT_COPIED] += 1
+        return replace(reply, text=UNREPLICATED)
+
+    # --- copies at the deputy ----------------------------------------------------------------
+
+    def _publish_news(self, changed: Iterable[Event]) -> None:
+        super()._publish_news(changed)
+        if self._keep_events:
+            self.copies.update(self._regional.help.copies)
+        for event in changed:
+            self._replicate(event)
+
+    def _replicate(self, event: Event) -> None:
+        """Tell the deputy how an event is now."""
+        replica = self._regional.replica_of(event, self._facts + 1, self.device.clock.now)
+        if replica is None:
+            return
+        deputy, body = replica
+        self._facts += 1
+        fact = self._facts
+        self._copied[event.number] = fact
+
+        def settled(text: str) -> None:
+            if self._copied.get(event.number) == fact:
+                del self._copied[event.number]
+            for release in self._held.pop(fact, []):
+                release(text)
+
+        def answered(reply: m.Reply) -> None:
+            settled("" if reply.code == m.OK else UNREPLICATED)
+
+        self.device.ask(deputy, body, answered, partial(settled, UNREPLICATED))

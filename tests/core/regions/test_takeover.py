@@ -1,0 +1,157 @@
+"""Deputies: what they keep, when they take over, and what becomes of the events."""
+
+import pytest
+from helpers.dva.dispatch_office import DETECTOR, GUARD, OPERATOR, OTHER_GUARD, ROBOT, east
+from helpers.dva.two_offices import EAST, WEST, Street
+
+from dva_sim.core.events import State
+from dva_sim.core.regions.division import Claim
+from dva_sim.protocol import messages as m
+
+
+def copied(street, state, **more):
+    """A status of event 7 in the west, as its DVA tells its deputy."""
+    usual = {"age": 20.0, "state_for": 5.0, "decisions": 1, **more}
+    status = m.EventStatus(7, "fire", east(10), 0.8, 0.9, state, **usual)
+    return street.say(EAST, WEST, m.Replicate("west", 1, 1, status))
+
+
+def dead_west(state="pending", **more):
+    """A street whose western DVA has died after one event was copied, and whose guard comes."""
+    street = Street()
+    street.tick(2)
+    assert copied(street, state, **more).code == m.OK
+    street.dead.add(WEST)
+    street.tick(12)
+    street.guard(EAST, GUARD, 5)
+    return street
+
+
+def test_a_deputy_takes_a_region_over_when_a_device_has_come_and_its_dva_is_silent():
+    street = dead_west()
+    assert street.cores[EAST].division.claims["west"] == Claim(1, WEST)
+    street.tick(1, GUARD)
+    assert street.cores[EAST].division.claims["west"] == Claim(2, EAST)
+
+
+def test_no_deputy_takes_over_while_no_device_of_the_region_has_come():
+    street = Street()
+    street.tick(2)
+    street.dead.add(WEST)
+    street.tick(12)
+    street.guard(EAST, GUARD, 90)
+    street.register(EAST, DETECTOR, "Sensor")
+    street.tick(20, GUARD, DETECTOR)
+    assert street.cores[EAST].division.claims["west"] == Claim(1, WEST)
+
+
+def test_no_deputy_takes_over_while_it_hears_the_dva():
+    street = Street()
+    street.guard(EAST, GUARD, 5)
+    street.tick(9, GUARD)
+    assert street.cores[EAST].division.claims["west"] == Claim(1, WEST)
+
+
+def test_an_event_that_waited_is_given_to_somebody_with_its_age_and_number():
+    street = dead_west()
+    street.tick(1, GUARD)
+    assert street.told(GUARD, m.Order) == [m.Order(7, "fire", east(10), None)]
+    event = street.cores[EAST].events.open[7]
+    assert event.times["detected"] == pytest.approx(2.0 - 20.0)
+    assert event.waiting_since == pytest.approx(2.0 - 5.0)
+    assert event.severity == 0.8
+
+
+def test_who_is_on_the_way_goes_on_and_gets_no_second_order():
+    street = dead_west("assigned", responder=GUARD)
+    street.tick(6, GUARD)
+    event = street.cores[EAST].events.open[7]
+    assert (event.state, event.responder) == (State.ASSIGNED, GUARD)
+    assert street.told(GUARD, m.Order) == []
+    assert street.say(EAST, GUARD, m.OrderProgress(7, "arrived")).code == m.OK
+    finding = m.EventReport(7, "fire", east(10), 0.5, 0.9, "confirmed")
+    assert street.say(EAST, GUARD, finding).code == m.OK
+    assert street.cores[EAST].events.closed[7].state is State.CONFIRMED
+
+
+def test_an_event_whose_responder_does_not_come_within_four_seconds_is_anothers():
+    street = dead_west("on_scene", responder=OTHER_GUARD)
+    street.tick(4, GUARD)
+    assert street.told(GUARD, m.Order) == []
+    street.tick(1, GUARD)
+    assert street.told(GUARD, m.Order) == [m.Order(7, "fire", east(10), None)]
+
+
+def test_an_event_that_is_over_is_not_taken_over():
+    street = Street()
+    street.tick(2)
+    copied(street, "pending")
+    copied(street, "refuted", closed_for=0.0)
+    street.dead.add(WEST)
+    street.tick(12)
+    street.guard(EAST, GUARD, 5)
+    street.tick(6, GUARD)
+    assert not street.cores[EAST].events.open
+
+
+def test_a_deputy_refuses_copies_of_an_older_epoch():
+    street = dead_west()
+    street.tick(1, GUARD)
+    refused = copied(street, "assigned")
+    assert (refused.code, refused.text) == (m.STALE, "epoch 1 of west is over: it is 2")
+
+
+def test_a_dva_that_comes_back_serves_the_region_no_longer_and_passes_its_events_on():
+    street = dead_west()
+    street.tick(1, GUARD)
+    street.dead.clear()
+    street.cores[WEST].division.claims["west"] = Claim(1, WEST)
+    street.register(WEST, DETECTOR, "Sensor")
+    street.fire(WEST, DETECTOR, 30)
+    street.tick(3, GUARD, DETECTOR)
+    assert street.cores[WEST].division.claims["west"] == Claim(2, EAST)
+    assert not street.cores[WEST].events.open
+    assert [e.position for e in street.cores[EAST].events.open.values()] == [east(10), east(30)]
+
+
+def test_a_robot_that_is_driven_under_a_session_of_the_dead_is_nobody_elses():
+    street = dead_west()
+    for device, kind in ((ROBOT, "Robot"), (OPERATOR, "TeleOp")):
+        street.register(EAST, device, kind)
+    driven = m.RobotStatus("Teleoperation", east(12), 0.0, 0.3, 0.0, 1)
+    street.publish(EAST, ROBOT, driven)
+    wish = m.PermissionRequest(ROBOT, "teleoperation")
+    assert street.say(EAST, OPERATOR, wish).code == m.BUSY
+    street.cores[EAST].dismiss(GUARD, street.now)
+    street.tick(8, ROBOT, OPERATOR)
+    assert street.told(OPERATOR, m.Order) == []
+    street.publish(EAST, ROBOT, m.RobotStatus("Idle", east(12), 0.0, 0.0, 0.0, 2))
+    street.tick(1, ROBOT, OPERATOR)
+    assert street.told(OPERATOR, m.Order) == [m.Order(7, "fire", east(10), ROBOT)]
+
+
+def test_a_dva_numbers_on_from_what_it_had_given_before_it_died():
+    street = Street()
+    street.tick(2)
+    status = m.EventStatus(5, "fire", east(10), 0.8, 0.9, "pending", 20.0, 5.0, 1)
+    street.say(WEST, EAST, m.Replicate("west", 2, 1, status))
+    street.register(WEST, DETECTOR, "Sensor")
+    street.parted = True
+    street.fire(WEST, DETECTOR, 20)
+    assert list(street.cores[WEST].events.open) == [6]
+
+
+def test_a_look_that_was_asked_for_by_the_dead_goes_on_as_the_deputys_own():
+    street = Street()
+    street.register(WEST, DETECTOR, "Sensor")
+    street.guard(EAST, GUARD, 90)
+    street.fire(WEST, DETECTOR, 10)
+    street.tick(6, GUARD, DETECTOR)
+    status = street.cores[WEST].replica_of(street.cores[WEST].events.open[1], 1, street.now)
+    street.say(EAST, WEST, status[1])
+    street.dead.add(WEST)
+    street.tick(12, GUARD)
+    street.guard(EAST, OTHER_GUARD, 5)
+    street.tick(6, GUARD, OTHER_GUARD)
+    assert list(street.cores[EAST].events.open) == [1_000_001]
+    assert not street.cores[EAST].help.copies

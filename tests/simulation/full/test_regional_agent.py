@@ -1,0 +1,193 @@
+"""Several DVAs in one run: passed on, lent, copied, taken over, and back; no rule is broken."""
+
+import pytest
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.protocol import messages as m
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.regional_agent import NOT_COPIED
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import id_of
+
+HALL = {
+    "site": {"name": "hall"},
+    "robot": {"count": 1},
+    "operator": {"count": 1},
+    "guard": {"count": 2},
+    "control": "supervisory",
+    "events": [{"kind": "fire", "position": [50, 20], "at_s": 5, "reported": True}],
+    "dva": {
+        "regions": {
+            "west": {"polygon": [[0, 0], [30, 0], [30, 40], [0, 40]]},
+            "east": {"rest": True},
+        }
+    },
+    "horizon_s": 200,
+}
+WEST, EAST = id_of("dva", 1), id_of("dva", 2)
+
+
+def hall(**changes) -> Run:
+    run = Run(scenarios.build(HALL, {k.replace("__", "."): v for k, v in changes.items()}), 1)
+    run.stage.recorder.keeps = True
+    return run
+
+
+def caller(run, x, y, dva) -> AgentDevice:
+    """A device that is registered with a DVA."""
+    device = run.stage.device("detector", 90, (x, y))
+    device.dva = dva
+    device.register()
+    return device
+
+
+def report(run, device, x, y, answers) -> None:
+    place = m.Position(*run.stage.site.frame.to_latlon(x, y))
+    body = m.EventReport(None, "flood", place, 0.5, 0.9, "detected")
+    device.ask(device.dva, body, answers.append, lambda: answers.append(None))
+
+
+def counts(run):
+    return run.recorder.counters
+
+
+def open_events(run, dva):
+    return [e.number for e in run.dvas[dva].core.events.open.values()]
+
+
+def test_devices_register_with_the_dva_of_their_place():
+    run = hall()
+    run.clock.run(3.0)
+    west, east = (run.dvas[dva].core.registry.entries for dva in (WEST, EAST))
+    assert {id_of("robot", 1), id_of("operator", 1), EAST} <= west.keys()
+    assert {id_of("guard", 1), id_of("guard", 2), WEST} <= east.keys()
+    assert not west.keys() & east.keys()
+
+
+def test_a_report_about_another_region_is_booked_there_once_and_answered():
+    run = hall()
+    device, answers = caller(run, 5, 5, WEST), []
+    run.clock.run(2.0)
+    report(run, device, 40, 5, answers)
+    run.clock.run(3.0)
+    assert [reply.code for reply in answers] == [m.OK]
+    assert open_events(run, WEST) == []
+    assert open_events(run, EAST) == [1_000_001]
+    assert counts(run)["reports passed on"] == 1
+
+
+def test_a_report_that_the_other_dva_does_not_take_within_three_seconds_is_kept_here():
+    run = hall()
+    device, answers = caller(run, 5, 5, WEST), []
+    run.clock.run(2.0)
+    run.end_dva(2)
+    report(run, device, 40, 5, answers)
+    run.clock.run(4.9)
+    assert answers == []
+    run.clock.run(5.5)
+    assert [reply.code for reply in answers] == [m.OK]
+    assert open_events(run, WEST) == [1]
+
+
+def test_a_report_is_answered_once_the_deputy_has_its_copy():
+    run = hall()
+    device, answers = caller(run, 5, 5, WEST), []
+    run.clock.run(2.0)
+    report(run, device, 10, 5, answers)
+    run.clock.run(2.2)
+    assert [(reply.code, reply.text) for reply in answers] == [(m.OK, "")]
+    assert list(run.dvas[EAST].core.deputy.copies["west"]) == [1]
+
+
+def test_a_report_without_a_copy_is_answered_as_unreplicated_after_300_ms_and_counted():
+    run = hall()
+    device, answers = caller(run, 5, 5, WEST), []
+    run.clock.run(2.0)
+    run.end_dva(2)
+    report(run, device, 10, 5, answers)
+    run.clock.run(2.25)
+    assert answers == []
+    run.clock.run(2.4)
+    assert [(reply.code, reply.text) for reply in answers] == [(m.OK, "unreplicated")]
+    assert counts(run)[NOT_COPIED] == 1
+
+
+def test_a_dva_without_robots_in_hand_lends_a_guard_and_gets_him_back():
+    run = hall(robot__count=0, events__0__position=[10, 20])
+    recording = run.run()
+    assert [(e.number, e.state, e.responder) for e in recording.events] == [(1, "confirmed", EAST)]
+    assert not run.dvas[EAST].core.help.copies
+    assert not run.dvas[EAST].core.orders.engaged
+    assert not recording.recorder.broken
+
+
+DEATH = [{"region": "east", "at_s": 20.0}]
+
+
+def test_a_deputy_goes_on_where_a_dva_was_killed_while_a_guard_was_under_way():
+    run = hall(dva__deaths=DEATH)
+    recording = run.run()
+    (event,) = recording.events
+    assert (event.number, event.state) == (1_000_001, "confirmed")
+    assert event.times["assigned"] < 20.0
+    assert run.dvas[WEST].core.division.claims["east"] == (2, WEST)
+    assert {guard.device.dva for guard in run.field.guards} == {WEST}
+    assert not recording.recorder.broken
+
+
+@pytest.mark.parametrize("at_s", [22.0, 60.0])
+def test_the_next_event_of_a_dead_dvas_region_is_assigned_in_time(at_s):
+    events = [{"kind": "fire", "position": [50, 20], "at_s": at_s, "reported": True}]
+    run = hall(dva__deaths=DEATH, events=events)
+    run.clock.run(max(20.0 + 25.0, at_s + 10.0))
+    (event,) = run.dvas[WEST].core.events.open.values()
+    assert event.state == "assigned"
+    assert not run.recorder.broken
+
+
+def test_a_dva_that_is_back_serves_no_region_and_is_the_deputy():
+    run = hall(dva__deaths=[{"region": "east", "at_s": 20.0, "back_after_s": 40.0}])
+    device, answers = caller(run, 5, 5, WEST), []
+    run.clock.run(70.0)
+    assert dict(run.dvas[EAST].core.division.served()) == {}
+    assert dict(run.dvas[WEST].core.division.served()) == {"west": 1, "east": 2}
+    report(run, device, 50, 5, answers)
+    run.clock.run(71.0)
+    assert [(reply.code, reply.text) for reply in answers] == [(m.OK, "")]
+    assert run.dvas[EAST].core.deputy.copies["east"]
+    assert not run.recorder.broken
+
+
+def test_a_device_obeys_the_last_dva_until_the_other_has_confirmed():
+    run = hall()
+    run.clock.run(3.0)
+    guard = run.field.guards[0].device
+    run.network.leave(WEST)
+    hand_over = m.HandOver(WEST)
+    answers = []
+    run.dvas[EAST].device.ask(guard.id_tag, hand_over, answers.append)
+    run.clock.run(8.0)
+    assert [reply.code for reply in answers] == [m.OK]
+    assert guard.dva == EAST
+    run.network.come_back(WEST)
+    run.clock.run(14.0)
+    assert guard.dva == WEST
+
+
+@pytest.mark.parametrize(
+    ("source", "dva", "code"),
+    [(WEST, WEST, m.NOT_PERMITTED), (EAST, "02:00:00:00:00:09", m.UNKNOWN_DEVICE)],
+)
+def test_a_device_takes_a_hand_over_only_from_its_dva_and_to_one_that_it_knows(source, dva, code):
+    run = hall()
+    run.clock.run(3.0)
+    guard, answers = run.field.guards[0].device, []
+    run.dvas[source].device.ask(guard.id_tag, m.HandOver(dva), answers.append)
+    run.clock.run(5.0)
+    assert [reply.code for reply in answers] == [code]
+    assert guard.dva == EAST
+
+
+def test_the_same_seed_gives_the_same_run_of_several_dvas():
+    one, other = (hall(dva__deaths=DEATH).run() for _ in range(2))
+    assert one.recorder.timeline == other.recorder.timeline
