@@ -27,6 +27,7 @@ class Division:
         lines: DVAs that serve each region in turn, its own first, by the name of the region.
         region_at: Function that returns the region of a place.
         outside: Function that returns how far a place is outside a region [m].
+        life: Number that tells this start of the DVA from others; it is part of event numbers.
         claims: Highest claim to each region that is known.
     """
 
@@ -34,6 +35,7 @@ class Division:
     lines: Mapping[str, tuple[str, ...]]
     region_at: Callable[[m.Position], str]
     outside: Callable[[str, m.Position], float]
+    life: int = 0
     claims: dict[str, Claim] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

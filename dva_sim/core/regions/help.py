@@ -17,6 +17,7 @@ from dva_sim.core.sessions import DvaAnswer, Send
 from dva_sim.protocol import messages as m
 
 ASK_AFTER: Final = 5.0  # design: an event for which nobody was free for so long needs help [s]
+KNOWN_FOR: Final = 5.0  # design: a DVA is asked that has said what it serves since then [s]
 SEVERITY: Final = 0.5  # of a copy: an order does not say it
 _FINDINGS: Final = {State.CONFIRMED: "confirmed", State.REFUTED: "refuted"}
 
@@ -36,14 +37,20 @@ class MutualHelp:
         division: Division of the site, with the service of each region.
         dispatcher: Dispatcher with all orders.
         copies: Events of others that this DVA looks at for them, by its own number.
+        adopted: Copies that have become events of this DVA's own.
         lent: Devices that have worked for others and may still be away.
+        told: Time at which each other DVA last said what it serves [s].
+        unheard: Words about orders that have not reached another DVA, by that DVA.
     """
 
     division: Division
     dispatcher: Dispatcher
     copies: dict[int, Lent] = field(default_factory=dict)
+    adopted: set[int] = field(default_factory=set)
     lent: set[str] = field(default_factory=set)
-    _told: dict[int, list[str]] = field(default_factory=dict)
+    told: dict[str, float] = field(default_factory=dict)
+    unheard: dict[str, list[Send]] = field(default_factory=dict)
+    _news: dict[int, list[str]] = field(default_factory=dict)
 
     # --- asked for -----------------------------------------------------------------------
 
@@ -62,13 +69,16 @@ class MutualHelp:
         return sends
 
     def _needs_help(self, event: Event, now: float) -> bool:
-        is_own = event.number not in self.copies
+        serves = self.division.dva_at(event.position) == self.division.own
+        is_own = serves and event.number not in self.copies
         return is_own and event.state is State.PENDING and now - event.waiting_since >= ASK_AFTER
 
     def _may_help(self, dva: str, event: Event, now: float) -> bool:
         registry = self.dispatcher.orders.registry
         if not self.division.is_there(dva, registry) or dva in event.failed:
             return False
+        if now - self.told.get(dva, -KNOWN_FOR) >= KNOWN_FOR:
+            return False  # who was parted from it may not know yet whose event it is
         return registry.entries[dva].free_from <= now and dva not in event.handling.taken_off
 
     # --- given ---------------------------------------------------------------------------
@@ -98,14 +108,30 @@ class MutualHelp:
 
     def end(self, copy: Event, now: float) -> list[Send]:
         """Let those go who were lent: the asker needs no help any longer."""
-        self.adopt(copy.number)
+        self._drop(copy.number)
         cause = Cause.SUPERSEDED if copy.state in LOOKING else Cause.WITHDRAWN
         return self.dispatcher.orders.transition(copy, cause, now)
 
     def adopt(self, number: int) -> None:
         """Keep a copy as an event of one's own: the DVA that asked for help is gone."""
-        self.copies.pop(number)
-        self._told.pop(number, None)
+        self.adopted.add(number)
+        self._drop(number)
+
+    def _drop(self, number: int) -> None:
+        del self.copies[number]
+        self._news.pop(number, None)
+
+    def claim(self, kind: str, place: m.Position) -> list[Send]:
+        """Make a copy an event of one's own, as it is reported here; return the word to its asker.
+
+        The asker may close its event, now that this DVA has the report.
+        """
+        event = self.dispatcher.orders.events.near(kind, place)
+        if event is None or event.number not in self.copies:
+            return []
+        lent = self.copies[event.number]
+        self.adopt(event.number)
+        return [Send(lent.asker, m.OrderProgress(lent.number, "failed"))]
 
     def news(self) -> list[Send]:
         """Return what askers have not been told yet of the events that are looked at for them."""
@@ -118,14 +144,14 @@ class MutualHelp:
             steps = (
                 [] if event is None else [s for s in ("departed", "arrived") if s in event.times]
             )
-            told = self._told.setdefault(number, [])
+            told = self._news.setdefault(number, [])
             news: list[m.Body] = [
                 m.OrderProgress(lent.number, step) for step in steps if step not in told
             ]
             told += [step for step in steps if step not in told]
             if event is None or not event.open:
                 news += self._ends(event, lent)
-                del self.copies[number], self._told[number]
+                self._drop(number)
             sends += [Send(lent.asker, body) for body in news]
         return sends
 

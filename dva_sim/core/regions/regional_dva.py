@@ -8,18 +8,21 @@ from typing import Any
 
 from dva_sim.core.dva import Dva
 from dva_sim.core.event_status import status_of
-from dva_sim.core.events import Event
+from dva_sim.core.events import Event, State, apart
 from dva_sim.core.regions.borders import Borders
 from dva_sim.core.regions.division import Claim, Division
 from dva_sim.core.regions.help import MutualHelp
 from dva_sim.core.regions.strays import Strays
 from dva_sim.core.regions.takeover import Deputy
 from dva_sim.core.registry import DeviceEntry
+from dva_sim.core.reports import NO_NEWS
 from dva_sim.core.sessions import DvaAnswer, Send
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import PEER
 
+FOUND = frozenset({State.CONFIRMED, State.CONTAINED, State.ESCALATED})
 NUMBERS = 1_000_000  # of events that one DVA gives: no two give the same
+LIFE = 10_000  # of them that it gives from one start to the next
 
 
 class RegionalDva(Dva):
@@ -41,8 +44,8 @@ class RegionalDva(Dva):
     def __init__(self, *args: Any, division: Division, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.division = division
-        self._numbers = NUMBERS * [line[0] for line in division.lines.values()].index(division.own)
-        self.events.first = self._numbers
+        place = [line[0] for line in division.lines.values()].index(division.own)
+        self.events.first = NUMBERS * place + LIFE * (division.life % (NUMBERS // LIFE))
         self.help = MutualHelp(division, self.dispatcher)
         self.borders = Borders(division, self.orders, self.help)
         self.deputy = Deputy(division, self.orders, self.help)
@@ -50,6 +53,7 @@ class RegionalDva(Dva):
         self.peers: dict[str, m.PeerStatus] = {}
         self.orders.unwatched |= set(division.peers)
         self._strangers: set[str] = set()
+        self._deputies: dict[str, str] = {}
 
     # --- what the agent asks --------------------------------------------------------------
 
@@ -103,6 +107,8 @@ class RegionalDva(Dva):
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
         """Handle a message that was not taken; others than orders are said again later."""
+        if isinstance(send.body, m.OrderProgress) and send.to in self.division.peers:
+            self.help.unheard.setdefault(send.to, []).append(send)
         is_later = isinstance(send.body, m.HandOver | m.EventReport)
         return [] if is_later else super().undelivered(send, now)
 
@@ -115,6 +121,7 @@ class RegionalDva(Dva):
         """Handle the passing of time, as in `Dva`: the dead, borders, and help."""
         self.deputy.take_over(now)
         self.deputy.resume(now)
+        self._copy_to_new_deputies()
         sends = super().tick(now)
         sends += self.borders.cross(now)
         sends += self.help.ask(now)
@@ -124,8 +131,18 @@ class RegionalDva(Dva):
     def _answer(self, message: m.Message, now: float) -> DvaAnswer:
         body = message.body
         entry = self.registry.entries.get(message.source)
-        if isinstance(body, m.Registration) and entry is None:
+        is_new = isinstance(body, m.Registration) and (
+            entry is None or entry.is_new_life(message.message_id, message.timestamp)
+        )
+        if is_new and isinstance(body, m.Registration) and body.device_type == PEER:
+            self._deputies.clear()
+            returned = self.deputy.return_copies(message.source, now)
+            answer = super()._answer(message, now)
+            return replace(answer, sends=[*answer.sends, *returned])
+        if is_new and entry is None:
             self.deputy.came(message.source, now)
+        if isinstance(body, m.EventReport) and body.event_id is None:
+            self.deputy.reported(message.source, self.division.region_at(body.position))
         if isinstance(body, m.PermissionRequest) and self._is_a_strangers(body):
             return DvaAnswer(m.BUSY, "it is driven under a session of another DVA")
         if entry is None or entry.kind != PEER:
@@ -138,8 +155,13 @@ class RegionalDva(Dva):
         source = message.source
         match message.body:
             case m.EventReport(event_id=None, origin=str(origin)) as report:
+                is_stray = origin in self.division.peers
+                if is_stray and self._is_no_news(report, now):
+                    return DvaAnswer()  # somebody has been there meanwhile
                 reporter = replace(entry, device=replace(entry.device, id_tag=origin))
-                return self._reports.sighted(reporter, report, now)
+                sends = self.help.claim(report.kind, report.position)
+                answer = self._reports.sighted(reporter, report, now)
+                return replace(answer, sends=[*answer.sends, *sends])
             case m.Order() as order:
                 return self.help.give(source, order, now)
             case m.OrderProgress(event_id=number, state="done") if copy := self.help.copy_of(
@@ -151,14 +173,26 @@ class RegionalDva(Dva):
                 if event is not None:  # where it has sent somebody, it has seen him arrive
                     self.registry.locate(entry, event.position)
             case m.Replicate() as copied:
-                self._count_from(copied.event.event_id)
                 return self.deputy.keep(source, copied, now)
         return super()._answer(message, now)
 
-    def _count_from(self, number: int) -> None:
-        """Give no number again that an earlier life of this DVA has given."""
-        if self._numbers < number <= self._numbers + NUMBERS:
-            self.events.first = max(self.events.first, number - self.events.total)
+    def _copy_to_new_deputies(self) -> None:
+        """Let all open events be copied, where another DVA is the deputy than before."""
+        registry = self.registry
+        served = (region for region, _ in self.division.served())
+        found = {region: self.division.deputy_of(region, registry) for region in served}
+        deputies = {region: deputy for region, deputy in found.items() if deputy is not None}
+        if deputies != self._deputies:
+            self._deputies = deputies
+            for event in self.events.open.values():
+                self.events.touch(event)
+
+    def _is_no_news(self, report: m.EventReport, now: float) -> bool:
+        """Return True if somebody has found the same event here lately."""
+        lately = (e for e in self.events.closed.values() if now - e.times["closed"] < NO_NEWS)
+        found = (e for e in lately if e.state in FOUND and e.kind == report.kind)
+        near = self.events.merge_distance
+        return any(apart(event.position, report.position) < near for event in found)
 
     def _hears_of(self, peer: str, status: m.PeerStatus, now: float) -> list[Send]:
         entry = self.registry.heard(peer, now)
@@ -166,12 +200,15 @@ class RegionalDva(Dva):
             self.refused += 1
             return []
         self.peers[peer] = status
+        self.help.told[peer] = now
         before = dict(self.division.served())
-        for each in status.regions:
-            self.division.learn(each.region, Claim(each.epoch, peer))
+        claims = [(each.region, Claim(each.epoch, peer)) for each in status.regions]
+        learned = [self.division.learn(*claim) for claim in claims]
         lost = before.keys() - dict(self.division.served()).keys()
         self.orders.counters["region yielded"] += len(lost)
-        return self.strays.pass_on(now) if lost else []
+        sends = self.help.unheard.pop(peer, [])
+        sends += self.deputy.return_copies(peer, now) if any(learned) else []
+        return sends + (self.strays.pass_on(now) if lost else [])
 
     # --- robots under sessions of others ---------------------------------------------------
 

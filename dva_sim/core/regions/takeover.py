@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
 from dva_sim.core.events import LOOKING, Event, State
 from dva_sim.core.orders import Orders
 from dva_sim.core.regions.division import Claim, Division
 from dva_sim.core.regions.help import MutualHelp
-from dva_sim.core.sessions import DvaAnswer
+from dva_sim.core.sessions import DvaAnswer, Send
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import DETECTOR, PEER
+from dva_sim.protocol.wire_size import sent_time
 
 COME_WITHIN: Final = 4.0  # design: a responder that has not come by then is given up [s]
 MOST_COPIES: Final = 10_000  # of the events of one region
@@ -43,12 +45,17 @@ class Deputy:
     taken_over: dict[str, float] = field(default_factory=dict)
     _silent_since: dict[str, float] = field(default_factory=dict)
     _came: dict[str, float] = field(default_factory=dict)
+    _reported: dict[str, float] = field(default_factory=dict)  # when such a one came [s]
 
     def keep(self, peer: str, body: m.Replicate, now: float) -> DvaAnswer:
         """Keep a copy of an event, unless a newer claim to its region is known."""
         known = self.division.claims.get(body.region)
         if known is None:
             return DvaAnswer(m.NOT_SUPPORTED, f"no region {body.region!r} is known here")
+        if known == Claim(body.epoch, self.division.own):  # it returns what this DVA has forgotten
+            self.copies.setdefault(body.region, {})[body.event.event_id] = Copy(body.event, now)
+            self.taken_over[body.region] = now
+            return DvaAnswer()
         self.division.learn(body.region, Claim(body.epoch, peer))
         if self.division.claims[body.region] != Claim(body.epoch, peer):
             text = f"epoch {body.epoch} of {body.region} is over: it is {known.epoch}"
@@ -61,9 +68,26 @@ class Deputy:
             kept[number] = Copy(body.event, now)
         return DvaAnswer()
 
+    def return_copies(self, peer: str, now: float) -> list[Send]:
+        """Return the copies that a DVA needs which was started again, before it was replaced."""
+        sends: list[Send] = []
+        for region, (epoch, dva) in self.division.claims.items():
+            for copy in self.copies.get(region, {}).values() if dva == peer else ():
+                passed = now - copy.told
+                age = sent_time(copy.status.age + passed)
+                state_for = sent_time(copy.status.state_for + passed)
+                status = replace(copy.status, age=age, state_for=state_for)
+                sends.append(Send(peer, m.Replicate(region, epoch, len(sends) + 1, status)))
+        return sends
+
     def came(self, device: str, now: float) -> None:
         """Note a device that was not registered here before."""
         self._came[device] = now
+
+    def reported(self, device: str, region: str) -> None:
+        """Note a report about a region: a detector that has come here may be of that region."""
+        if device in self._came:
+            self._reported[region] = self._came[device]
 
     def take_over(self, now: float) -> list[str]:
         """Claim the regions of DVAs that have died, and whose devices come here; return them."""
@@ -91,7 +115,9 @@ class Deputy:
         return taken
 
     def _has_come(self, region: str, since: float) -> bool:
-        """Return True if a device has come that may have lost its DVA."""
+        """Return True if a device has come, or reports, that may have lost its DVA."""
+        if self._reported.get(region, -math.inf) >= since:
+            return True
         entries = self.orders.registry.entries
         late = (entries[device] for device, at in self._came.items() if at >= since)
         return any(
@@ -122,9 +148,9 @@ class Deputy:
 
     def _go_on(self, copy: Copy, there: bool, now: float) -> None:
         status = copy.status
-        if self._is_looked_at(status):
-            return
         events = self.orders.events
+        if events.get(status.event_id) is not None or self._is_looked_at(status):
+            return
         state = State(status.event_state.replace("_", " "))
         if not there and state in LOOKING:
             state = State.PENDING

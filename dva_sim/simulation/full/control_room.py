@@ -58,6 +58,7 @@ def add_dva(
     memory: Store | None = None,
     keep_events: bool = True,
     number: int = 1,
+    life: int = 0,
 ) -> DvaAgent:
     """The DVA; sessions are drawn by the run's seed where no other `permissions` are given.
 
@@ -66,6 +67,7 @@ def add_dva(
         memory: State that survives the DVA.
         keep_events: True to keep all past events, for a recording.
         number: Number among the DVAs of the regions.
+        life: Number of its starts before this one.
 
     Raises:
         ConfigError: a policy that cannot be loaded.
@@ -73,7 +75,7 @@ def add_dva(
     device = stage.device("dva", number)
     draw = stage.streams[f"{_stream_of(number)}/sessions"]
     permissions = permissions or Permissions(lambda: int(draw.integers(2**LOW_BITS)))
-    core = make_core(stage, permissions, number)
+    core = make_core(stage, permissions, number, life)
     if isinstance(core, RegionalDva):
         kept = {"memory": memory, "keep_events": keep_events}
         return RegionalDvaAgent(device, core, is_public=stage.attended, **kept)
@@ -84,13 +86,14 @@ def _stream_of(number: int) -> str:
     return "dva" if number == 1 else f"dva-{number}"
 
 
-def make_core(stage: Stage, permissions: Permissions, number: int = 1) -> Dva:
+def make_core(stage: Stage, permissions: Permissions, number: int = 1, life: int = 0) -> Dva:
     """Build the DVA that a scenario wants.
 
     Args:
         stage: The stage.
         permissions: Permissions.
         number: Number among the DVAs of the regions.
+        life: Number of its starts before this one.
 
     Raises:
         ConfigError: a policy that cannot be loaded.
@@ -111,7 +114,7 @@ def make_core(stage: Stage, permissions: Permissions, number: int = 1) -> Dva:
         )
         for rule in stage.scenario.access
     ]
-    division = None if stage.regions is None else _division(stage, permissions.own)
+    division = None if stage.regions is None else _division(stage, permissions.own, life)
     kind = Dva if division is None else partial(RegionalDva, division=division)
     return kind(
         policy,
@@ -136,7 +139,7 @@ def make_core(stage: Stage, permissions: Permissions, number: int = 1) -> Dva:
     )
 
 
-def _division(stage: Stage, own: str) -> Division:
+def _division(stage: Stage, own: str, life: int) -> Division:
     """Return the division of the site, as the DVA with this id knows it at first."""
     plan = stage.regions
     assert plan is not None, "one DVA serves everything"
@@ -146,6 +149,7 @@ def _division(stage: Stage, own: str) -> Division:
         {name: stage.dvas_for(name) for name in plan.names},
         lambda place: plan.region_at(*to_xy(place.latitude, place.longitude)),
         lambda region, place: plan.outside(region, *to_xy(place.latitude, place.longitude)),
+        life,
     )
 
 

@@ -27,10 +27,13 @@ LOST_BY_RESTART = 1.0  # a DVA that was killed goes on from the time that it wro
 INFORMED_WITHIN = (
     90.0  # a robot that is heard is told of the end of a session, whatever waits before [s]
 )
+RETURNED_WITHIN = 8.0  # a DVA of regions has its events back from its deputy [s]
+TOGETHER = 20.0  # two deaths of DVAs within that are at once: copies take a while [s]
 HEARD_LATE = 25.0  # of a place that a device has told, over a bad link [s]
 STIRRED = 0.25  # who has moved less has not moved: half of the DVA's own limit [m]
 MOVED = 25.0  # an event that a robot has felt is moved to where it is seen, but no farther [m]
 FELT_LATELY = 10.0  # a value of a robot's sensor may have confirmed an event [s]
+UNREPLICATED: Final = "unreplicated"  # said of a report that the deputy may not have
 MOST_KEPT = 1000  # reports and orders that wait for an answer, and events
 UNSETTLED: Final = State.PENDING, State.ASSIGNED, State.ON_SCENE
 IN_HAND: Final = State.ASSIGNED, State.ON_SCENE
@@ -153,6 +156,7 @@ class EventLedger:
         self._uninformed: dict[Right, float] = {}
         self._asked: dict[tuple[str, int], m.EventReport] = {}
         self._taken: list[m.EventReport] = []
+        self._unreplicated: list[m.EventReport] = []
         self._orders: dict[tuple[str, int], int] = {}
         self._called_false: dict[tuple[str, int], int] = {}
         self._words: dict[int, Word] = {}
@@ -160,9 +164,12 @@ class EventLedger:
         self._seen: dict[int, Seen] = {}
         self._open: dict[int, tuple[str, m.Position]] = {}
         self._promised: dict[int, float] = {}  # with the highest severity that was reported
+        self._numbers: dict[int, None] = {}  # of events, where there are several DVAs
         self._lost: dict[int, tuple[str, m.Position, Word]] = {}
         self._now = 0.0
         self._was_down = False
+        self._back_at = -math.inf
+        self._down_at = -math.inf
         self._not_kept = 0.0
 
     # --- what is said --------------------------------------------------------------------
@@ -300,6 +307,8 @@ class EventLedger:
         report = self._asked.pop((reporter, reply.answers), None)
         if report is not None and reply.code == m.OK:
             self._taken.append(report)
+            self._unreplicated += [report] if reply.text == UNREPLICATED else []
+            del self._unreplicated[:-MOST_KEPT]
 
     # --- what the book shows -------------------------------------------------------------
 
@@ -313,12 +322,14 @@ class EventLedger:
         yield from self._unheard(page.rights, now, page.works)
         if not page.works:  # what it has not kept, nobody knows when it is back
             self._let_no_time_pass(passed)
+            self._down_at = self._down_at if self._was_down else now
             self._was_down = True
             return
         if self._was_down:
             self._was_down = False
             self._let_no_time_pass(LOST_BY_RESTART + self._not_kept)
             self._not_kept = 0.0
+            self._back_at = now if len(self._books) > 1 else -math.inf
             last = -math.inf
             self._seen = {n: e._replace(debt=Debt(None, False, now)) for n, e in self._seen.items()}
             self._forget_unpromised(page.events)
@@ -348,13 +359,16 @@ class EventLedger:
         for number in events.open.keys() & events.closed.keys():
             yield "S6", f"event {number} is open and closed"
         gone = self._open.keys() - events.open.keys() - events.closed.keys()
-        for number in [n for n in gone if not self._is_elsewhere(n)]:
+        gone = {n for n in gone if not self._may_be_gone(*self._open[n])}
+        returns = now - self._back_at < RETURNED_WITHIN
+        later = {number: self._open[number] for number in gone if returns}
+        for number in gone - later.keys():
             yield "S6", f"event {number} was open, but the DVA does not list it"
         self._promised = {n: at for n, at in self._promised.items() if n in events.open}
         for number in self._lost.keys() & events.open.keys():
             self._find_again(events.open[number])
         known = self._open
-        self._open = {n: (e.kind, e.position) for n, e in events.open.items()}
+        self._open = later | {n: (e.kind, e.position) for n, e in events.open.items()}
         for number in known.keys() & self._open.keys():
             kind, place = self._open[number]
             was, before = known[number]
@@ -365,7 +379,7 @@ class EventLedger:
         self._seen = {}
         for event in every:
             old = seen.get(event.number)
-            if old is None and last > -math.inf and self._is_elsewhere(event.number):
+            if old is None and last > -math.inf and self._was_known(event.number):
                 old = self._adopted(event, now)
             if old is not None and old.is_over and not event.open and old.times == event.times:
                 self._seen[event.number] = old
@@ -433,9 +447,27 @@ class EventLedger:
         found = FOUND.intersection((*event.times, event.state.value))
         return Seen(found, _in_hand(event), now, now, now, times=dict(event.times))
 
-    def _is_elsewhere(self, number: int) -> bool:
-        """Return True for an event that another DVA has had."""
-        return any(number in book._seen for book in self._books if book is not self)
+    def _may_be_gone(self, kind: str, place: m.Position) -> bool:
+        """Return True if another DVA has such an event, or nobody was told that one has a copy."""
+        near = max(self._rules.merge_distance, SAME_SPOT)
+        others = [book for book in self._books if book is not self]
+        if not all(book._worked_since(self._down_at - TOGETHER) for book in others):
+            return True  # that a DVA and its deputy die at once is not promised to be harmless
+        tables = [book._events for book in others]
+        known: list[Event | m.EventReport] = [*self._unreplicated]
+        known += [e for t in tables for e in (*t.open.values(), *t.closed.values())]
+        return any(e.kind == kind and apart(e.position, place) < near for e in known)
+
+    def _worked_since(self, time: float) -> bool:
+        return not self._was_down and self._back_at < time
+
+    def _was_known(self, number: int) -> bool:
+        """Return True for an event that any of several DVAs has had before."""
+        is_first = not any(number in book._numbers for book in self._books)
+        if len(self._books) > 1:
+            self._numbers[number] = None
+            _keep_newest(self._numbers)
+        return not is_first
 
     def _let_no_time_pass(self, passed: float) -> None:
         """Shift all deadlines: a DVA that was silenced decides nothing meanwhile."""

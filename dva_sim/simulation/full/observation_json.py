@@ -120,15 +120,16 @@ def _read_places(time: float, content: Mapping[str, Any]) -> o.PlaceNews:
 def _write_events(fact: o.BookNews) -> Plain:
     rights = None if fact.rights is None else [right._asdict() for right in fact.rights]
     written = _EVENTS.write(fact) | {"rights": rights}
-    if fact.dva == DVA and not fact.copies:  # as it was written before there were several
-        del written["dva"], written["copies"]
+    if not fact.served and fact.dva == DVA:  # as it was written before there were several
+        del written["dva"], written["copies"], written["served"]
     return written
 
 
 def _read_events(time: float, content: Mapping[str, Any]) -> o.BookNews:
     rights = content["rights"] and [o.Right(**right) for right in content["rights"]]
-    news: o.BookNews = _EVENTS.read(time, {"dva": DVA, "copies": ()} | dict(content))
-    return news._replace(rights=rights, copies=tuple(news.copies))
+    news: o.BookNews = _EVENTS.read(time, {"dva": DVA, "copies": {}, "served": {}} | dict(content))
+    copies = {int(number): (lent[0], lent[1]) for number, lent in news.copies.items()}
+    return news._replace(rights=rights, copies=copies)
 
 
 _EVENTS: Final = _as_named(o.BookNews)

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict, defaultdict
-from collections.abc import Callable, Collection, Container, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
 from dva_sim.agents.robot.command_queue import mean_of
@@ -23,7 +24,7 @@ from dva_sim.kernel.recorder import Accepted, ByHand, Sent
 from dva_sim.protocol.messages import Position, ReleasedBy
 from dva_sim.simulation.full.control_room import at_event_m
 from dva_sim.simulation.full.dva_server import DvaAgent
-from dva_sim.simulation.full.stage import DVA, dvas_of, id_of, label_of, release_of
+from dva_sim.simulation.full.stage import DVA, dvas_of, id_of, label_of, region_finder, release_of
 from dva_sim.simulation.scenario import Scenario, robot_profiles
 from dva_sim.worlds.bodies import GRIP
 
@@ -51,6 +52,7 @@ class SafetyTerms:
         labels: Names by id, for what is said of somebody.
         dvas: Ids of the DVAs.
         release: Rule by which robots are released after an emergency; None: as the DVA says.
+        region_at: Function that returns the region of a place; None: there is one DVA.
     """
 
     watchdog: float
@@ -62,6 +64,7 @@ class SafetyTerms:
     labels: dict[str, str] = field(default_factory=dict)
     dvas: tuple[str, ...] = (DVA,)
     release: ReleasedBy | None = DRIVE
+    region_at: Callable[[Position], str] | None = None
 
     def about_robots(self) -> dict[str, Any]:
         """Return the limits that stand in the profiles of the robots, and not in the scenario."""
@@ -88,6 +91,8 @@ def terms_of(
     labels = dvas_of(scenario)
     terms = SafetyTerms(*limits, rules, at_event_m(scenario), labels=labels, dvas=tuple(labels))
     terms.release = release_of(scenario, attended)
+    if scenario.dva.regions:
+        terms.region_at = region_finder(scenario)
     for kind in ("robot", "guard", "operator"):
         count = getattr(scenario, kind).count
         terms.labels |= {id_of(kind, n): label_of(kind, n) for n in range(1, count + 1)}
@@ -170,22 +175,27 @@ class Page(NamedTuple):
         rights: Permissions to act on robots.
         works: False while the DVA is silenced: then it decides nothing.
         dva: Id of the DVA.
-        copies: Events that it looks at for another DVA.
+        copies: DVAs for which it looks at events, and their numbers there, by its own number.
+        served: Epochs of the regions that it serves.
     """
 
     events: EventTable
     rights: Sequence[Right]
     works: bool
     dva: str = DVA
-    copies: Collection[int] = ()
+    copies: Mapping[int, tuple[str, int]] = MappingProxyType({})
+    served: Mapping[str, int] = MappingProxyType({})
 
 
 def page_of(dva: DvaAgent) -> Page:
     """Return the present page of a DVA's book."""
     grants = dva.core.sessions.permissions.grants.values()
     rights = [Right(grant.robot, grant.holder, grant.session) for grant in grants]
-    copies = dva.core.help.copies if isinstance(dva.core, RegionalDva) else ()
-    return Page(dva.core.events, rights, not dva.device.silent, dva.device.id_tag, copies)
+    page = Page(dva.core.events, rights, not dva.device.silent, dva.device.id_tag)
+    core = dva.core
+    if not isinstance(core, RegionalDva):
+        return page
+    return page._replace(copies=core.help.copies, served=dict(core.division.served()))
 
 
 class Listener(Protocol):
@@ -300,7 +310,8 @@ class BookNews(NamedTuple):
         rights: Permissions to act on robots; None: as before.
         works: False while the DVA is silenced.
         dva: Id of the DVA.
-        copies: Events that it looks at for another DVA.
+        copies: As in `Page`.
+        served: As in `Page`.
     """
 
     time: float
@@ -311,7 +322,8 @@ class BookNews(NamedTuple):
     rights: list[Right] | None
     works: bool
     dva: str = DVA
-    copies: tuple[int, ...] = ()
+    copies: Mapping[int, tuple[str, int]] = MappingProxyType({})
+    served: Mapping[str, int] = MappingProxyType({})
 
 
 class Deafened(NamedTuple):
@@ -522,7 +534,8 @@ class _EventTableDiff:
             rights=rights if rights != self._rights else None,
             works=page.works,
             dva=page.dva,
-            copies=tuple(page.copies),
+            copies={number: (asker, at) for number, (asker, at) in page.copies.items()},
+            served=dict(page.served),
         )
         self._counts = counts
         self._rights = rights
@@ -555,7 +568,7 @@ class EventTableCopy:
             events.counts = {State(state): count for state, count in news.counts.items()}
         if news.rights is not None:
             self._rights = news.rights
-        return Page(events, self._rights, news.works, news.dva, news.copies)
+        return Page(events, self._rights, news.works, news.dva, news.copies, news.served)
 
     def _put(self, facts: Mapping[str, Any]) -> None:
         number = facts["number"]

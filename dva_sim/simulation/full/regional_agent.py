@@ -10,6 +10,7 @@ from typing import Any, Final
 from dva_sim.agents.device import PEER_STATUS, REGISTER_AGAIN, RENEW_PERIOD, AgentDevice
 from dva_sim.core.events import Event
 from dva_sim.core.regions.regional_dva import RegionalDva
+from dva_sim.core.sessions import Send
 from dva_sim.network.messaging import Request
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.devices import PEER
@@ -19,6 +20,7 @@ PASS_WITHIN: Final = 3.0  # design: the other DVA takes a report by then, or thi
 COPY_WITHIN: Final = 0.3  # design: a report waits so long for its copy at the deputy [s]
 JOIN_AFTER: Final = 0.1  # design: from the start to the first registration with the others [s]
 STATUS_PERIOD: Final = 2.0  # design: [s]
+OF_A_DVA: Final = m.HandOver | m.Order | m.Relocation | m.TaskAward | m.PermissionGrant
 UNREPLICATED: Final = "unreplicated"
 NOT_COPIED: Final = "reports acknowledged without a copy at the deputy"
 
@@ -45,7 +47,7 @@ class RegionalDvaAgent(DvaAgent):
         """Begin as any DVA, and make oneself known to the others."""
         super().start()
         clock = self.device.clock
-        for peer in self._regional.division.peers:
+        for peer in self._peers:
             clock.call_after(JOIN_AFTER, self._join, peer)
         clock.every(STATUS_PERIOD, self._publish_status, start=clock.now + STATUS_PERIOD)
 
@@ -64,8 +66,7 @@ class RegionalDvaAgent(DvaAgent):
         def failed() -> None:
             device.clock.call_after(REGISTER_AGAIN, self._join, peer)
 
-        body = m.Registration(device.label, PEER, device.address)
-        device.ask(peer, body, answered, failed)
+        device.ask(peer, self._registration, answered, failed)
 
     def _publish_status(self) -> bool:
         if not self.is_gone and not self.device.silent:
@@ -79,7 +80,7 @@ class RegionalDvaAgent(DvaAgent):
     def _tick(self) -> bool:
         """Look at deadlines; a change of the regions that it serves goes out at once."""
         goes_on = super()._tick()
-        for peer in self._regional.division.peers:
+        for peer in self._peers:
             entry = self._regional.registry.entries.get(peer)
             if entry is not None and entry.silent:
                 self.device.give_up(peer)
@@ -90,6 +91,57 @@ class RegionalDvaAgent(DvaAgent):
                 self.device.tell(f"takes over {', '.join(news)}", "link")
             self._tell_peers()
         return goes_on
+
+    def _answered(self, send: Send, reply: m.Reply) -> None:
+        """Handle an answer; a device that takes no orders from here is another DVA's by now."""
+        if reply.code == m.NOT_REGISTERED and send.to in self._peers:
+            answered = partial(super()._answered, send)
+            self._ask_again(send.to, send.body, answered, partial(self._undelivered, send))
+            return
+        super()._answered(send, reply)
+        is_order = isinstance(send.body, OF_A_DVA)
+        if is_order and reply.code == m.NOT_PERMITTED and send.to not in self._peers:
+            self.dismiss(send.to)
+
+    def _ask_peer(
+        self,
+        peer: str,
+        body: m.Body,
+        answered: Callable[[m.Reply], object],
+        failed: Callable[[], object],
+    ) -> None:
+        """Ask another DVA; one that was started again has to know this one first."""
+
+        def known(reply: m.Reply) -> None:
+            if reply.code == m.NOT_REGISTERED:
+                self._ask_again(peer, body, answered, failed)
+            else:
+                answered(reply)
+
+        self.device.ask(peer, body, known, failed)
+
+    def _ask_again(
+        self,
+        peer: str,
+        body: m.Body,
+        answered: Callable[[m.Reply], object],
+        failed: Callable[[], object],
+    ) -> None:
+        device = self.device
+        device.ask(
+            peer,
+            self._registration,
+            lambda _: device.ask(peer, body, answered, failed),
+            failed,
+        )
+
+    @property
+    def _registration(self) -> m.Registration:
+        return m.Registration(self.device.label, PEER, self.device.address)
+
+    @property
+    def _peers(self) -> tuple[str, ...]:
+        return self._regional.division.peers
 
     # --- reports ---------------------------------------------------------------------------
 
@@ -137,7 +189,7 @@ class RegionalDvaAgent(DvaAgent):
                 take_here()
 
         body = replace(message.body, origin=message.source)
-        self.device.ask(peer, body, answered, take_here)
+        self._ask_peer(peer, body, answered, take_here)
         self.device.clock.call_after(PASS_WITHIN, take_here)
 
     def _held_back(self, request: Request, message: m.Message, reply: m.Reply) -> m.Reply | None:
@@ -173,6 +225,7 @@ class RegionalDvaAgent(DvaAgent):
         super()._publish_news(changed)
         if self._keep_events:
             self.copies.update(self._regional.help.copies)
+            self.copies -= self._regional.help.adopted
         for event in changed:
             self._replicate(event)
 
@@ -195,4 +248,4 @@ class RegionalDvaAgent(DvaAgent):
         def answered(reply: m.Reply) -> None:
             settled("" if reply.code == m.OK else UNREPLICATED)
 
-        self.device.ask(deputy, body, answered, partial(settled, UNREPLICATED))
+        self._ask_peer(deputy, body, answered, partial(settled, UNREPLICATED))

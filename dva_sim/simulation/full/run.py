@@ -382,7 +382,9 @@ class Run:
         self.stage.devices.remove(self.dvas[id_tag].device)
         self._dead.append(self.dvas[id_tag])
         self.network.come_back(id_tag)
-        self.dvas[id_tag] = add_dva(self.stage, None, None, self._keeps_events, number)
+        life = sum(dead.device.id_tag == id_tag for dead in self._dead)
+        keeps = self._keeps_events
+        self.dvas[id_tag] = add_dva(self.stage, None, None, keeps, number, life)
         self.dvas[id_tag].device.tell("is started again", "link")
         self.dvas[id_tag].start()
 

@@ -30,6 +30,7 @@ from dva_sim.simulation.full.event_ledger import (
 )
 from dva_sim.simulation.full.observations import MotorLimits, Page, RobotMotion, SafetyTerms
 from dva_sim.simulation.full.physical_world import PHYSICS_TICK
+from dva_sim.simulation.full.regional_checks import RegionalRules
 from dva_sim.simulation.full.takeovers import Takeovers
 from dva_sim.worlds.bodies import G
 
@@ -407,6 +408,8 @@ class SafetyAudit:
             self._ledgers[dva] = EventLedger(*what, self._ledgers.values())
         self._witnesses: dict[str, Witness] = {}
         self._takeovers = {dva: Takeovers() for dva in terms.dvas}
+        at = terms.region_at
+        self._regional = None if at is None else RegionalRules(terms, at)
 
     def _name_of(self, device: str) -> str:
         return self._labels.get(device, device)
@@ -435,6 +438,8 @@ class SafetyAudit:
 
     def delivered(self, now: float, source: str, to: str, payload: Any) -> None:
         """Implement `Observer`."""
+        if self._regional is not None and isinstance(payload, bytes):
+            self._regional.delivered(now, source, to, payload)
         if to in self._motors:
             if to not in self._deaf:
                 self._reaches_robot(now, source, to, payload)
@@ -528,6 +533,8 @@ class SafetyAudit:
 
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:
         """Implement `Observer`."""
+        if self._regional is not None and isinstance(payload, bytes):
+            self._report([*self._regional.sent(now, source, to, payload)], now, source)
         if source in self._dvas:
             if isinstance(payload, bytes) and _ORDERS_ROBOT.search(payload) is not None:
                 self._report([*self._sends_stopped(to, payload, now)], now, source)
@@ -759,6 +766,8 @@ class SafetyAudit:
         """Implement `Observer`."""
         self._report([*self._ledgers[page.dva].check(now, page)], now, page.dva)
         self._report([*self._hands_over(page, now)], now, page.dva)
+        if self._regional is not None:
+            self._report([*self._regional.shows(now, page)], now, page.dva)
 
     def _hands_over(self, page: Page, now: float) -> Iterator[Broken]:
         """Yield robots that are handed over before they stand and know that they are."""

@@ -32,7 +32,7 @@ from dva_sim.protocol.devices import (
     ControlRoomRole,
 )
 from dva_sim.protocol.exchange import NOON
-from dva_sim.protocol.messages import ReleasedBy
+from dva_sim.protocol.messages import Position, ReleasedBy
 from dva_sim.simulation.scenario import (
     Scenario,
     plan_of,
@@ -90,6 +90,14 @@ def dvas_of(scenario: Scenario) -> dict[str, str]:
     if not names:
         return {DVA: label_of("dva", 1)}
     return {id_of("dva", number): f"dva-{name}" for number, name in enumerate(names, 1)}
+
+
+def region_finder(scenario: Scenario) -> Callable[[Position], str]:
+    """Return the function that finds the region of a place, for a scenario that has regions."""
+    site = site_of(scenario, seed=0)
+    plan = plan_of(scenario.dva.regions, site)
+    assert plan is not None, "one DVA serves everything"
+    return lambda at: plan.region_at(*site.frame.to_xy(at.latitude, at.longitude))
 
 
 def control_rooms_of(scenario: Scenario) -> dict[str, ControlRoomRole]:

@@ -26,6 +26,13 @@ RULES: Final = {
     "S6": "no event is lost, counted twice or left waiting",
     "S7": "the times of events are in order",
 }
+OF_REGIONS: Final = {
+    "S12": "a device obeys one DVA at a time, and no DVA whose epoch is over orders anybody",
+    "S13": "an event whose report was kept by two DVAs survives the death of one",
+    "S14": "DVAs that hear each other have one DVA for a region, and one look at an event",
+    "S15": "help that was lent comes back",
+}
+"""Rules of runs with several DVAs."""
 OF_ROBOTS: Final = ("S1", "S2", "S3", "S4", "S5")
 OF_THE_DVA: Final = ("S6", "S7")
 _AT_ROBOTS: Final = ("S1", "S2", "S3", "S5")  # rules on messages that reach robots
@@ -97,6 +104,8 @@ def verdicts(
     not_judged: Mapping[str, str] | None = None,
     until: str = "",
     lost: Mapping[str, str] | None = None,
+    *,
+    of_regions: bool = False,
 ) -> list[Verdict]:
     """Return a verdict on each rule, in order; one for each agent where several broke it.
 
@@ -105,12 +114,13 @@ def verdicts(
         not_judged: Rules that could not be judged, each with the reason.
         until: Time up to which the run was judged, in words; empty: all of it.
         lost: Rules that lack facts which should be there, each with the reason.
+        of_regions: True to judge the rules of several DVAs as well.
     """
     broken = broken_lines(recorder.broken.values())
     why_not = not_judged or {}
     lost = lost or {}
     found: list[Verdict] = []
-    for rule, says in RULES.items():
+    for rule, says in (RULES | OF_REGIONS if of_regions else RULES).items():
         if rule in broken:
             found += [Verdict(rule, BROKEN, line) for line in broken[rule]]
         elif rule in lost:
@@ -225,7 +235,8 @@ class Judge:
     def verdicts(self, until: str = "") -> list[Verdict]:
         """Return the verdicts so far; see the function `verdicts`."""
         lost = {rule: _lost(gaps) for rule in RULES if (gaps := self._gaps_of(rule))}
-        return verdicts(self.recorder, self._not_judged(), until, lost)
+        of_regions = self._terms.region_at is not None
+        return verdicts(self.recorder, self._not_judged(), until, lost, of_regions=of_regions)
 
     def _not_judged(self) -> dict[str, str]:
         why_not: dict[str, str] = {}

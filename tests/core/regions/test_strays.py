@@ -12,6 +12,7 @@ def parted_street():
     street = Street()
     street.register(WEST, DETECTOR, "Sensor")
     street.guard(WEST, GUARD, 10)
+    street.tick(2, GUARD, DETECTOR)
     street.parted = True
     street.tick(12, GUARD, DETECTOR)
     street.fire(WEST, DETECTOR, 70)

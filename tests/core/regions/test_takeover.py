@@ -130,15 +130,27 @@ def test_a_robot_that_is_driven_under_a_session_of_the_dead_is_nobody_elses():
     assert street.told(OPERATOR, m.Order) == [m.Order(7, "fire", east(10), ROBOT)]
 
 
-def test_a_dva_numbers_on_from_what_it_had_given_before_it_died():
+def test_a_dva_that_was_started_again_gets_its_events_back_with_their_ages():
     street = Street()
     street.tick(2)
-    status = m.EventStatus(5, "fire", east(10), 0.8, 0.9, "pending", 20.0, 5.0, 1)
-    street.say(WEST, EAST, m.Replicate("west", 2, 1, status))
-    street.register(WEST, DETECTOR, "Sensor")
-    street.parted = True
-    street.fire(WEST, DETECTOR, 20)
-    assert list(street.cores[WEST].events.open) == [6]
+    copied(street, "pending")
+    street.tick(3)
+    street.cores[WEST] = street.new_core(WEST, life=1)
+    street.register(WEST, EAST, "DVA")
+    street.number = 0
+    street.register(EAST, WEST, "DVA")
+    assert street.told(WEST, m.Replicate)[0].event.age == 23.0
+    street.tick(5)
+    event = street.cores[WEST].events.open[7]
+    assert event.times["detected"] == pytest.approx(2.0 - 20.0)
+
+
+def test_no_two_lives_of_a_dva_give_an_event_the_same_number():
+    street = Street()
+    street.cores[EAST] = street.new_core(EAST, life=2)
+    street.guard(EAST, GUARD, 90)
+    street.fire(EAST, GUARD, 80)
+    assert list(street.cores[EAST].events.open) == [1_020_001]
 
 
 def test_a_look_that_was_asked_for_by_the_dead_goes_on_as_the_deputys_own():

@@ -45,15 +45,19 @@ class Street:
         self.parted = False
         self.dead: set[str] = set()
         self.sent: list[tuple[str, Send]] = []
-        self.cores = {dva: self._core(dva, rules or Rules()) for dva in (WEST, EAST)}
+        self._rules = rules or Rules()
+        self.cores = {dva: self.new_core(dva) for dva in (WEST, EAST)}
         for dva, other in ((WEST, EAST), (EAST, WEST)):
             self.register(dva, other, "DVA")
 
-    def _core(self, own: str, rules: Rules) -> RegionalDva:
+    def new_core(self, own: str, life: int = 0) -> RegionalDva:
+        """A core that knows nobody yet."""
         sessions = Sessions(Permissions(lambda: 0, own=own))
-        division = Division(own, LINES, region_at, outside)
+        division = Division(own, LINES, region_at, outside, life)
         rng = np.random.default_rng(1)
-        return RegionalDva(MinEta(), crow, rules, rng=rng, sessions=sessions, division=division)
+        return RegionalDva(
+            MinEta(), crow, self._rules, rng=rng, sessions=sessions, division=division
+        )
 
     def say(self, to: str, source: str, body: m.Body) -> m.Reply:
         self.number += 1
