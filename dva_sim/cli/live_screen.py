@@ -58,9 +58,10 @@ class Board:
         self.events: list[dict[str, Any]] = []
         self.story: list[list[Any]] = []
         self.time = 0.0
-        self.dva = ""
+        self.dvas: set[str] = set()
         self.addresses = list[str]()
-        self._registered: set[str] = set()
+        self._registered: dict[int, set[str]] = {}  # labels, by the number of the DVA
+        self._events: dict[int, list[dict[str, Any]]] = {}
 
     def hear(self, report: Report) -> list[list[Any]]:
         """Take a report; the new lines of the story."""
@@ -68,12 +69,14 @@ class Board:
         for row in report.rows:
             self.devices.setdefault(row["label"], {}).update(row)
         if report.part == "dva":
-            self.dva = report.dva or self.dva
-            self.events = report.events
-            registered = {row["label"] for row in report.rows}
-            for label in self._registered - registered:
+            self.dvas |= {report.dva} if report.dva else set()
+            self._events[report.number] = report.events
+            every = {event["number"]: event for of in self._events.values() for event in of}
+            self.events = [every[number] for number in sorted(every)]
+            known = set().union(*self._registered.values())
+            self._registered[report.number] = {row["label"] for row in report.rows}
+            for label in known - set().union(*self._registered.values()):
                 del self.devices[label]
-            self._registered = registered
         self.story = sorted(self.story + report.story)[-1000:]
         return sorted(report.story)
 
@@ -179,7 +182,7 @@ def warn(console: Console, options: LiveOptions) -> None:
 
 def _say_where(console: Console, board: Board, report: Report) -> None:
     """Print once where the DVA listens, and with it all other addresses: all can be reached."""
-    if report.dva is not None and report.dva != board.dva:
+    if report.dva is not None and report.dva not in board.dvas:
         for line in (f"DVA: {report.dva}", *board.addresses):
             _print(console, line)
         board.addresses.clear()
@@ -204,7 +207,7 @@ def run_one(part: str, options: LiveOptions) -> None:
     board = Board()
     warn(console, options)
     if options.dva is None and (part != "dva" or not options.port):
-        options = replace(options, dva=DEFAULT_DVA)
+        options = replace(options, dva=_default_dvas(options))
     check(options)
     if part in PARTS and part != "dva":
         _print(console, f"Looking for the DVA at {options.dva} for {process.PATIENCE:g} s ...")
@@ -226,6 +229,13 @@ def run_one(part: str, options: LiveOptions) -> None:
     console.print(board.table())
     _print_rules(console, found)
     refuse_unheld(found)
+
+
+def _default_dvas(options: LiveOptions) -> str:
+    """Return where DVAs listen if nobody says so: each at the second port after the last."""
+    host, _, port = DEFAULT_DVA.rpartition(":")
+    count = max(1, len(scenario_of(options).dva.regions))
+    return ",".join(f"{host}:{int(port) + 2 * n}" for n in range(count))
 
 
 class InOrder:

@@ -99,8 +99,8 @@ def live(options: LiveOptions, quiet: Quiet = False, verbose: Verbose = False) -
     only = options.only
     dva = options.dva
     has_keys = options.keys is not None
-    at = dva if dva is not None and not problem_of(dva) and only in (None, "dva") else None
-    listens = [] if at is None else [at.rpartition(":")[0]]
+    here = dva.split(",") if dva is not None and only in (None, "dva") else []
+    listens = [at.strip().rpartition(":")[0] for at in here if not problem_of(at.strip())]
     if only != "dva" or (dva is None and options.port):
         listens.append(options.host)
     exposure.warn_of_devices(listens, has_keys=has_keys, close_by=_CLOSED)

@@ -40,8 +40,8 @@ def scenario_of(options: LiveOptions) -> Scenario:
         raise ConfigError(f"--port {options.port} should be from 1 to 64999")
     if options.duration is not None and not 0 < options.duration < math.inf:
         raise ConfigError(f"--for {options.duration:g} should be a number of seconds above 0")
-    if options.dva is not None:
-        check_address(options.dva, "--dva ")
+    for address in addresses_of(options):
+        check_address(address, "--dva ")
     changes = changes_of(options)
     try:
         scenario = build(load(options.scenario), parse_changes(changes))
@@ -56,7 +56,28 @@ def scenario_of(options: LiveOptions) -> Scenario:
             f"zeromq.conflate {scenario.zeromq.conflate!r}: only in virtual time, since real "
             "sockets would keep one part of a message and not the message"
         )
+    _check_regions(options, scenario)
     return scenario
+
+
+def addresses_of(options: LiveOptions) -> list[str]:
+    """Return the addresses of the DVAs, in the order of their regions; none if none is given."""
+    return [] if options.dva is None else [each.strip() for each in options.dva.split(",")]
+
+
+def _check_regions(options: LiveOptions, scenario: Scenario) -> None:
+    """Refuse what several DVAs cannot do over sockets, and addresses that are not one for each."""
+    given = len(addresses_of(options))
+    count = max(1, len(scenario.dva.regions))
+    if given not in (0, count):
+        has = f"{count} regions" if scenario.dva.regions else "one DVA"
+        raise ConfigError(f"--dva names {given} addresses, and the scenario has {has}")
+    if scenario.dva.deaths:
+        raise ConfigError("dva.deaths: only in virtual time; end the process of a DVA instead")
+    if scenario.dva.regions and options.link:
+        raise ConfigError("--link: not with dva.regions, whose DVAs would all be at one end")
+    if options.only == "dva" and options.number > count:
+        raise ConfigError(f"--number {options.number}: the scenario has {count} DVAs")
 
 
 def check(options: LiveOptions) -> Scenario:

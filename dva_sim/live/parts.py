@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any, Protocol
 
 from dva_sim.agents.operator.operator import OperatorAgent
@@ -90,7 +91,7 @@ class DvaPart:
         ConfigError: the file for its memory cannot be used.
     """
 
-    def __init__(self, stage: Stage, options: LiveOptions) -> None:
+    def __init__(self, stage: Stage, options: LiveOptions, number: int = 1) -> None:
         # Sessions that no one can guess, and higher than in any earlier life of the DVA, as
         # long as that handed out no more than so many a second and the clock was not set back: then
         # robots take the lower ones, too, as they ask. A clock may know no date at all.
@@ -98,12 +99,15 @@ class DvaPart:
         permissions = Permissions(lambda: secrets.randbits(LOW_BITS), count=count)
         memory = None
         if options.state is not None:
-            memory = Store(options.state)
-        self.agent = add_dva(stage, permissions, memory, keep_events=False)
+            memory = Store(_state_of(options.state, stage, number))
+        life = int(time.time())
+        self.agent = add_dva(
+            stage, permissions, memory, keep_events=False, number=number, life=life
+        )
         self.agent.core.registry.most = devices_that_fit()
         self.agent.stopwatch = time.perf_counter
         trace = _trace_of("dva", stage, options)
-        if trace is not None:
+        if trace is not None and stage.regions is None:
             self.agent.core = traced(self.agent.core, trace, stage, memory)
         if isinstance(stage.recorder, LiveRecorder):
             self._observe(stage.recorder, stage)
@@ -161,6 +165,13 @@ class DvaPart:
     def finish(self) -> None:
         """See `LivePart`: nobody drives any longer by our permission."""
         self.agent.close()
+
+
+def _state_of(path: Path, stage: Stage, number: int) -> Path:
+    """Return the file for the memory of a DVA; of several, each has its own."""
+    if stage.regions is None:
+        return path
+    return path.with_name(f"{path.stem}-{stage.regions.names[number - 1]}{path.suffix}")
 
 
 def _device_row(booked: BookedDevice) -> Row:
@@ -363,7 +374,7 @@ class RosbridgePart:
 def make_part(
     name: str, stage: Stage, options: LiveOptions, number: int, door: OpenPort | None = None
 ) -> LivePart:
-    """The part of that name; `number` says which operator.
+    """The part of that name; `number` says which operator, or which DVA.
 
     Raises:
         ConfigError: the scenario has no such operator, or no place for its team.
@@ -377,7 +388,7 @@ def make_part(
         has = f"the scenario has {count or 'no'} operator{'s' * (count != 1)}"
         raise ConfigError(f"--number {number}: {has}")
     makers: dict[str, Callable[[], LivePart]] = {
-        "dva": lambda: DvaPart(stage, options),
+        "dva": lambda: DvaPart(stage, options, number),
         "world": lambda: WorldPart(stage, options),
         "operator": lambda: OperatorPart(stage, options, number),
     }

@@ -15,7 +15,7 @@ from dva_sim.agents.observation import OVER_ZMQ, Cameras, topic_in
 from dva_sim.cameras.screens import topic_of
 from dva_sim.cameras.service import CameraService
 from dva_sim.kernel.errors import DvaSimError, RunsFailed
-from dva_sim.live.options import CAMERA_PORT, scenario_of
+from dva_sim.live.options import CAMERA_PORT, addresses_of, scenario_of
 from dva_sim.live.parts import DvaPart, LivePart, WorldPart, make_part
 from dva_sim.live.recording import LiveRecorder, RunKeeping
 from dva_sim.network.keys import KeyRing
@@ -28,7 +28,7 @@ from dva_sim.serving.open_port import OpenPort
 from dva_sim.serving.pipes import PipeEnd
 from dva_sim.serving.signals import caught_signals
 from dva_sim.simulation.full.dva_server import DvaAgent
-from dva_sim.simulation.full.stage import DVA, Stage, id_of, team_of
+from dva_sim.simulation.full.stage import DVA, Stage, dvas_of, id_of, team_of
 from dva_sim.simulation.full.verdicts import Verdict
 
 REPORT_PERIOD = 1.0  # [s]
@@ -55,7 +55,7 @@ class ServedDva:
     @property
     def address(self) -> str:
         """Address at which it listens."""
-        return str(self.network.address(DVA))
+        return str(self.network.address(self.agent.device.id_tag))
 
     def appoint(self, room: str, role: ControlRoomRole) -> None:
         """Give the control room beside it a role."""
@@ -191,7 +191,7 @@ def _run_part(
         recorder.team = team
         recorder.is_own = team.__contains__ if supervised else network.is_here
         network.watcher = recorder.message
-        joining = _joining(network, options, name)
+        joining = _joining(network, options, name, number)
         service = None
         if name == "world" and options.shows_pictures:
             port = CAMERA_PORT if options.camera_port is None else options.camera_port
@@ -209,16 +209,18 @@ def _run_part(
             cameras=cameras,
             attended=True,
         )
-        if options.dva is not None and name != "dva":
-            network.introduce(DVA, options.dva)
+        here = id_of("dva", number) if name == "dva" else ""
+        for dva, address in zip(dvas_of(scenario), addresses_of(options), strict=False):
+            if dva != here:
+                network.introduce(dva, address)
         part = make_part(name, stage, options, number, door)
-        if options.dva is not None:
+        if options.dva is not None and not (stage.regions is not None and name == "dva"):
             for device in stage.devices:
                 device.look_for_dva_at(options.dva)
         recorder.here(d.id_tag for d in stage.devices if recorder.is_own(d.id_tag))
         if service is not None and isinstance(part, WorldPart):
             part.film(service)
-        if beside is not None and isinstance(part, DvaPart):
+        if beside is not None and isinstance(part, DvaPart) and stage.regions is None:
             at_end.callback(beside.end)
             beside.begin(ServedDva(part.agent, network, part.aside, tell))
         gc.freeze()  # what stays for the whole run is not looked through again and again
@@ -231,7 +233,8 @@ def _run_part(
         with ending_when_asked(clock, supervised) as ending:
             if not supervised:
                 clock.run(patience)
-                _refuse_to_be_alone(name, part, network.address(DVA), patience, ending)
+                own = network.address(here or DVA)
+                _refuse_to_be_alone(name, part, own, patience, ending)
             if not ending.is_asked:
                 clock.run(lasts)
             part.finish()
@@ -260,7 +263,9 @@ def _time_of_day(clock: LiveClock) -> tuple[float, bool]:
     return whole + started % 1.0, True
 
 
-def _joining(network: RealNetwork, options: LiveOptions, name: str) -> Callable[[str, int], str]:
+def _joining(
+    network: RealNetwork, options: LiveOptions, name: str, of: int
+) -> Callable[[str, int], str]:
     """Gives each new device of this process two ports, and its address."""
     given = options.port
 
@@ -269,7 +274,7 @@ def _joining(network: RealNetwork, options: LiveOptions, name: str) -> Callable[
         host = options.host
         port = given
         if name == "dva" and options.dva is not None:
-            host, port = split_address(options.dva)
+            host, port = split_address(addresses_of(options)[of - 1])
         elif given:
             given += 2
         return network.join(id_of(kind, number), host, port)
@@ -308,7 +313,7 @@ class _Reporter:
             story=[list(moment) for moment in story],
             counters=dict(recorder.counters + self._network.counters),
             settled=part.settled(),
-            dva=self._network.address(DVA) if self._name == "dva" else None,
+            dva=self._network.address(id_of("dva", self._number)) if self._name == "dva" else None,
             lateness=clock.lateness,
         )
 

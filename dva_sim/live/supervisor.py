@@ -39,12 +39,19 @@ LOOK = 0.5  # between looks at whether all parts are still there [s]
 
 @dataclass
 class _Part:
-    """A part that runs: its process, and what it said last."""
+    """A part that runs: its process, and what it said last.
+
+    Attributes:
+        may_die: True for a DVA that others take the place of.
+        is_dead: True once such a one has ended by itself.
+    """
 
     child: Child
     reports: PipeEnd
     latest: Report | None = None
     heard: float = field(default_factory=time.monotonic)
+    may_die: bool = False
+    is_dead: bool = False
 
 
 @dataclass
@@ -136,9 +143,7 @@ class Supervisor:
             self._link = LinkProcess(scenario.link, self._options.seed)
             self._link.begin()
         first = self._options.port
-        dva = self._options.dva
-        self._start("dva", "dva", dva, port=first)
-        address = self._address_of_dva()
+        address = self._start_dvas(scenario, self._options.dva)
         if address is not None:
             ports = _ports(first, scenario)
             self._start("world", "world", address, port=next(ports))
@@ -146,6 +151,23 @@ class Supervisor:
                 self._start(f"operator-{number}", "operator", address, number, next(ports))
             if self._rosbridge is not None:
                 self._start(ROSBRIDGE, ROSBRIDGE, address)
+
+    def _start_dvas(self, scenario: Scenario, dva: str | None) -> str | None:
+        """Start the DVA, or that of each region; return where they listen, with commas between."""
+        first = self._options.port
+        regions = scenario.dva.regions
+        if not regions:
+            self._start("dva", "dva", dva, port=first)
+            return self._address_of_dva()
+        host = self._options.host
+        ports = [first + 2 * n for n in range(len(regions))] if first else free_pairs(len(regions))
+        dva = dva or ",".join(f"{host}:{port}" for port in ports)
+        for number, name in enumerate(regions, 1):
+            self._start(f"dva-{name}", "dva", dva, number)
+            self._parts[-1].may_die = True
+        while not self._interrupted and any(part.latest is None for part in self._parts):
+            self._listen()
+        return None if self._interrupted else dva
 
     def _start(self, name: str, part: str, dva: str | None, number: int = 1, port: int = 0) -> None:
         """Start a part; it ends when its standard input does, whatever happens to us."""
@@ -215,7 +237,7 @@ class Supervisor:
         return any(part.child.poll() == 0 for part in self._parts)
 
     def _all_settled(self) -> bool:
-        reports = [part.latest for part in self._parts]
+        reports = [part.latest for part in self._parts if not part.is_dead]
         if not all(report is not None and report.settled for report in reports):
             self._settled_since = None
             return False
@@ -238,19 +260,37 @@ class Supervisor:
         for part in self._parts:
             code = part.child.poll()
             if code and not self._interrupted:
-                raise part.child.failure()
+                self._bury(part)
             if code is None and time.monotonic() - part.heard > SPEAK_WITHIN:
                 raise ChildFailed(f"{part.child.name} has said nothing for {SPEAK_WITHIN:g} s")
+
+    def _bury(self, part: _Part) -> None:
+        """Go on without a DVA that has ended, as long as another one is there.
+
+        Raises:
+            ChildFailed: another part has ended, or all DVAs have.
+        """
+        others = [other for other in self._parts if other.may_die and other is not part]
+        if not part.may_die or all(other.is_dead for other in others):
+            raise part.child.failure()
+        if not part.is_dead:
+            part.is_dead = True
+            now = time.monotonic() - self._epoch
+            self._tell("dva", [[now, part.child.name, "has ended; the others go on", "link"]])
 
     def _tell_broken_rules(self) -> None:
         """Report the rules that were found broken since the last look."""
         found = [list(moment) for moment in self._keeping.news()] if self._keeping else []
+        self._tell("rules", found)
+
+    def _tell(self, part: str, found: list[list[Any]]) -> None:
+        """Report lines of the timeline that no part has told."""
         if found:
             now = time.monotonic() - self._epoch
             self._hear(
-                "rules",
+                part,
                 Report(
-                    part="rules",
+                    part=part,
                     number=0,
                     time=now,
                     rows=[],
@@ -292,15 +332,33 @@ class Supervisor:
             part.reports.close()
 
 
+def free_pairs(count: int) -> list[int]:
+    """Return the first of so many pairs of ports that are free now."""
+    taken: list[socket.socket] = []
+    pairs: list[int] = []
+    try:
+        while len(pairs) < count:
+            taken.append(socket.create_server(("", 0)))
+            port = taken[-1].getsockname()[1]
+            with suppress(OSError):
+                taken.append(socket.create_server(("", port + 1)))
+                pairs.append(port)
+    finally:
+        for each in taken:
+            each.close()
+    return pairs
+
+
 def _end_of(part: str) -> str:
     """The end of an emulated link that a part is at: its robots are at the far one."""
     return FAR if part == "world" else NEAR
 
 
 def _ports(first: int, scenario: Scenario) -> Iterator[int]:
-    """First ports of the world and of each operator, behind the DVA's two; 0 for free ones."""
+    """First ports of the world and of each operator, behind the DVAs'; 0 for free ones."""
     in_world = scenario.robot.count + scenario.guard.count + len(scenario.events)
-    devices = 1
+    dvas = max(1, len(scenario.dva.regions))
+    devices = dvas
     while True:
         yield first + 2 * devices if first else 0
-        devices += in_world if devices == 1 else 1
+        devices += in_world if devices == dvas else 1

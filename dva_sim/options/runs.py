@@ -118,14 +118,18 @@ class LiveOptions:
     only: Annotated[
         str | None, OptionForm("Run only this part.", metavar="dva|world|operator", words=PARTS)
     ] = None
-    number: Annotated[int, OptionForm("Number of the operator, with --only operator.", least=1)] = 1
+    number: Annotated[
+        int, OptionForm("Number of the operator or the DVA, with --only.", least=1)
+    ] = 1
     operators: Annotated[
         str, OptionForm("Who drives.", metavar="simulated|scripted", words=OPERATORS)
     ] = "simulated"
     dva: Annotated[
         str | None,
         OptionForm(
-            "Address of the DVA; with --only: 127.0.0.1:5600 by default.", metavar="HOST:PORT"
+            "Address of the DVA, or of each region's with commas between; with --only: "
+            "127.0.0.1:5600 by default, and every second port from there.",
+            metavar="HOST:PORT",
         ),
     ] = None
     host: Host = LOCALHOST

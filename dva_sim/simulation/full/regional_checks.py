@@ -21,6 +21,7 @@ from dva_sim.simulation.full.observations import Page, SafetyTerms
 OBEYS_WITHIN: Final = 5.0  # a device may wait so long until it does what it is told [s]
 HEALS_WITHIN: Final = 30.0  # two DVAs that hear each other agree after that [s]
 HEARD_WITHIN: Final = 6.0  # a DVA that was heard within that hears the other one now [s]
+SHOWN_WITHIN: Final = 5.0  # a DVA whose book was not seen for so long is dead [s]
 PASSED_WITHIN: Final = 0.9  # an event that was passed on is in the other book by then [s]
 GOES_ON_WITHIN: Final = 15.0  # after a take-over the events of the dead are open again [s]
 COMES_BACK_WITHIN: Final = 60.0  # after the end of an event those who were lent are free [s]
@@ -89,6 +90,7 @@ class RegionalRules:
     _pages: dict[str, Page] = field(default_factory=dict)
     _died: dict[str, float] = field(default_factory=dict)  # of those that are dead
     _down: dict[str, float] = field(default_factory=dict)  # when each was last seen dead
+    _shown: dict[str, float] = field(default_factory=dict)  # when each book was last seen
     _since: dict[tuple[Any, ...], float] = field(default_factory=dict)
 
     # --- messages --------------------------------------------------------------------------
@@ -170,12 +172,9 @@ class RegionalRules:
         before = self._pages.get(page.dva, page)
         for region in page.served.keys() - before.served.keys():
             self._claimed[region] = page.dva, now
-        if not page.works:
-            self._died.setdefault(page.dva, now)
-            self._down[page.dva] = now
-        else:
-            self._died.pop(page.dva, None)
+        self._note_dead(now, page)
         self._pages[page.dva] = page
+        self._shown[page.dva] = now
         if page.works:
             yield from self._of_orders(page)
             yield from self._of_the_dead(page, now)
@@ -183,13 +182,22 @@ class RegionalRules:
             yield from self._of_others(page, now)
             yield from self._of_help(page, now)
 
+    def _note_dead(self, now: float, page: Page) -> None:
+        """Note the DVAs that decide nothing, or whose book nobody has seen for a while."""
+        dead = [dva for dva, at in self._shown.items() if now - at > SHOWN_WITHIN]
+        for dva in dead if page.works else [*dead, page.dva]:
+            self._died.setdefault(dva, now)
+            self._down[dva] = now
+        if page.works:
+            self._died.pop(page.dva, None)
+
     def _of_the_dead(self, page: Page, now: float) -> Iterator[Broken]:
         """Yield promises of a dead DVA that the one which has taken over does not keep."""
         for promise in list(self._promises):
             region = self.region_at(promise.report.position)
             by, since = self._claimed.get(region, ("", now))
             dead = self._pages.get(promise.dva)
-            if by != page.dva or promise.dva == by or dead is None or dead.works:
+            if by != page.dva or promise.dva == by or dead is None or promise.dva not in self._died:
                 continue
             if now - since <= GOES_ON_WITHIN:
                 continue
