@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,8 +15,8 @@ from dva_sim.options.forms import Jobs, OptionForm, argument, out_form
 
 if TYPE_CHECKING:
     from dva_sim.storms.campaign import StormTally
+    from dva_sim.storms.outcome import StormOutcome
     from dva_sim.storms.plan import StormPlan
-    from dva_sim.storms.storm import StormOutcome
 
 OUT = Path("results/storms")
 AROUND = 20.0  # of a breach, in its story [s]
@@ -33,6 +33,9 @@ def storm(
     profile: Annotated[
         str, OptionForm("Kinds of faults: all, messages, nodes, people or none.")
     ] = "all",
+    plays: Annotated[
+        str, OptionForm("Storms of one `team`, or of several DVAs (`regions`).", metavar="PLAY")
+    ] = "team",
     jobs: Jobs = None,
     out: Annotated[Path, out_form("Folder for the journal and for failures.")] = OUT,
     quiet: Quiet = False,
@@ -45,6 +48,10 @@ def storm(
     fourteen minutes of virtual time. Rules S1 to S8, S10 and S11 are checked by observers that rely
     on no agent. Two minutes after the last fault, everything must work again.
 
+    With `--plays regions`, two to four DVAs serve a hall: they are killed and come back, and links
+    between them and to their devices are cut, lose, delay and double messages. S1 to S8 and S12 to
+    S15 are checked.
+
     At the end, each storm that broke a rule is reduced to the faults that matter. Its plan and
     timeline are saved in the folder, and the plan can be replayed. The same seed gives the same
     storm. Storms already in the folder are counted, not repeated.
@@ -54,17 +61,30 @@ def storm(
     Examples:
         dva-sim storm --seeds 1:256  # 60 fleet-hours
         dva-sim storm --hours 100  # continue with further seeds until 100 fleet-hours are reached
+        dva-sim storm --plays regions --seeds 1:100  # 10 hours of several DVAs
         dva-sim storm results/storms/found/all-7.yaml  # replay a failure
     """
     from dva_sim.experiments.execution.executors import local  # late: start-up
-    from dva_sim.storms.campaign import Journal, StormTally, outcomes  # late: start-up
-    from dva_sim.storms.drawing import draw  # late: start-up
+    from dva_sim.storms.campaign import (  # late: start-up
+        REGIONS,
+        Journal,
+        StormTally,
+        drawn,
+        outcomes,
+    )
     from dva_sim.storms.plan import load_plan  # late: start-up
 
     if plan is not None:
         raise typer.Exit(_replay(load_plan(plan)))
     first, last = _range(seeds)
-    draw(first, profile)  # an unknown profile is refused before anything starts
+    if plays not in ("team", REGIONS):
+        raise ConfigError(f"--plays {plays!r} should be team or {REGIONS}")
+    if plays == REGIONS and profile != "all":
+        raise ConfigError(
+            f"--profile {profile} is for --plays team: {REGIONS} has faults of its own"
+        )
+    profile = REGIONS if plays == REGIONS else profile
+    drawn(first, profile)  # an unknown profile is refused before anything starts
     out.mkdir(parents=True, exist_ok=True)
     tally = StormTally()
     known = 0
@@ -83,7 +103,7 @@ def storm(
             break
     _tell(tally, known)
     for outcome in failed:  # last: reducing one takes minutes of a single process
-        _keep_failure(draw(outcome.seed, profile), outcome, out / "found", profile)
+        _keep_failure(drawn(outcome.seed, profile), outcome, out / "found", profile)
     raise typer.Exit(ExitCode.DOES_NOT_HOLD if tally.failures else ExitCode.OK)
 
 
@@ -96,9 +116,9 @@ def _range(seeds: str) -> tuple[int, int]:
 
 def _replay(plan: StormPlan) -> ExitCode:
     """Play one storm, and tell its story."""
-    from dva_sim.storms.storm import Storm, play  # late: start-up
+    from dva_sim.storms.storm import play  # late: start-up
 
-    kept = list[Storm]()
+    kept = list[Any]()
     outcome = play(plan, kept.append)
     for moment in kept[0].recorder.timeline:
         typer.echo(f"{moment.time:9.3f} s  {moment.who}: {moment.what}")
@@ -124,7 +144,7 @@ def _tell_failure(outcome: StormOutcome, profile: str) -> None:
 def _keep_failure(plan: StormPlan, outcome: StormOutcome, folder: Path, profile: str) -> None:
     """Reduce a failure, and keep its plan and its story, unless an earlier call has done so."""
     from dva_sim.storms.shrinking import Shrinker  # late: start-up
-    from dva_sim.storms.storm import Storm, play  # late: start-up
+    from dva_sim.storms.storm import play  # late: start-up
 
     file = folder / f"{profile}-{plan.seed}.yaml"
     if file.exists():
@@ -133,7 +153,7 @@ def _keep_failure(plan: StormPlan, outcome: StormOutcome, folder: Path, profile:
     shrinker = Shrinker(plan, outcome)
     small = shrinker.shrink()
     folder.mkdir(parents=True, exist_ok=True)
-    kept = list[Storm]()
+    kept = list[Any]()
     again = play(small, kept.append)
     when = min((breach.time for breach in again.breaches), default=again.simulated_s)
     story = [

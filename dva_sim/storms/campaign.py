@@ -16,9 +16,14 @@ from dva_sim.experiments.execution.executors import Workers
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Breach
 from dva_sim.storms.drawing import draw
-from dva_sim.storms.storm import StormOutcome, play
+from dva_sim.storms.outcome import StormOutcome
+from dva_sim.storms.plan import StormPlan
+from dva_sim.storms.regional_storm import draw_regions
+from dva_sim.storms.storm import play
 
 HOUR = 3600.0
+REGIONS: Final = "regions"
+"""Stands for a profile where storms of several DVAs are played."""
 CONFIDENCE: Final = 0.95
 LOOK_EVERY = 1.0  # after the processes [s]
 
@@ -62,7 +67,16 @@ class StormTally:
 
 def play_seed(seed: int, profile: str) -> StormOutcome:
     """Play the storm of a seed."""
-    return play(draw(seed, profile))
+    return play(drawn(seed, profile))
+
+
+def drawn(seed: int, profile: str) -> StormPlan:
+    """Draw the storm of a seed: by a profile of faults, or of several DVAs.
+
+    Raises:
+        ConfigError: there is no such profile.
+    """
+    return draw_regions(seed) if profile == REGIONS else draw(seed, profile)
 
 
 class Journal:

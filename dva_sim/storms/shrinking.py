@@ -9,8 +9,9 @@ from dataclasses import replace
 from typing import Any, Final
 
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.storms.outcome import StormOutcome
 from dva_sim.storms.plan import Fault, StormPlan
-from dva_sim.storms.storm import Storm, StormOutcome, play
+from dva_sim.storms.storm import play
 
 TRIES: Final = 120
 """So many smaller storms are tried at most."""
@@ -43,7 +44,7 @@ class Shrinker:
         self,
         plan: StormPlan,
         outcome: StormOutcome,
-        before: Callable[[Storm], object] = lambda _: None,
+        before: Callable[[Any], object] = lambda _: None,
         tries: int = TRIES,
     ) -> None:
         self.plan = plan
@@ -80,9 +81,9 @@ class Shrinker:
 
     def _play(self, plan: StormPlan) -> StormOutcome:
         """Play a storm until one of the rules is broken."""
-        storms = list[Storm]()
+        storms = list[Any]()
 
-        def begins(storm: Storm) -> None:
+        def begins(storm: Any) -> None:
             storms.append(storm)
             self._before(storm)
 
@@ -121,8 +122,10 @@ class Shrinker:
         for count in range(self.plan.drivers):
             if count < self.plan.drivers:
                 yield replace(self.plan, drivers=count)
+        several = bool(self.plan.scenario.get("dva", {}).get("regions"))
         for key, plain in _PLAINER:
-            yield self._with(key, plain)
+            if not (several and key in ("site", "dva")):  # its regions are of that site
+                yield self._with(key, plain)
 
     def _with(self, key: str, value: Any) -> StormPlan:
         return replace(self.plan, scenario={**self.plan.scenario, key: value})

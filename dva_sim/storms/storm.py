@@ -9,22 +9,24 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from typing_extensions import override
 
 from dva_sim.agents.robot.command_queue import EACH
-from dva_sim.kernel.recorder import Accepted, Breach
+from dva_sim.kernel.recorder import Accepted
 from dva_sim.simulation.full.observations import RobotMotion, motion_of
 from dva_sim.simulation.full.physical_world import PHYSICS_TICK
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.storms.checkers import AnswerWatch, RefusedDrivers, is_waiting, oversized, waiting_of
 from dva_sim.storms.faults import FAULTS
 from dva_sim.storms.interference import PassingMessage
+from dva_sim.storms.outcome import StormOutcome
 from dva_sim.storms.plan import Fault, StormPlan
 from dva_sim.storms.recovery import RecoveryProbes
+from dva_sim.storms.regional_storm import RegionalStorm
 from dva_sim.storms.scene import StormScene
 
 LOOK_AT_BOUNDS = 30.0  # how often all containers are counted [s]
@@ -35,43 +37,6 @@ SILENCED = frozenset(
     | {"dva-silent", "messages-lost", "partition", "frozen"}
 )
 """Faults after which what was asked may stay without an answer."""
-
-
-@dataclass
-class StormOutcome:
-    """Outcome of a storm: its size, and the rules that broke.
-
-    Attributes:
-        seed: Seed of the storm.
-        breaches: Breaches of rules, each by one agent; empty if all were held.
-        error: Traceback of an exception that ended it; empty if it went to its end.
-        faults: Number of faults by kind.
-        messages: Number of messages that faults have touched, by kind.
-        simulated_s: Simulated time [s].
-        cpu_s: Cost [CPU s].
-        digest: Hash of all messages: equal storms have equal ones.
-    """
-
-    seed: int
-    breaches: list[Breach] = field(default_factory=list)
-    error: str = ""
-    faults: Counter[str] = field(default_factory=Counter)
-    messages: Counter[str] = field(default_factory=Counter)
-    simulated_s: float = 0.0
-    cpu_s: float = 0.0
-    digest: str = ""
-
-    @property
-    def signature(self) -> frozenset[str]:
-        """Signature shared by equal failures: the broken rules, or the kind of exception."""
-        if self.error:
-            return frozenset({self.error.strip().rpartition("\n")[2].partition(":")[0]})
-        return frozenset(breach.rule for breach in self.breaches)
-
-    @property
-    def is_clean(self) -> bool:
-        """Return True if no rule was broken."""
-        return not self.breaches and not self.error
 
 
 class Storm(StormScene):
@@ -263,10 +228,10 @@ def _chance(plan: StormPlan, fault: Fault | None = None) -> random.Random:
 
 def play(
     plan: StormPlan,
-    before: Callable[[Storm], object] = lambda _: None,
+    before: Callable[[Any], object] = lambda _: None,
     enough: Callable[[], bool] = lambda: False,
 ) -> StormOutcome:
-    """Play a storm to its end, whatever happens.
+    """Play a storm of one team, or of several DVAs, to its end, whatever happens.
 
     Args:
         plan: The storm.
@@ -274,7 +239,8 @@ def play(
         enough: See `Storm.play`.
     """
     with tempfile.TemporaryDirectory(prefix="dva-storm-") as folder:
-        storm = Storm(plan, Path(folder))
+        several = bool(plan.scenario.get("dva", {}).get("regions"))
+        storm = RegionalStorm(plan) if several else Storm(plan, Path(folder))
         before(storm)
         try:
             return storm.play(enough)

@@ -9,7 +9,7 @@ from dva_sim.experiments.execution.executors import local
 from dva_sim.kernel.recorder import Breach
 from dva_sim.storms import campaign, shrinking, storm
 from dva_sim.storms.campaign import Journal, StormTally, outcomes
-from dva_sim.storms.storm import StormOutcome
+from dva_sim.storms.outcome import StormOutcome
 
 
 def outcome(seed: int, **of: object) -> StormOutcome:

@@ -141,6 +141,9 @@ class RegionalDva(Dva):
             return replace(answer, sends=[*answer.sends, *returned])
         if is_new and entry is None:
             self.deputy.came(message.source, now)
+            answer = super()._answer(message, now)
+            self.deputy.spare(message.source, now)
+            return answer
         if isinstance(body, m.EventReport) and body.event_id is None:
             self.deputy.reported(message.source, self.division.region_at(body.position))
         if isinstance(body, m.PermissionRequest) and self._is_a_strangers(body):

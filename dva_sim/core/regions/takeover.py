@@ -84,6 +84,13 @@ class Deputy:
         """Note a device that was not registered here before."""
         self._came[device] = now
 
+    def spare(self, device: str, now: float) -> None:
+        """Order a device nowhere that has just come, and that a copied event has in hand."""
+        copies = (copy for kept in self.copies.values() for copy in kept.values())
+        entry = self.orders.registry.entries.get(device)
+        if entry is not None and any(device in self._sent(copy.status) for copy in copies):
+            entry.free_from = now + COME_WITHIN
+
     def reported(self, device: str, region: str) -> None:
         """Note a report about a region: a detector that has come here may be of that region."""
         if device in self._came:
@@ -133,6 +140,7 @@ class Deputy:
             for number, copy in list(kept.items()):
                 sent = self._sent(copy.status)
                 there = all(self._is_there(device) for device in sent)
+                there = there and copy.status.responder not in self.orders.engaged
                 if there or now - since >= COME_WITHIN:
                     del kept[number]
                     self._go_on(copy, there, now)

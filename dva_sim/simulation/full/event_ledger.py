@@ -359,7 +359,7 @@ class EventLedger:
         for number in events.open.keys() & events.closed.keys():
             yield "S6", f"event {number} is open and closed"
         gone = self._open.keys() - events.open.keys() - events.closed.keys()
-        gone = {n for n in gone if not self._may_be_gone(*self._open[n])}
+        gone = {n for n in gone if not self._may_be_gone(n, *self._open[n])}
         returns = now - self._back_at < RETURNED_WITHIN
         later = {number: self._open[number] for number in gone if returns}
         for number in gone - later.keys():
@@ -447,8 +447,13 @@ class EventLedger:
         found = FOUND.intersection((*event.times, event.state.value))
         return Seen(found, _in_hand(event), now, now, now, times=dict(event.times))
 
-    def _may_be_gone(self, kind: str, place: m.Position) -> bool:
-        """Return True if another DVA has such an event, or nobody was told that one has a copy."""
+    def _may_be_gone(self, number: int, kind: str, place: m.Position) -> bool:
+        """Return True if another DVA has such an event, or nobody was told that one has a copy.
+
+        Or it was over just before its DVA died: deputies keep copies of open events.
+        """
+        if len(self._books) > 1 and self._word(number).found:
+            return True
         near = max(self._rules.merge_distance, SAME_SPOT)
         others = [book for book in self._books if book is not self]
         if not all(book._worked_since(self._down_at - TOGETHER) for book in others):
