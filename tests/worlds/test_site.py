@@ -69,10 +69,14 @@ def test_free_floor_is_its_own_place_and_that_of_a_desk_is_before_it():
     assert site.is_free(*place, 0.30)
 
 
-def test_a_room_behind_a_wall_has_no_floor_nearby(tmp_path):
-    closed = feature("room", "Polygon", square(20, 20, 3), name="vault")
-    site = load_site(write_site(tmp_path, [*TWO_ROOMS, closed]))
-    assert site.floor_near(21.5, 21.5, 2.0) is None
+def test_floor_behind_a_wall_is_not_nearby(tmp_path):
+    vault = [
+        feature("room", "Polygon", square(8, 0, 3), name="vault"),
+        feature("wall", "LineString", square(8, 0, 3)),
+    ]
+    site = load_site(write_site(tmp_path, [*TWO_ROOMS, *vault]))
+    assert site.floor_near(7.5, 2.0, 2.0) == (7.5, 2.0)
+    assert site.floor_near(8.5, 2.0, 2.0) is None
 
 
 def test_bases_posts_and_desks_of_caparica_stand_free():
