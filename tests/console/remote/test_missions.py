@@ -75,6 +75,30 @@ def test_a_robot_that_falls_silent_on_its_way_is_given_back(page):
     assert any(isinstance(body, m.PermissionRevocation) for body in given_back)
 
 
+def test_a_mission_is_an_order_to_the_console_and_its_person_says_what_is_there(page):
+    assert page.ask("mission", robot=number(page, "robot-1"), event=1)["ok"]
+    page.until(lambda: page.events()[0]["state"] == "assigned")
+    assert page.events()[0]["assigned"][0] == "robot-1"
+    assert page.ask("event_details", event=1)["details"]["history"][-1]["device"] == "robot-1"
+    assert page.ask("mission_found", event=1, finding="confirmed")["ok"]
+    page.until(lambda: page.events()[0]["state"] == "confirmed")
+    page.until(lambda: page.world.robot().controller.grant is None)
+
+
+def test_people_who_share_a_control_room_hand_a_mission_over_without_a_stop(page):
+    assert page.ask("room_join", client="c2", name="ben")["ok"]
+    assert page.ask("mission", robot=number(page, "robot-1"), event=1)["ok"]
+    session = page.world.robot().controller.grant.session
+    assert page.ask("hand_over", to="ben", note="smoke")["ok"]
+    assert page.ask("hand_over_answer", client="c2", offer=1, accept=True)["ok"]
+    page.let(5.0)
+    assert page.world.robot().controller.grant.session == session
+    assert page.lines_of("control")[-1]["owners"] == [{"event": 1, "label": "ben"}]
+
+    assert not page.ask("mission_found", event=1, finding="confirmed")["ok"]
+    assert page.ask("mission_found", client="c2", event=1, finding="confirmed")["ok"]
+
+
 @pytest.mark.parametrize(
     ("about", "words"),
     [({"robot": 99, "event": 1}, "no robot 99"), ({"robot": 0, "event": 7}, "no event 7")],
