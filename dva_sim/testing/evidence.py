@@ -88,7 +88,7 @@ def judged_recording(opened: Opened) -> list[Verdict]:
     found = v.judged(opened.playback.recorder.facts, opened.terms, until)
     topics = missing_topics(opened)
     verdicts = list[v.Verdict]()
-    for rule in v.RULES:
+    for rule in dict.fromkeys([*v.RULES, *(verdict.rule for verdict in found)]):
         if lacking := topics.get(rule):
             text = f"the recording lacks {listed(lacking)}"
             verdicts.append(v.Verdict(rule, v.NOT_JUDGED, text, lacks_facts=True))
@@ -107,6 +107,7 @@ def missing_topics(opened: Opened) -> dict[str, list[str]]:
     from dva_sim.recordings.raw_records import is_camera  # late: start-up
     from dva_sim.simulation.full.verdicts import (  # late: start-up
         OF_MESSAGES,
+        OF_REGIONS,
         OF_ROBOTS,
         OF_THE_DVA,
         RULES,
@@ -116,10 +117,16 @@ def missing_topics(opened: Opened) -> dict[str, list[str]]:
     terms = opened.terms
     if facts is None or terms is None:
         return {}
-    needed_by = {"book": OF_THE_DVA, "arrived": OF_MESSAGES, "heard": ("S2",), "places": ("S6",)}
+    regional = () if terms.region_at is None else tuple(OF_REGIONS)
+    needed_by: dict[str, tuple[str, ...]] = {
+        "book": (*OF_THE_DVA, *regional),
+        "arrived": (*OF_MESSAGES, *regional),
+        "heard": ("S2",),
+        "places": ("S6",),
+    }
     found: dict[str, list[str]] = {}
     for topic in _lacking(opened):
-        rules = tuple(RULES)
+        rules: tuple[str, ...] = (*RULES, *regional)
         if topic.startswith(OBSERVED):
             rules = needed_by.get(topic.removeprefix(OBSERVED), OF_ROBOTS)
         elif is_camera(topic):
@@ -127,7 +134,7 @@ def missing_topics(opened: Opened) -> dict[str, list[str]]:
         elif topic.startswith("/") and not topic.startswith(MESSAGES):
             rules = ()  # drawn, and not judged
         for rule in rules:
-            if rule in OF_THE_DVA or terms.motors:
+            if rule in (*OF_THE_DVA, *regional) or terms.motors:
                 found.setdefault(rule, []).append(topic)
     return found
 
