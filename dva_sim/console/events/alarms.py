@@ -74,6 +74,7 @@ class RaisedAlarm:
         state: See `AlarmState`.
         raised: Start of the present state, real time [s].
         is_on: True while the condition lasts.
+        is_worse: True if it has become graver since somebody acknowledged it elsewhere.
         seen_by: Person who acknowledged it.
         shelved_until: Real time [s]; None if it is not shelved.
         shelved_by: Person who shelved it.
@@ -84,6 +85,7 @@ class RaisedAlarm:
     state: AlarmState
     raised: float
     is_on: bool = True
+    is_worse: bool = False
     seen_by: str = ""
     shelved_until: float | None = None
     shelved_by: str = ""
@@ -145,14 +147,14 @@ class Alarms:
         graver = PRIORITIES.index(condition.priority) < PRIORITIES.index(known.condition.priority)
         if graver:
             alarm = replace(alarm, shelved_until=None, shelved_by="", shelved_why="")
-        if graver and not condition.seen_by:
             alarm = replace(alarm, state=AlarmState.UNACKNOWLEDGED, raised=now, seen_by="")
+            alarm = replace(alarm, is_worse=condition.seen_by is not None)
             self._raised.append(now)
         self._keep(self._seen(alarm, condition.seen_by))
 
     @staticmethod
     def _seen(alarm: RaisedAlarm, by: str | None) -> RaisedAlarm:
-        if by is None or alarm.state is not AlarmState.UNACKNOWLEDGED:
+        if by is None or alarm.is_worse or alarm.state is not AlarmState.UNACKNOWLEDGED:
             return alarm
         return replace(alarm, state=AlarmState.ACKNOWLEDGED, seen_by=by)
 
@@ -198,7 +200,8 @@ class Alarms:
         if alarm is None:
             return
         if alarm.is_on:
-            self.known[key] = replace(alarm, state=AlarmState.ACKNOWLEDGED, seen_by=by)
+            alarm = replace(alarm, state=AlarmState.ACKNOWLEDGED, seen_by=by, is_worse=False)
+            self.known[key] = alarm
         else:
             del self.known[key]
 

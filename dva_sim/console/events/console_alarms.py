@@ -129,12 +129,15 @@ class ConsoleAlarms:
         return found
 
     def by_event(self, keys: Iterable[str]) -> Mapping[str, int]:
-        """Those of the alarms that an open event is behind, which the DVA is to be told of."""
+        """Return the alarms of open events whose acknowledgement is news to the DVA."""
         known = ((key, self.alarms.known[key]) for key in keys)
         return {
             key: alarm.condition.event
             for key, alarm in known
-            if alarm.is_on and alarm.condition.event is not None and key.startswith("event ")
+            if alarm.is_on
+            and alarm.condition.event is not None
+            and alarm.condition.seen_by is None
+            and key.startswith("event ")
         }
 
     def acknowledge(self, key: str, by: str) -> None:

@@ -171,3 +171,14 @@ def test_a_dva_that_says_nothing_is_an_alarm_until_it_speaks_again(page):
     page.let(5.0)
     (alarm,) = [row for row in page.lines_of("alarms")[-1]["alarms"] if row["key"] == "dva silent"]
     assert alarm["state"] == "returned"
+
+
+def test_what_gets_graver_after_it_was_acknowledged_calls_again(alarms):
+    seen = {"acknowledged": {"label": "ana"}}
+    alarms.look([event(severity="low", **seen)], [], 10_000)
+    (row,) = alarms.look([event(severity="critical", **seen)], [], 11_000)["alarms"]
+    assert row["state"] == "unacknowledged"
+    assert alarms.by_event([row["key"]]) == {}  # the DVA knows who answers for the event
+    alarms.acknowledge(row["key"], "ben")
+    (row,) = alarms.look([event(severity="critical", **seen)], [], 12_000)["alarms"]
+    assert (row["state"], row["seen_by"]) == ("acknowledged", "ben")
