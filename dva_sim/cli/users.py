@@ -24,7 +24,7 @@ def add(name: _Name, role: Annotated[str, _ROLE] = "drive", file: _File = _USUAL
     no terminal, its first line is the password.
 
     Examples:
-        dva-sim users add ana --role supervise
+        dva-sim users add ana --role supervise  # asks for the password
         dva-sim console hands-on --users users.json  # ana may log in there
     """
     users = UserFile(file)
@@ -38,7 +38,14 @@ def change(
     password: Annotated[bool, OptionForm("Ask for a new password.")] = False,
     file: _File = _USUAL,
 ) -> None:
-    """Change the role or the password of a user; who is logged in has the new role at once."""
+    """Change the role or the password of a user.
+
+    A user who is logged in has the new role at once.
+
+    Examples:
+        dva-sim users change ana --role dispatch  # sends others from now on
+        dva-sim users change ana --password  # asks for a new one
+    """
     users = UserFile(file)
     users.find(name)
     users.change(name, role=role, password=_password() if password else None)
@@ -46,25 +53,41 @@ def change(
 
 
 def remove(name: _Name, file: _File = _USUAL) -> None:
-    """Remove a user; a login that goes on ends."""
+    """Remove a user, whose login ends.
+
+    Examples:
+        dva-sim users remove ana  # from users.json
+    """
     UserFile(file).remove(name)
     print(f"{name} is removed from {file}")
 
 
 def lock(name: _Name, file: _File = _USUAL) -> None:
-    """Lock a user out, until unlocked; a login that goes on ends."""
+    """Lock a user out, whose login ends.
+
+    Examples:
+        dva-sim users lock ana  # until dva-sim users unlock ana
+    """
     UserFile(file).change(name, locked=True)
     print(f"{name} is locked")
 
 
 def unlock(name: _Name, file: _File = _USUAL) -> None:
-    """Let a user log in again."""
+    """Let a user log in again.
+
+    Examples:
+        dva-sim users unlock ana  # after dva-sim users lock ana
+    """
     UserFile(file).change(name, locked=False)
     print(f"{name} may log in again")
 
 
 def list_(file: _File = _USUAL) -> None:
-    """List the users of a file, with their roles."""
+    """List the users of a file, with their roles.
+
+    Examples:
+        dva-sim users list --file night-shift.json  # of another file
+    """
     users = UserFile(file).users.values()
     for user in users:
         print(f"{user.name}: {user.role}{', locked' if user.locked else ''}")

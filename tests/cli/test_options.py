@@ -27,7 +27,7 @@ CLASSES = [of for module in (runs, studies) for of in vars(module).values() if i
 ADDED = {
     "compare": {"measure", "by", "fail_if", "as_json"},
     "episode": {"quiet", "verbose"},
-    "replay": {"console", "host", "port", "no_open", "no_token", "quiet", "verbose"},
+    "replay": {"console", "host", "port", "no_open", "no_token", "users", "quiet", "verbose"},
     "report": {"quiet", "verbose"},
     "run": {"dry_run", "quiet", "verbose"},
     "show": {"as_json"},

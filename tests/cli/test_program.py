@@ -14,7 +14,12 @@ from dva_sim.cli.commands import PanelGroup
 from dva_sim.kernel.errors import ConfigError, ExitCode, RunsFailed
 
 COMMANDS = get_command(app).list_commands(None)
-PATHS = [[name] for name in COMMANDS] + [["site", "show"], ["site", "export"]]
+GROUPS = ["site"], ["users"]
+PATHS = [[name] for name in COMMANDS] + [
+    ["site", "show"],
+    ["site", "export"],
+    *(["users", name] for name in ("add", "change", "remove", "lock", "unlock", "list")),
+]
 WIDTH = 80
 
 
@@ -39,7 +44,7 @@ def test_help_by_its_short_name_fits_a_terminal_of_80_columns(terminal, capsys, 
     assert "..." not in short.replace("FILE...", "").replace("NAME...", "").replace("[ARGS]...", "")
 
 
-@pytest.mark.parametrize("path", [path for path in PATHS if path != ["site"]], ids=" ".join)
+@pytest.mark.parametrize("path", [path for path in PATHS if path not in GROUPS], ids=" ".join)
 def test_help_ends_with_examples_that_say_what_they_do(terminal, capsys, path):
     call([*path, "--help"])
     examples = capsys.readouterr().out.partition("\nExamples:\n")[2].splitlines()
@@ -52,7 +57,7 @@ def test_help_ends_with_examples_that_say_what_they_do(terminal, capsys, path):
     ]
 
 
-@pytest.mark.parametrize("path", [path for path in PATHS if path != ["site"]], ids=" ".join)
+@pytest.mark.parametrize("path", [path for path in PATHS if path not in GROUPS], ids=" ".join)
 def test_examples_use_words_and_options_that_there_are(path):
     program = get_command(app)
     for line, _ in command_at(path).examples:
