@@ -26,7 +26,7 @@ def addresses(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[str]]:
         yield [drive, *re.findall(r"^Look only: +(\S+)$", console.output, re.MULTILINE)]
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def console(addresses: list[str]) -> str:
     return addresses[0]
 
