@@ -29,8 +29,9 @@ CALM: Final = 240.0  # faults have ended [s]
 LASTS: Final = 120.0  # from then to the end [s]
 FIRST: Final = 10.0  # faults begin [s]
 KILLED: Final = "region-killed"
-KINDS: Final = (KILLED, "partition", "messages-lost", "messages-late", "messages-doubled")
-_WEIGHTS: Final = (3.0, 3.0, 1.0, 1.5, 1.0)
+ALONE: Final = "region-alone"  # a DVA reaches detectors and nobody else
+KINDS: Final = (KILLED, ALONE, "partition", "messages-lost", "messages-late", "messages-doubled")
+_WEIGHTS: Final = (3.0, 2.0, 2.0, 1.0, 1.5, 1.0)
 _HALL: Final = (60.0, 40.0)  # extent of the site [m]
 
 
@@ -80,6 +81,8 @@ def _fault(chance: random.Random, dvas: list[str], devices: list[str]) -> Fault:
     at_s = round(chance.uniform(FIRST, CALM - 60.0), 3)
     if kind == KILLED:
         return Fault(kind, at_s, target=target, value=round(chance.uniform(2.0, 55.0), 3))
+    if kind == ALONE:
+        return Fault(kind, at_s, for_s=round(chance.uniform(12.0, 55.0), 3), target=target)
     source = chance.choice([*(dva for dva in dvas if dva != target), *devices])
     if chance.random() < 0.5:
         source, target = target, source
@@ -164,11 +167,28 @@ class RegionalStorm:
                 self.run.end_dva(number)
                 clock.call_after(fault.value, self.run.start_region_again, number)
             return
+        if fault.kind == ALONE:
+            clock.call_after(fault.for_s, self._cut_off(self.id_of(fault.target)))
+            return
         chance = random.Random(f"{self.plan.seed} {fault!r}")
         scene: Any = self  # faults of messages need its interference and its labels
         ends = FAULTS[fault.kind].begin(scene, fault, chance)
         if ends is not None:
             clock.call_after(fault.for_s, ends)
+
+    def _cut_off(self, dva: str) -> Callable[[], object]:
+        """Cut a DVA off from all but detectors, both ways; return what ends that."""
+        detectors = id_of("detector", 1)[: len("02:00:00:04")]
+        rules = self.interference.rules
+
+        def meets(passing: PassingMessage) -> bool:
+            ends = passing.source, passing.to
+            lost = dva in ends and not any(end.startswith(detectors) for end in ends)
+            self.interference.counts[ALONE] += lost
+            return lost
+
+        rules.append(meets)
+        return lambda: rules.remove(meets)
 
     def _judge_recovery(self) -> None:
         """Tell what has not recovered (S8): a region without a DVA, a device that is nobody's."""

@@ -164,6 +164,7 @@ class EventLedger:
         self._seen: dict[int, Seen] = {}
         self._open: dict[int, tuple[str, m.Position]] = {}
         self._promised: dict[int, float] = {}  # with the highest severity that was reported
+        self._registered: dict[str, float] = {}
         self._numbers: dict[int, None] = {}  # of events, where there are several DVAs
         self._lost: dict[int, tuple[str, m.Position, Word]] = {}
         self._now = 0.0
@@ -203,6 +204,7 @@ class EventLedger:
                     self._ends(self._word(number), source)
                     self._word(number).ended.add(source)
             case m.Registration():
+                self._registered[source] = now
                 for word in self._words.values():
                     self._ends(word, source)
 
@@ -447,6 +449,12 @@ class EventLedger:
         found = FOUND.intersection((*event.times, event.state.value))
         return Seen(found, _in_hand(event), now, now, now, times=dict(event.times))
 
+    def _is_anothers(self, device: str) -> bool:
+        """Return True if a device has registered with another DVA since it did with this one."""
+        own = self._registered.get(device, -math.inf)
+        others = (book._registered.get(device, -math.inf) for book in self._books)
+        return any(when > own for when in others)
+
     def _may_be_gone(self, number: int, kind: str, place: m.Position) -> bool:
         """Return True if another DVA has such an event, or nobody was told that one has a copy.
 
@@ -511,7 +519,8 @@ class EventLedger:
                 self._uninformed.setdefault(right, now)
         for right, since in list(self._uninformed.items()):
             is_there = now - self._heard.get(right.robot, now) < SILENT_AFTER / 2
-            if right.session in self._informed or (right.robot, right.holder) in held:
+            is_told = right.session in self._informed or self._is_anothers(right.robot)
+            if is_told or (right.robot, right.holder) in held:
                 del self._uninformed[right]
             elif not works or not is_there:
                 self._uninformed[right] = now

@@ -613,7 +613,8 @@ class SafetyAudit:
             case m.Emergency():  # it acts whenever it comes, though its bytes never change
                 witness.note_stop(now, self._release)
             case m.PermissionRevocation() if asked.source in self._dvas:
-                _end(witness, body.session, now)
+                if len(self._dvas) == 1 or code != m.NOT_PERMITTED:  # a robot obeys one DVA
+                    _end(witness, body.session, now)
         if code != m.OK:
             return
         if witness.obeyed_before(message):
