@@ -7,7 +7,6 @@ the run, so that a frame needs no more than a pose and who was near.
 from __future__ import annotations
 
 import io
-import json
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -45,7 +44,7 @@ class Eyes:
     """
 
     def __init__(self, scenario: Mapping[str, Any], seed: int) -> None:
-        run = Scenario.model_validate_json(json.dumps(scenario))  # its numbers as keys are texts
+        run = Scenario.model_validate(scenario)
         site = site_of(run, seed)
         angle = math.radians(min(WIDEST, run.camera.field_of_view_deg))
         self._camera = Camera(site, WIDTH, HEIGHT, angle)

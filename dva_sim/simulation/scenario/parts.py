@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     SerializerFunctionWrapHandler,
@@ -100,7 +101,14 @@ class RobotConfig(Config):
 
 
 Kind = Literal["simulated", "person"]
-Kinds = Kind | dict[Annotated[int, Field(ge=1)], Kind]
+
+
+def _number(key: object) -> object:
+    """Return a number that was a key of JSON, where each is a text."""
+    return int(key) if isinstance(key, str) and key.isascii() and key.isdigit() else key
+
+
+Kinds = Kind | dict[Annotated[int, BeforeValidator(_number), Field(ge=1)], Kind]
 """One kind for all, or kinds of some by their numbers from 1; the others are simulated."""
 
 

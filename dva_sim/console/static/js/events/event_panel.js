@@ -1,5 +1,5 @@
 /** Event in hand: its state, who could go, one button for what is next, and the other decisions. */
-import { html, signal, useRef, useState } from '../../vendor/preact.js';
+import { html, signal, useEffect, useRef, useState } from '../../vendor/preact.js';
 import { alarmList, control, mayDispatch, maySteer, maySupervise, selection, thingNamed } from '../store.js';
 import { act } from '../net/actions.js';
 import { ageOf } from '../net/world_time.js';
@@ -15,6 +15,8 @@ import { Shelve } from './shelve.js';
 
 /** @typedef {import('../lines.js').SiteEvent} SiteEvent */
 /** @typedef {{ok: boolean, text: string}} Done */
+
+const SETTLE_MS = 500;
 
 /** The panel. */
 export function EventPanel() {
@@ -111,6 +113,7 @@ function NextStep({ event, tell }) {
   const ways = waysOf(candidateOf(whom));
   const way = ways.includes(wayWanted.value) ? wayWanted.value : ways[0];
   const isSent = sentTo(event).includes(whom);
+  const settled = useSettled(`${event.number} ${Boolean(whom)}`);
   const off = !maySteer.value;
   const acknowledge = async () => tell(await act('event_acknowledge', { event: event.number }));
   const send = async () => {
@@ -129,12 +132,25 @@ function NextStep({ event, tell }) {
     ${ways.length > 1 && !isSent && html`<fieldset><legend class="hidden">How</legend>${ways.map((one) => html`<label key=${one}>
       <input type="radio" name="way" checked=${one === way} onInput=${() => (wayWanted.value = one)} />${WAYS[one]}</label>`)}</fieldset>`}
     <div class="buttons">
-      ${whom && !isSent && html`<button type="button" class=${looks ? '' : 'primary'} data-deed="send" disabled=${off} onClick=${send}>
+      ${whom && !isSent && html`<button type="button" class=${looks ? '' : 'primary'} data-deed="send" disabled=${off || !settled} onClick=${send}>
         ${way === 'drive' ? `Drive ${whom} there` : `Send ${estimateOf(whom)}`}</button>`}
       ${!whom && !sentTo(event).length && html`<p class="none">Nobody can go.</p>`}
       ${!event.acknowledged && html`<button type="button" class=${looks || (whom && !isSent) ? '' : 'primary'} disabled=${off}
         onClick=${acknowledge}>Acknowledge</button>`}
     </div></div>`;
+}
+
+/**
+ * False for a moment after something has appeared: a click on what stood there before is not for it.
+ * @param {string} key
+ */
+function useSettled(key) {
+  const [settled, settle] = useState('');
+  useEffect(() => {
+    const timer = window.setTimeout(() => settle(key), SETTLE_MS);
+    return () => window.clearTimeout(timer);
+  }, [key]);
+  return settled === key;
 }
 
 /** Take a robot from its holder, with its task, and open its driving page. @param {string} robot @param {string} words */
