@@ -136,6 +136,7 @@ class RegionalDva(Dva):
         )
         if is_new and isinstance(body, m.Registration) and body.device_type == PEER:
             self._deputies.clear()
+            self.deputy.replace_restarted(message.source, now)
             returned = self.deputy.return_copies(message.source, now)
             answer = super()._answer(message, now)
             return replace(answer, sends=[*answer.sends, *returned])

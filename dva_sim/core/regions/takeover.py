@@ -80,6 +80,15 @@ class Deputy:
                 sends.append(Send(peer, m.Replicate(region, epoch, len(sends) + 1, status)))
         return sends
 
+    def replace_restarted(self, peer: str, now: float) -> None:
+        """Claim the regions that a DVA had taken over before it was started again: it forgot."""
+        for region, claim in list(self.division.claims.items()):
+            is_deputy = self.division.deputy_of(region, self.orders.registry) == self.division.own
+            if claim.dva == peer != self.division.lines[region][0] and is_deputy:
+                self.division.learn(region, Claim(claim.epoch + 1, self.division.own))
+                self.taken_over[region] = now
+                self.orders.counters["region taken over"] += 1
+
     def came(self, device: str, now: float) -> None:
         """Note a device that was not registered here before."""
         self._came[device] = now
