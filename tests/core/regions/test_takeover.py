@@ -167,3 +167,19 @@ def test_a_look_that_was_asked_for_by_the_dead_goes_on_as_the_deputys_own():
     street.tick(6, GUARD, OTHER_GUARD)
     assert list(street.cores[EAST].events.open) == [1_000_001]
     assert not street.cores[EAST].help.copies
+
+
+def test_a_region_whose_deputy_has_taken_over_and_forgotten_it_is_served_again():
+    street = dead_west()
+    street.tick(1, GUARD)
+    street.dead.clear()
+    street.tick(3, GUARD)
+    assert street.cores[WEST].division.claims["west"] == Claim(2, EAST)
+    street.register(WEST, EAST, "DVA")
+    street.cores[EAST] = street.new_core(EAST, life=1)
+    street.register(EAST, WEST, "DVA")
+    street.number = 1
+    street.register(WEST, EAST, "DVA")
+    street.tick(3)
+    assert street.cores[WEST].division.claims["west"] == Claim(3, WEST)
+    assert street.cores[EAST].division.claims["west"] == Claim(3, WEST)
