@@ -128,7 +128,7 @@ def tell_outcome(tables: Tables, how: str, console: Console, found: Sequence[Ver
     if unjudged_rules(found):
         lines.append(_unjudged(found))
     else:
-        lines.append(f"safety rules S1 to S7: {_violations(row['violations'])}")
+        lines.append(f"safety rules: {_violations(row['violations'])}")
     lines += _failed(row)
     print_lines(["", *lines], console)
     tell_measures(row, RUN_COLUMNS)

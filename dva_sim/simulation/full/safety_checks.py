@@ -396,7 +396,7 @@ class SafetyAudit:
         self._release = terms.release
         self._asked_release: dict[tuple[str, str], float] = {}  # by robot and device: when last
         self._hears_dva = False
-        self._told_stopped: dict[str, StopTold] = {}
+        self._told_stopped: dict[tuple[str, str], StopTold] = {}  # by DVA and robot
         self._orders_sent: deque[int] = deque(maxlen=MOST_KEPT)  # hashes; each may be sent again
         self._dvas = frozenset(terms.dvas)
         self._obeys_within = OBEYS_WITHIN + 10 * terms.processing
@@ -449,7 +449,7 @@ class SafetyAudit:
             self._ledgers[to].hears(source, message, now)
             if message is not None and message.source == source:
                 self._takeovers[to].hears(source, message)
-                self._dva_hears_of_stops(message, now)
+                self._dva_hears_of_stops(to, message, now)
 
     def knows_places(self, known: bool) -> None:
         """Note whether places are known; without them, any finding is taken as made there."""
@@ -495,22 +495,22 @@ class SafetyAudit:
             grant = message.body
             witness.given(grant.session, Held(grant.holder, grant.level, grant.sensors))
 
-    def _dva_hears_of_stops(self, message: m.Message, now: float) -> None:
+    def _dva_hears_of_stops(self, dva: str, message: m.Message, now: float) -> None:
         source = message.source
         body = message.body
         if isinstance(body, m.RobotEmergency) and source in self._motors:
-            told = self._told_stopped.setdefault(source, StopTold())
+            told = self._told_stopped.setdefault((dva, source), StopTold())
             told.at = -math.inf if body.tick == told.released else now
             told.tick = body.tick
         elif isinstance(body, m.ReleaseEmergency) and body.device in self._motors:
-            told = self._told_stopped.setdefault(body.device, StopTold())
+            told = self._told_stopped.setdefault((dva, body.device), StopTold())
             told.at = -math.inf
             told.released = told.tick
             self._asked_release[body.device, source] = now
             if len(self._asked_release) > MOST_KEPT:
                 del self._asked_release[next(iter(self._asked_release))]
 
-    def _sends_stopped(self, to: str, data: bytes, now: float) -> Iterator[Broken]:
+    def _sends_stopped(self, dva: str, to: str, data: bytes, now: float) -> Iterator[Broken]:
         """Yield an order for a robot that has just told the DVA that an emergency holds it."""
         is_new = hash(data) not in self._orders_sent
         self._orders_sent.append(hash(data))
@@ -518,7 +518,7 @@ class SafetyAudit:
         if order is None:
             return
         robot = order.body.device if isinstance(order.body, m.Order) else to
-        told = self._told_stopped.get(robot or "")
+        told = self._told_stopped.get((dva, robot or ""))
         if told is not None and now - told.at < TELLS_WITHIN:
             yield "S3", f"sends out {robot}, which has told it that an emergency holds it"
 
@@ -537,7 +537,7 @@ class SafetyAudit:
             self._report([*self._regional.sent(now, source, to, payload)], now, source)
         if source in self._dvas:
             if isinstance(payload, bytes) and _ORDERS_ROBOT.search(payload) is not None:
-                self._report([*self._sends_stopped(to, payload, now)], now, source)
+                self._report([*self._sends_stopped(source, to, payload, now)], now, source)
             ledger = self._ledgers[source]
             if isinstance(payload, bytes) and ledger.waits_for(payload):
                 ledger.says(decode_if_valid(payload))
