@@ -21,8 +21,8 @@ def decided(page: Page) -> str:
     """Somebody raises an event and overrules the policy; return who is sent."""
     expect(page.locator(".desk-head")).to_contain_text("supervise-1")
     raised(page)
-    page.get_by_role("button", name="Acknowledge").click()
-    expect(page.get_by_role("button", name="Acknowledge")).to_have_count(0)
+    page.get_by_role("button", name="Acknowledge", exact=True).click()
+    expect(page.get_by_role("button", name="Acknowledge", exact=True)).to_have_count(0)
     guard = another(page)
     page.get_by_label("Reason or note").fill("=1+1, a person has to look")
     sends(page, guard).click()

@@ -62,8 +62,8 @@ def test_a_fire_is_acknowledged_sent_to_taken_over_reached_over_250_ms_and_confi
     base = address.partition("?")[0]
     fire_in_hand(page)
 
-    page.get_by_role("button", name="Acknowledge").click()
-    expect(page.get_by_role("button", name="Acknowledge")).to_have_count(0)
+    page.get_by_role("button", name="Acknowledge", exact=True).click()
+    expect(page.get_by_role("button", name="Acknowledge", exact=True)).to_have_count(0)
     robot = page.locator(".candidate").filter(has_text=re.compile("robot-.*free")).first
     label = robot.locator("span").first.inner_text()
     robot.get_by_role("radio").check()
@@ -106,8 +106,8 @@ def test_people_decide_over_real_links_too(tmp_path, visit, programs):
     page = visit.open(address, "events")
     fire_in_hand(page)
 
-    page.get_by_role("button", name="Acknowledge").click()
-    expect(page.get_by_role("button", name="Acknowledge")).to_have_count(0)
+    page.get_by_role("button", name="Acknowledge", exact=True).click()
+    expect(page.get_by_role("button", name="Acknowledge", exact=True)).to_have_count(0)
     page.get_by_role("radio", name="guard-1").check()
     page.get_by_role("button", name="Send guard-1").click()
     expect(page.get_by_role("region", name="Events")).to_contain_text("guard-1")

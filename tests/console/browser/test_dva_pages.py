@@ -323,7 +323,7 @@ def test_an_attached_console_shows_what_messages_tell_the_rest_as_unknown_and_of
     page.get_by_role("link", name="Events").click()
     expect(page.get_by_text("The DVA lets this console look.")).to_be_visible(timeout=SLOW)
     expect(page.get_by_role("region", name="Events")).to_contain_text("Fire", timeout=SLOW)
-    expect(page.get_by_role("button", name="Acknowledge")).to_have_count(0)
+    expect(page.get_by_role("button", name="Acknowledge", exact=True)).to_have_count(0)
     expect(page.get_by_role("button", name="Take over")).to_have_count(0)
     page.get_by_role("link", name="Map").click()
     page.get_by_role("region", name="Robots").get_by_role("button", name="robot-1").click()
@@ -370,7 +370,7 @@ def test_people_at_an_attached_console_decide_see_alarms_and_read_what_they_did(
     fire = page.get_by_role("button", name=re.compile("^Event 1 Fire"))
     fire.click(timeout=SLOW)
     assert faults(page) == []
-    page.get_by_role("button", name="Acknowledge").click()
+    page.get_by_role("button", name="Acknowledge", exact=True).click()
     expect(fire).to_contain_text("control room", timeout=SLOW)
     page.get_by_role("radio", name="guard-1").check(timeout=SLOW)
     page.get_by_role("button", name="Send guard-1").click()

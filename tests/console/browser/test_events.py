@@ -25,9 +25,9 @@ def test_an_event_is_acknowledged_and_somebody_is_sent(both):
     number = raised(page)
     choose(page, number)
 
-    page.get_by_role("button", name="Acknowledge").click()
+    page.get_by_role("button", name="Acknowledge", exact=True).click()
     cell(other, number, "supervise-")
-    expect(page.get_by_role("button", name="Acknowledge")).to_have_count(0)
+    expect(page.get_by_role("button", name="Acknowledge", exact=True)).to_have_count(0)
     guard = another(page)
     page.get_by_label("Reason or note").fill("a person has to look")
     sends(page, guard).click()

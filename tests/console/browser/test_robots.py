@@ -282,6 +282,7 @@ def test_a_name_that_is_hostile_is_shown_as_text(visit, console):
         "address => { location.hash = address; }", "#/robots/%3Cimg%20src=x%20onerror=alert(2)%3E"
     )
     expect(page.get_by_text("There is no robot <img src=x onerror=alert(2)>")).to_be_visible()
+    page.close()
     visit.errors.clear()  # the console has no pictures of a robot of that name
 
 

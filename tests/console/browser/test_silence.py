@@ -25,7 +25,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "drive": (".watchdog", ".stop-reason", ".picture-age", ".mode-status", ".latency .figures b"),
     "map": (".lists .state", ".card dd", ".bar .time .figure", ".bar .age"),
     "events": (".desk-row .state small", ".facts dd", ".picture-age"),
-    "robots": (".robots-page td.n",),
+    "robots": (".robot-cards dd",),
     "robots/robot-1": (".robot-bar .mode-status", ".sensors dd", ".view-panel b", ".picture-age"),
     "devices": (".devices-page td.n",),
     "network": (".figures-panel td.n",),
