@@ -156,7 +156,7 @@ class HeldRobot:
         if self.phase != "gone" and session == self.session:
             self.end("gave up")
             known = "" if self._has_answered else f"; {self._silence()}"
-            self._alert(f"{self.label}: the permission was revoked{known}")
+            self._alert(f"{self.label}: {REVOKED}{known}")
             self._be_gone()
 
     def taken_back(self, outcome: str) -> None:
@@ -449,6 +449,7 @@ class HeldRobot:
 
 
 FOUND = ("confirmed", "refuted")
+REVOKED = "the permission was revoked"
 DRIVES = ("teleoperation", "both")  # levels of permission
 _NOT_NOW = {
     "asking": "the DVA has not answered yet",

@@ -125,6 +125,7 @@ class ConsolePages:
         self._modes: list[object] = []
         self._is_shown = False
         system.on_devices = self.tell_scene
+        system.agent.on_record = self.hear_record
 
     # --- see `ConsoleSubject` --------------------------------------------------------------
 
@@ -169,6 +170,13 @@ class ConsolePages:
         """Free a client's seat and notify the client."""
         self.tell(self.seat_lines.free(client), client)
         self._news.forget("seat", client)
+
+    def hear_record(self, record: m.AuditRecord) -> None:
+        """Note who takes a robot from its driver, whom the DVA tells no name."""
+        if record.action == "revoke" and record.code == m.OK and record.device is not None:
+            reason = f": {record.reason}" if record.reason else ""
+            robot = self.system.label_of(record.device)
+            self.driven.revokers[robot] = f"by {record.label}{reason}"
 
     # --- what is told ----------------------------------------------------------------------
 

@@ -39,6 +39,7 @@ class DrivenSystem:
         own_pattern: Pattern of its scenario.
         stale_s: Age above which robots refuse what a command was based on [s].
         seeks_orders: True if free seats take part while pages are open: the DVA may order them.
+        revokers: Name of the person who took a robot from its driver, with the reason, by label.
         stoppers: Device and name of the person who stopped a robot from a page, by its id.
         on_held: Callback for the robots that are in somebody's hands, by id.
         free_seat: Callback for a page that sits nowhere any more.
@@ -59,6 +60,7 @@ class DrivenSystem:
         self.clock = system.clock
         self.own_pattern = scenario.pattern
         self.stale_s = scenario.robot.max_age_s
+        self.revokers: dict[str, str] = {}
         self.stoppers: dict[str, tuple[str, str]] = {}
         self.on_held: Callable[[set[str]], object] = lambda _: None
         self.free_seat: Callable[[str], object] = lambda _: None

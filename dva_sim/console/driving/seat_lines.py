@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from dva_sim.agents.operator.held_robot import HeldRobot
+from dva_sim.agents.operator.held_robot import REVOKED, HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.driving.driven_system import DrivenSystem
 from dva_sim.console.phones.phone_seat import PhoneSeat
@@ -107,10 +107,16 @@ class SeatLines:
             "label": person.device.label,
             "phase": next((phase for phase in PHASES if phase in phases), "free"),
             "order": None if person.order is None else self._order(person.order),
-            "alert": person.alert or person.device.dva_alert,
+            "alert": self._alert(person.alert) or person.device.dva_alert,
             "drives": [self._drive(each) for each in held],
             "phone": self._phone(client),
         }
+
+    def _alert(self, alert: str) -> str:
+        """Return the alert of a person, with the name of who took the robot away."""
+        robot, _, what = alert.partition(": ")
+        by = self._system.revokers.get(robot) if what.startswith(REVOKED) else None
+        return alert if by is None else f"{alert} {by}"
 
     def _order(self, order: m.Order) -> OrderShown:
         x, y, room = self._system.place_of(order.position)

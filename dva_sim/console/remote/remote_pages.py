@@ -95,7 +95,6 @@ class RemotePages(ConsolePages):
         )
         self.requests = RequestReader(system.agent, lambda line: self.tell(line))
         self.audited = RemoteAudit(keeper, system, self.author)
-        system.agent.on_record = self._hear_record
 
     def close(self) -> None:
         """Take part no more."""
@@ -196,8 +195,10 @@ class RemotePages(ConsolePages):
             removed="speaks no more: the DVA takes it from its list within some seconds",
         )
 
-    def _hear_record(self, record: m.AuditRecord) -> None:
-        """Tell somebody's decision, in words, and keep it."""
+    @override
+    def hear_record(self, record: m.AuditRecord) -> None:
+        # A decision is told in words, and kept.
+        super().hear_record(record)
         about = f" about event {record.event_id}" if record.event_id is not None else ""
         refused = f", refused: {record.text}" if record.code != m.OK else ""
         text = f"{record.action.replace('_', ' ')}{about}{refused}"
