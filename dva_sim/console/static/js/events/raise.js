@@ -4,13 +4,8 @@ import { maySteer, scene } from '../store.js';
 import { act } from '../net/actions.js';
 import { placeOf } from '../map/shown.js';
 import { Choice, Field, wrongNumber } from '../ui/fields.js';
-import { plain } from '../ui/words.js';
+import { KINDS, SEVERITIES } from '../ui/report_choices.js';
 import { place, raising, select } from './shared.js';
-
-const pairs = (/** @type {string[]} */ names) =>
-  /** @type {[string, string][]} */ (names.map((name) => [name, plain(name)]));
-const KINDS = pairs(['fire', 'gas_leak', 'flood']);
-const SEVERITIES = pairs(['low', 'medium', 'high', 'critical']);
 
 /** The panel. */
 export function Raise() {

@@ -3,12 +3,7 @@ import { html, useState } from '../../vendor/preact.js';
 import { maySteer, tracks } from '../store.js';
 import { act } from '../net/actions.js';
 import { Choice } from '../ui/fields.js';
-import { plain } from '../ui/words.js';
-
-const pairs = (/** @type {string[]} */ names) =>
-  /** @type {[string, string][]} */ (names.map((name) => [name, plain(name)]));
-const KINDS = pairs(['fire', 'gas_leak', 'flood']);
-const SEVERITIES = pairs(['low', 'medium', 'high', 'critical']);
+import { KINDS, SEVERITIES } from '../ui/report_choices.js';
 
 /** @param {{me: import('../lines.js').Guard}} props */
 export function Report({ me }) {

@@ -4,14 +4,9 @@ import { maySteer } from '../store.js';
 import { act } from '../net/actions.js';
 import { placeOf } from '../map/shown.js';
 import { Choice } from '../ui/fields.js';
-import { plain } from '../ui/words.js';
+import { KINDS, SEVERITIES } from '../ui/report_choices.js';
 import { phone } from './drive.js';
 import { LazyMap } from './lazy_map.js';
-
-const pairs = (/** @type {string[]} */ names) =>
-  /** @type {[string, string][]} */ (names.map((name) => [name, plain(name)]));
-const KINDS = pairs(['fire', 'gas_leak', 'flood']);
-const SEVERITIES = pairs(['low', 'medium', 'high', 'critical']);
 
 /** The screen. */
 export function ReportScreen() {
