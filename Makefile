@@ -39,7 +39,7 @@ test: $(DEV)  ## the tests that are quick, which are nearly all
 	@echo "Running the quick tests ..."
 	@$(PYTEST) --cpu-by-room -m "not system and not soak and not browser"
 
-test-all: test-browser check test test-system test-long  ## what must pass; make -j2 does two at a time
+test-all: test-browser check test test-system test-long  ## what must pass, one after the other
 
 test-contract: $(DEV)  ## what every transport promises, in virtual time and over sockets
 	@$(PYTEST) -m contract
