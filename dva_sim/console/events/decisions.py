@@ -66,6 +66,20 @@ def decision_of(
     return m.SetDispatch(mode, reason), asks
 
 
+def on_site(line: PlaceAsked, site: Site | None) -> tuple[float, float]:
+    """Return a place that a page names [m]; where no site is known, any place.
+
+    Raises:
+        Refused: it lies beyond the site.
+    """
+    x = line["x_m"]
+    y = line["y_m"]
+    left, low, right, high = (x, y, x, y) if site is None else site.extent
+    if not (left <= x <= right and low <= y <= high):
+        raise Refused("that is outside the site, where nobody can go")
+    return x, y
+
+
 def place_of(line: PlaceAsked, site: Site | None) -> tuple[float, float]:
     """Return where an event is raised [m]: on floor that a robot can reach, at the named place.
 
@@ -74,13 +88,9 @@ def place_of(line: PlaceAsked, site: Site | None) -> tuple[float, float]:
     Raises:
         Refused: nobody can go there.
     """
-    x = line["x_m"]
-    y = line["y_m"]
+    x, y = on_site(line, site)
     if site is None:
         return x, y
-    left, low, right, high = site.extent
-    if not (left <= x <= right and low <= y <= high):
-        raise Refused("that is outside the site, where nobody can go")
     floor = site.floor_near(x, y, BEFORE)
     if floor is None:
         room = site.room_at(x, y)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import OnResult, Refused
-from dva_sim.console.events.decisions import place_of
+from dva_sim.console.events.decisions import on_site, place_of
 from dva_sim.console.guards.played_guards import PlayedGuards
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import (
@@ -66,7 +66,7 @@ class GuardActions:
 
     @does("guard_place")
     def _place(self, client: str, line: PlaceAsked, on_result: OnResult) -> None:
-        self._guard(client).stand_at(*place_of(line, self._site), on_result)
+        self._guard(client).stand_at(*on_site(line, self._site), on_result)
 
     @does("guard_report")
     def _report(self, client: str, line: ReportAsked, on_result: OnResult) -> None:

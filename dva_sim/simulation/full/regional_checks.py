@@ -60,7 +60,7 @@ class Asked(NamedTuple):
     obeyed: str | None
 
 
-class Promise(NamedTuple):
+class KeptReport(NamedTuple):
     """A report that a DVA has answered as kept by its deputy, too."""
 
     dva: str
@@ -84,7 +84,7 @@ class RegionalRules:
     _epochs: dict[tuple[str, str], tuple[int, float]] = field(default_factory=dict)
     _heard: dict[tuple[str, str], float] = field(default_factory=dict)
     _reported: OrderedDict[Key, m.EventReport] = field(default_factory=OrderedDict)
-    _promises: list[Promise] = field(default_factory=list)
+    _promises: list[KeptReport] = field(default_factory=list)
     _claimed: dict[str, tuple[str, float]] = field(default_factory=dict)  # by region
     _sends: list[tuple[str, m.Order, float]] = field(default_factory=list)
     _pages: dict[str, Page] = field(default_factory=dict)
@@ -148,7 +148,7 @@ class RegionalRules:
                 report = self._reported.pop((to, dva, number), None)
                 is_kept = report is not None and text != UNREPLICATED
                 if report is not None and is_kept and report.finding == "detected":
-                    self._promises.append(Promise(dva, report))
+                    self._promises.append(KeptReport(dva, report))
                     del self._promises[:-MOST_KEPT]
             case m.Replicate(event=event) if event.closed_for is not None:
                 self._promises = [p for p in self._promises if not _is_about(p.report, event)]
