@@ -59,7 +59,7 @@ class KnownSystem:
         frame: Origin of the map.
         has_all_events: True once the DVA has sent all its events since its last restart.
         switched: Time of the latest change of the mode of dispatch [s].
-        on_devices: Callback when a device appears or disappears, or the DVA moves.
+        on_devices: Callback when somebody from outside appears or disappears, or the DVA moves.
     """
 
     def __init__(
@@ -92,6 +92,7 @@ class KnownSystem:
         self.switched = 0.0
         self._started = 0.0
         self._foreign: set[str] = set()
+        self._here: dict[str, str] = {}  # labels of those from outside who are shown, by id
         self._met: set[str] = set()  # devices that the DVA has ever listed
         self._listed = 0.0  # time of the DVA's newest list of devices [s]
         self._forgotten = -math.inf  # time at which the DVA last knew nothing of this console [s]
@@ -222,7 +223,10 @@ class KnownSystem:
                 self.things.add_foreign(id_tag, label, kind, body)
                 self._foreign.add(id_tag)
                 room -= 1
-        self.on_devices()
+        here = {i: self.labels[i] for i in self._foreign if i in self.state.devices}
+        if here != self._here:
+            self._here = here
+            self.on_devices()
 
     def things_here(self) -> list[ThingShown]:
         """Return everybody but those from outside who have gone."""

@@ -9,11 +9,10 @@ import { CalibrationScreen } from './calibration.js';
 import { choices } from './choices.js';
 import { robot } from './drive.js';
 import { EmergencyFooter } from './emergency_footer.js';
-import { EventScreen } from './event.js';
 import { InstructionsScreen } from './instructions.js';
+import { lazy } from './lazy.js';
 import { LinkStatus } from './link_status.js';
 import { MainScreen } from './main_screen.js';
-import { ReportScreen } from './report.js';
 import { SCREENS, screen } from './screens.js';
 import { TeleoperationScreen } from './teleoperation.js';
 
@@ -23,8 +22,8 @@ const BODIES = /** @type {Record<string, any>} */ ({
   calibration: CalibrationScreen,
   instructions: InstructionsScreen,
   teleoperation: TeleoperationScreen,
-  event: EventScreen,
-  report: ReportScreen,
+  event: lazy(async () => (await import('./event.js')).EventScreen),
+  report: lazy(async () => (await import('./report.js')).ReportScreen),
 });
 
 /** @param {HTMLElement} where */

@@ -5,11 +5,11 @@ import { act } from '../net/actions.js';
 import { ageOf } from '../net/world_time.js';
 import { watch } from '../net/sockets.js';
 import { CameraPicture } from '../drive/camera.js';
+import { MapBox } from '../map/map_box.js';
 import { isOpen, placeOf } from '../map/shown.js';
 import { SeverityMark } from '../ui/icon.js';
 import { ageText, capital, plain } from '../ui/words.js';
 import { holds, isKnown, robot } from './drive.js';
-import { LazyMap } from './lazy_map.js';
 import { subject } from './screens.js';
 
 /** @typedef {import('../lines.js').SiteEvent} SiteEvent */
@@ -31,7 +31,7 @@ export function EventScreen() {
       </dl></section>
     ${isOpen(event) && html`<${Way} event=${event} />`}
     <section class="map-region small" aria-label="Map">
-      <${LazyMap} cones=${() => (goes ? [goes.i] : [])} legend=${false} keyboard=${false}
+      <${MapBox} cones=${() => (goes ? [goes.i] : [])} legend=${false} keyboard=${false}
         goals=${() => [{ x: event.x_m, y: event.y_m, radius: 0.8, name: '' }]} /></section>
     ${goes && html`<${Picture} key=${goes.i} robot=${goes} />`}`;
 }

@@ -2,11 +2,11 @@
 import { html, useState } from '../../vendor/preact.js';
 import { maySteer } from '../store.js';
 import { act } from '../net/actions.js';
+import { MapBox } from '../map/map_box.js';
 import { placeOf } from '../map/shown.js';
 import { Choice } from '../ui/fields.js';
 import { KINDS, SEVERITIES } from '../ui/report_choices.js';
 import { phone } from './drive.js';
-import { LazyMap } from './lazy_map.js';
 
 /** The screen. */
 export function ReportScreen() {
@@ -28,7 +28,7 @@ export function ReportScreen() {
       <${Choice} name="Severity" value=${severity} options=${SEVERITIES} onInput=${setSeverity} /></div>
     <p role="status" aria-label="Place">${at ? placeOf({ x_m: at[0], y_m: at[1] }) : 'Tap the map where it is.'}</p>
     <div class="map-region small" role="group" aria-label="Map">
-      <${LazyMap} cones=${() => []} legend=${false} keyboard=${false} onPlace=${(/** @type {number} */ x, /** @type {number} */ y) => place([x, y])}
+      <${MapBox} cones=${() => []} legend=${false} keyboard=${false} onPlace=${(/** @type {number} */ x, /** @type {number} */ y) => place([x, y])}
         goals=${() => (at ? [{ x: at[0], y: at[1], radius: 0.8, name: '' }] : [])} /></div>
     <button type="button" class="big go" disabled=${!at || !maySteer.value} onClick=${report}>Report</button>
     <p role="status" aria-label="Report">${sent && html`${sent.text}. ${sent.event && html`<a href=${`#/event?${sent.event}`}>Event ${sent.event}</a>`}`}</p>
