@@ -19,7 +19,10 @@ OWN = sorted((STATIC / "js").rglob("*.js"))
 TYPES = STATIC / "js" / "lines.js"  # written from the declarations
 VENDORED = {"shipped": STATIC / "vendor", "tests": HERE / "browser" / "vendor"}
 LIST = tomllib.loads((HERE / "vendor.toml").read_text())
-IMPORT = re.compile(r"^(?:import|export)\b[^;]*?from '([^']+)';|^import '([^']+)';", re.MULTILINE)
+IMPORT = re.compile(
+    r"^(?:import|export)\b[^;]*?from '([^']+)';|^import '([^']+)';|\bimport\('([^']+)'\)",
+    re.MULTILINE,
+)
 
 
 def test_vendored_files_are_those_of_the_list():
@@ -80,7 +83,7 @@ def test_modules_of_the_pages_say_what_they_are_for_and_write_no_html():
 
 def imports(file: Path) -> set[Path]:
     """Own modules that a module imports."""
-    found = {a or b for a, b in IMPORT.findall(file.read_text())}
+    found = {"".join(names) for names in IMPORT.findall(file.read_text())}
     return {(file.parent / name).resolve() for name in found if "vendor" not in name}
 
 

@@ -2,7 +2,7 @@
 import { connect, keepDriveSocket } from '../net/sockets.js';
 import { showPhone } from './app.js';
 import { seat } from '../store.js';
-import { vibrateFor } from '../shell/calling.js';
+import { vibrateFor } from '../shell/unseen.js';
 import { isKnown, keepDriveInHand } from './drive.js';
 import { keepSampling } from './samples.js';
 

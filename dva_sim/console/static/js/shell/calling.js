@@ -1,23 +1,17 @@
 /** Calls for the person: the page's title, a strip on each page, a sound and a notification. */
-import { computed, effect, html, signal } from '../../vendor/preact.js';
-import { alarmList, isPast } from '../store.js';
+import { effect, html, signal } from '../../vendor/preact.js';
 import { ageOf } from '../net/world_time.js';
 import { select } from '../events/shared.js';
 import { SeverityMark } from '../ui/icon.js';
 import { ageText } from '../ui/words.js';
 import { page } from './route.js';
+import { callByAlarms, RANKS, unseen } from './unseen.js';
 
-const RANKS = ['low', 'medium', 'high', 'critical'];
 const BEEP_S = 0.18;
-const PATTERN_MS = [300, 150, 300]; // on, off, on
 
 /** True while alarms sound; a browser lets a page sound only after a click. */
 const sounds = signal(false);
 let speaker = /** @type {AudioContext | null} */ (null);
-
-const unseen = computed(() =>
-  isPast.value ? [] : alarmList.value.alarms.filter((alarm) => alarm.state === 'unacknowledged'),
-);
 
 /** Call for each alarm that is new or has become worse, in the title as well. */
 export function callThePerson() {
@@ -27,36 +21,6 @@ export function callThePerson() {
     const [worst] = unseen.value;
     const title = `${page.value.charAt(0).toUpperCase()}${page.value.slice(1)} · ${name}`;
     document.title = worst ? `(${unseen.value.length}) ${worst.text}` : title;
-  });
-}
-
-/**
- * Do something about each alarm that is new or has become worse since the page was opened.
- * @param {(worst: import('../lines.js').AlarmRow) => void} act
- */
-function callByAlarms(act) {
-  let known = /** @type {Map<string, number> | null} */ (null);
-  effect(() => {
-    const ranks = new Map(unseen.value.map((alarm) => [alarm.key, RANKS.indexOf(alarm.priority)]));
-    const worse = unseen.value.filter((alarm) => (known?.get(alarm.key) ?? -1) < RANKS.indexOf(alarm.priority));
-    if (known && worse.length) act(worse[0]);
-    known = ranks;
-  });
-}
-
-/**
- * Have the phone of somebody on call vibrate for alarms and orders.
- * @param {() => boolean} isOnCall
- * @param {() => unknown} order number of the order in hand, if any
- */
-export function vibrateFor(isOnCall, order) {
-  const vibrate = () => isOnCall() && navigator.vibrate?.(PATTERN_MS);
-  callByAlarms(vibrate);
-  let known = order();
-  effect(() => {
-    const now = order();
-    if (now && now !== known) vibrate();
-    known = now;
   });
 }
 
