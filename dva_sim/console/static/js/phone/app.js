@@ -9,21 +9,21 @@ import { CalibrationScreen } from './calibration.js';
 import { choices } from './choices.js';
 import { robot } from './drive.js';
 import { EmergencyFooter } from './emergency_footer.js';
-import { InstructionsScreen } from './instructions.js';
 import { lazy } from './lazy.js';
 import { LinkStatus } from './link_status.js';
 import { MainScreen } from './main_screen.js';
 import { SCREENS, screen } from './screens.js';
 import { TeleoperationScreen } from './teleoperation.js';
 
+const MAP = ['/static/css/map.css', '/static/vendor/leaflet.css'];
 const BODIES = /** @type {Record<string, any>} */ ({
   main: MainScreen,
   authentication: AuthenticationScreen,
   calibration: CalibrationScreen,
-  instructions: InstructionsScreen,
+  instructions: lazy(async () => (await import('./instructions.js')).InstructionsScreen),
   teleoperation: TeleoperationScreen,
-  event: lazy(async () => (await import('./event.js')).EventScreen),
-  report: lazy(async () => (await import('./report.js')).ReportScreen),
+  event: lazy(async () => (await import('./event.js')).EventScreen, MAP),
+  report: lazy(async () => (await import('./report.js')).ReportScreen, MAP),
 });
 
 /** @param {HTMLElement} where */

@@ -1,25 +1,23 @@
-/** Screens with a map, loaded with their styles when they are first shown: the pages stay light. */
+/** Screens that are loaded with their styles when they are first shown: the pages stay light. */
 import { html, useEffect, useState } from '../../vendor/preact.js';
 
-const STYLES = ['/static/css/map.css', '/static/vendor/leaflet.css'];
-let styled = false;
-
-function addStyles() {
-  if (styled) return;
-  styled = true;
-  for (const href of STYLES) document.head.append(Object.assign(document.createElement('link'), { rel: 'stylesheet', href }));
+/** @param {string} href */
+function addStyle(href) {
+  if (document.querySelector(`link[href="${href}"]`)) return;
+  document.head.append(Object.assign(document.createElement('link'), { rel: 'stylesheet', href }));
 }
 
 /**
  * Screen that is loaded when it is first shown.
  * @param {() => Promise<any>} load
+ * @param {string[]} [styles]
  */
-export function lazy(load) {
+export function lazy(load, styles = []) {
   return function Lazy() {
     const [Screen, show] = useState(/** @type {any} */ (null));
     useEffect(() => {
       let over = false;
-      addStyles();
+      styles.forEach(addStyle);
       load().then((loaded) => over || show(() => loaded));
       return () => {
         over = true;
