@@ -42,6 +42,7 @@ COMMANDS = {
     },
     "phone-log": f"phone-log {NOBODY}",
     **{name: f"{name} {NOBODY}" for name in ("live", "console", "validate", "storm")},
+    "users": "users list --file {out}/users.json",
     "robot": f"robot {NOBODY}",
     "link": f"link {NOBODY} --near true --far true",
 }

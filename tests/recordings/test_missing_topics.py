@@ -135,6 +135,6 @@ def test_a_whole_recording_is_judged(whole: Path, capsys: pytest.CaptureFixture[
     console = Console(width=300)
     with console.capture() as captured:
         stories.replay(whole, Wanted(), where=console)
-    assert "S1 to S7" in captured.get()
+    assert "safety rules: none" in captured.get()
     assert checks.check([str(whole)]) == ExitCode.OK
     assert "recording: valid" in capsys.readouterr().out

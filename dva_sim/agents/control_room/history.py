@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 
 from dva_sim.protocol import messages as m
 
-MOST_STEPS: Final = 60  # of one event; of more the oldest but the report are lost
-SAME_STEP: Final = 2.0  # a state and the decision that led to it are told within this [s]
+MOST_STEPS: Final = 60  # design: of one event; of more the oldest but the report are lost
+SAME_STEP: Final = 2.0  # design: a state and the decision that led to it are told within this [s]
 LED_BY: Final = {
     "assign": "assigned",
     "false_alarm": "refuted",
