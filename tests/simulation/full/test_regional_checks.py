@@ -95,6 +95,7 @@ def test_a_run_of_one_dva_is_judged_by_seven_rules():
 # --- planted faults ----------------------------------------------------------------------------
 
 
+@pytest.mark.invariant("S12")
 def test_a_guard_that_obeys_two_dvas_breaks_s12(monkeypatch):
     honest = GuardProtocol.handle
 
@@ -111,6 +112,7 @@ def test_a_guard_that_obeys_two_dvas_breaks_s12(monkeypatch):
     assert "S12" in broken(run)
 
 
+@pytest.mark.invariant("S12")
 def test_a_dva_that_orders_by_an_older_epoch_breaks_s12(monkeypatch):
     monkeypatch.setattr(Division, "learn", lambda self, region, claim: False)
     run = hall(events__0__at_s=40)
@@ -119,6 +121,7 @@ def test_a_dva_that_orders_by_an_older_epoch_breaks_s12(monkeypatch):
     assert "S12" in broken(run)
 
 
+@pytest.mark.invariant("S13")
 def test_a_deputy_that_confirms_copies_and_keeps_none_breaks_s13(monkeypatch):
     monkeypatch.setattr(Deputy, "keep", lambda *_: DvaAnswer())
     run = hall(dva__deaths=[{"region": "east", "at_s": 20.0}])
@@ -126,6 +129,7 @@ def test_a_deputy_that_confirms_copies_and_keeps_none_breaks_s13(monkeypatch):
     assert broken(run) == {"S13"}
 
 
+@pytest.mark.invariant("S13")
 def test_a_dva_that_lets_a_stray_go_untold_breaks_s13(monkeypatch):
     def pass_on(self, now):
         sends = honest(self, now)
@@ -138,6 +142,7 @@ def test_a_dva_that_lets_a_stray_go_untold_breaks_s13(monkeypatch):
     assert "S13" in broken(run)
 
 
+@pytest.mark.invariant("S14")
 def test_two_dvas_that_serve_one_region_after_a_partition_break_s14(monkeypatch):
     def learn(self, region, claim):
         return self.own == WEST and honest(self, region, claim)
@@ -149,6 +154,7 @@ def test_two_dvas_that_serve_one_region_after_a_partition_break_s14(monkeypatch)
     assert "S14" in broken(run)
 
 
+@pytest.mark.invariant("S14")
 def test_dvas_that_look_at_one_event_twice_after_a_partition_break_s14(monkeypatch):
     monkeypatch.setattr(Strays, "pass_on", lambda *_: [])
     two = [
@@ -164,6 +170,7 @@ def test_dvas_that_look_at_one_event_twice_after_a_partition_break_s14(monkeypat
     assert "S14" in broken(run)
 
 
+@pytest.mark.invariant("S15")
 def test_a_helper_that_goes_on_when_it_is_told_to_stop_breaks_s15(monkeypatch):
     monkeypatch.setattr(MutualHelp, "end", lambda *_: [])
     run = hall(events__0__position=[10, 20], guard__mobilisation_s=300)
