@@ -29,7 +29,7 @@ class Grading:
     orders: Orders
 
     def reported(self, event: Event, severity: float, source: str, now: float) -> None:
-        """Somebody reports an event that is known."""
+        """Follow another report of a known event."""
         label = self.orders.label_of(source)
         self._raise(event, severity, f"{label} reports it as graver", now)
         if len(event.sources) >= MANY:
@@ -38,13 +38,13 @@ class Grading:
     def sensed(
         self, event: Event, sensor: str, robot: str, *, times_alarm: float, now: float
     ) -> None:
-        """A robot's sensor shows so many times its alarm level, for some while."""
+        """Follow a robot's sensor that has been above its alarm level for a while."""
         label = self.orders.label_of(robot)
         reason = f"{sensor} at {label} is {times_alarm:.1f} times the alarm level"
         self._raise(event, min(1.0, AT_ALARM * times_alarm), reason, now)
 
     def found(self, event: Event, severity: float, device: str, now: float) -> None:
-        """Somebody who was sent there has confirmed an event."""
+        """Follow a finding that confirms an event."""
         self._raise(event, severity, f"{self.orders.label_of(device)} confirms it", now)
 
     def _raise(self, event: Event, severity: float, reason: str, now: float) -> None:

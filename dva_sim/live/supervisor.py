@@ -333,7 +333,7 @@ class Supervisor:
 
 
 def free_pairs(count: int) -> list[int]:
-    """Return the first of so many pairs of ports that are free now."""
+    """Return the first port of each of `count` pairs that are free now."""
     taken: list[socket.socket] = []
     pairs: list[int] = []
     try:

@@ -18,7 +18,7 @@ LED_BY: Final = {
 
 
 class EventStep(NamedTuple):
-    """One step of an event.
+    """Step of an event.
 
     Attributes:
         time: Time [s].
@@ -36,7 +36,7 @@ class EventStep(NamedTuple):
 
 
 class EventHistory:
-    """All known steps of one event, in the order of their times."""
+    """Known steps of an event, in order of time."""
 
     def __init__(self) -> None:
         self.steps: list[EventStep] = []

@@ -25,15 +25,13 @@ from dva_sim.agents.people.profiles import Walker
 from dva_sim.agents.people.walking import Walking
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.event_kinds import SEVERITIES
 from dva_sim.worlds.planning import Planner
 
 DECLINED_AFTER: Final = 30.0  # design: an order to a guard whom nobody plays [s]
 SET_OUT: Final = 2.0  # design: who is so far from where the order came has departed [m]
 FINDINGS: Final = (CONFIRMED, REFUTED, CONTAINED)
 SAYINGS: Final = ("departed", "arrived", *FINDINGS, "help")
-SEVERITIES: Final = {"low": 0.15, "medium": 0.4, "high": 0.6, "critical": 0.9}
-"""Design: the share that a word of a report stands for."""
-KINDS: Final = ("fire", "gas_leak", "flood")
 
 OnResult = Callable[[bool, str], object]
 

@@ -136,7 +136,7 @@ class ConsolePages:
         """There is nothing to be drawn of a world that is known by messages alone."""
 
     def note(self, text: str) -> None:
-        """Something of the console itself has gone wrong that people should know of."""
+        """Tell people of a failure of the console itself."""
         self.system.recorder.tell(self.clock.now, "console", text, "link")
 
     def begin(self) -> None:
@@ -178,7 +178,7 @@ class ConsolePages:
             robot = self.system.label_of(record.device)
             self.driven.revokers[robot] = f"by {record.label}{reason}"
 
-    # --- what is told ----------------------------------------------------------------------
+    # --- lines for pages --------------------------------------------------------------------
 
     def scene(self) -> SceneLine:
         """Return what does not change, but for who is there and where the DVA listens."""

@@ -8,8 +8,7 @@ from dva_sim.agents.device import AgentDevice
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.dva.run_bench import RunBench
 from dva_sim.simulation.full.run import Run
-from dva_sim.simulation.full.stage import DVA, address_of, id_of
-from dva_sim.simulation.scenario import request_timeout_s
+from dva_sim.simulation.full.stage import address_of, id_of
 
 
 def fakes_of(run: Run, bench: RunBench, dismissed: Callable[[str], object]) -> FakeDevices:
@@ -23,22 +22,7 @@ def fakes_of(run: Run, bench: RunBench, dismissed: Callable[[str], object]) -> F
     stage = run.stage
 
     def make(id_tag: str, label: str, kind: str, address: str) -> AgentDevice:
-        device = AgentDevice(
-            id_tag=id_tag,
-            label=label,
-            device_type=kind,
-            address=address,
-            dva=DVA,
-            network=stage.network,
-            recorder=stage.recorder,
-            frame=stage.site.frame,
-            timeout=request_timeout_s(stage.scenario),
-            attempts=stage.scenario.request.attempts,
-            labels=stage.labels,
-            time_of_day=stage.time_of_day,
-        )
-        stage.devices.append(device)
-        return device
+        return stage.take_in(id_tag, label=label, device_type=kind, address=address)
 
     def identity(number: int) -> tuple[str, str]:
         is_modelled = bench.is_modelled

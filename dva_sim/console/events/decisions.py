@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from dva_sim.agents.people.person_guard import SEVERITIES
 from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import PlaceAsked, ReportAsked
@@ -14,6 +13,7 @@ from dva_sim.console.wire.scenes import LabelledMoment
 from dva_sim.console.wire.seats import Answered, CandidateShown
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.control_room import FREE
+from dva_sim.protocol.event_kinds import SEVERITIES
 from dva_sim.worlds.site import Site
 
 UNKNOWN_ROOM: Final = "unknown room"  # where no site is known

@@ -47,7 +47,7 @@ class Offer:
 
 
 class HandingOver:
-    """All offers, and the persons who answer for events that were handed over.
+    """Offers, and the persons who answer for events that were handed over.
 
     Attributes:
         owners: Name of the person by event.

@@ -28,7 +28,7 @@ NOTHING: Final = f"nothing {IN_VIEW}"
 
 
 class RobotMission:
-    """One robot on its way to an event, and its order.
+    """Robot on its way to an event, and its order.
 
     Args:
         agent: Control room that sends it.

@@ -63,7 +63,7 @@ class ConsoleSubject(Protocol):
         """Send the whole scene to the renderer."""
 
     def note(self, text: str) -> None:
-        """Something of the console itself has gone wrong that people should know of."""
+        """Tell people of a failure of the console itself."""
 
 
 class ConsoleProcesses:

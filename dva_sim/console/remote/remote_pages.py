@@ -111,7 +111,7 @@ class RemotePages(ConsolePages):
 
     @override
     def tell_scene(self) -> None:
-        # An unknown site lies around whoever is first heard of.
+        # The first position that is heard becomes the origin of an unknown site.
         self.system.find_place()
         if self.clock.now >= FIRST_SCENE or self.system.is_placed:
             super().tell_scene()
@@ -197,7 +197,6 @@ class RemotePages(ConsolePages):
 
     @override
     def hear_record(self, record: m.AuditRecord) -> None:
-        # A decision is told in words, and kept.
         super().hear_record(record)
         about = f" about event {record.event_id}" if record.event_id is not None else ""
         refused = f", refused: {record.text}" if record.code != m.OK else ""

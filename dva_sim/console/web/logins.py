@@ -55,7 +55,7 @@ class _Failures:
 
 
 class Logins:
-    """All logins of a console.
+    """Logins of a console.
 
     Args:
         path: File of the users.

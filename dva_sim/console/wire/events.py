@@ -138,7 +138,7 @@ class ControlLine(TypedDict):
 
 
 class StepShown(TypedDict):
-    """One step in the history of an event."""
+    """Step in the history of an event."""
 
     event: int
     at_ms: int
@@ -149,7 +149,7 @@ class StepShown(TypedDict):
 
 
 class InstructionShown(TypedDict):
-    """One line of the instructions for an event; `step` is its number among those to be ticked."""
+    """Line of the instructions for an event; `step` is its number among the boxes to tick."""
 
     text: str
     step: int | None

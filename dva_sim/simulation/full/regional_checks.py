@@ -18,7 +18,7 @@ from dva_sim.protocol.codec import decode_if_valid
 from dva_sim.simulation.full.event_ledger import TOGETHER, UNREPLICATED
 from dva_sim.simulation.full.observations import Page, SafetyTerms
 
-OBEYS_WITHIN: Final = 5.0  # a device may wait so long until it does what it is told [s]
+OBEYS_WITHIN: Final = 5.0  # delay allowed between an order and its first effect [s]
 HEALS_WITHIN: Final = 30.0  # two DVAs that hear each other agree after that [s]
 HEARD_WITHIN: Final = 6.0  # a DVA that was heard within that hears the other one now [s]
 SHOWN_WITHIN: Final = 5.0  # a DVA whose book was not seen for so long is dead [s]

@@ -322,7 +322,7 @@ class Run:
 
     @property
     def _ever(self) -> list[DvaAgent]:
-        """All DVAs that there have been."""
+        """Return all DVAs of the run, those that have died first."""
         return [*self._dead, *self.dvas.values()]
 
     def _people(self) -> list[PersonLog]:

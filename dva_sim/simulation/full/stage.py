@@ -261,11 +261,37 @@ class Stage:
             at: Its first place [m], if it has one.
         """
         dvas = self._dvas_known_to(kind, number, at)
-        device = AgentDevice(
-            id_tag=id_of(kind, number),
+        return self.take_in(
+            id_of(kind, number),
             label=self.labels[dvas[0]] if kind == "dva" else label_of(kind, number),
             device_type=TYPES[kind],
             address=self.address(kind, number),
+            dvas=dvas,
+        )
+
+    def take_in(
+        self,
+        id_tag: str,
+        *,
+        label: str,
+        device_type: str,
+        address: str,
+        dvas: tuple[str, ...] = (DVA,),
+    ) -> AgentDevice:
+        """Make a device that takes part, of any id, label, type and address.
+
+        Args:
+            id_tag: Its id.
+            label: Its name for people.
+            device_type: Type in its registration.
+            address: Address in its registration.
+            dvas: DVAs that it knows, its own first.
+        """
+        device = AgentDevice(
+            id_tag=id_tag,
+            label=label,
+            device_type=device_type,
+            address=address,
             dva=dvas[0],
             dvas=dvas,
             network=self.network,

@@ -1,4 +1,4 @@
-"""All events that the DVA knew, and who did what about each: for runs in which people take part.
+"""Events as the DVA knew them, with the decisions of people: for runs in which people take part.
 
 The table `events` has those of the scenario; this one has events that people raised, too.
 """

@@ -18,7 +18,7 @@ _STEP: Final = re.compile(r"(?:[-*+]|\d{1,2}[.)])\s+(?:\[[ xX]?\]\s*)?(.*)")
 
 
 class Instruction(NamedTuple):
-    """One line of instructions.
+    """Line of instructions.
 
     Attributes:
         text: Text without marks of a list or heading.

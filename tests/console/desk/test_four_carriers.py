@@ -1,4 +1,4 @@
-"""One run shown four ways: beside the console, at a DVA elsewhere, on its bench, and recorded."""
+"""A run looks the same beside its console, at a remote DVA, on that DVA's bench, and recorded."""
 
 from collections.abc import Callable, Iterator
 from typing import Any

@@ -127,6 +127,11 @@ def test_a_wait_grows_and_has_an_end(logins, watch):
     assert waits[-1] == pytest.approx(LONGEST_WAIT)
 
 
+def test_under_https_the_cookie_goes_nowhere_else(logins):
+    phones = rules("127.0.0.1", 8766, tokens=Tokens.drawn(), secure=True, logins=logins)
+    assert "Secure" in phones.cookie_of_login("token").split("; ")
+
+
 # --- over http ---------------------------------------------------------------------------------
 
 

@@ -319,12 +319,12 @@
  *   lines: LogEntry[]}} Log
  */
 /**
- * One step in the history of an event.
+ * Step in the history of an event.
  * @typedef {{event: number, at_ms: number, what: string, who: string, device: string,
  *   reason: string}} Step
  */
 /**
- * One line of the instructions for an event; `step` is its number among those to be ticked.
+ * Line of the instructions for an event; `step` is its number among the boxes to tick.
  * @typedef {{text: string, step: number | null, done: LabelledMoment | null}} Instruction
  */
 /**

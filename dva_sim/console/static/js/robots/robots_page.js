@@ -1,4 +1,4 @@
-/** All robots, each on a card with a link to its page; or the page of the robot named in the address. */
+/** Robots page: a card for each robot, or the windows of the robot that the address names. */
 import { html, useEffect } from '../../vendor/preact.js';
 import { isPast, modeOf, robots, rowOf, rows, scene, tracks } from '../store.js';
 import { CameraPicture } from '../drive/camera.js';
