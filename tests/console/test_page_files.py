@@ -81,6 +81,16 @@ def test_modules_of_the_pages_say_what_they_are_for_and_write_no_html():
         assert file == TYPES or len(text.splitlines()) <= 300, file
 
 
+CONDITIONAL_BUTTON = re.compile(r"(?:&&|\?|:) html`\s*<button[^>]*?>", re.DOTALL)
+
+
+def test_a_button_that_comes_and_goes_never_becomes_another_one():
+    # Preact turns a button without a key into its neighbour, under a finger or with the focus.
+    buttons = [(file, tag) for file in OWN for tag in CONDITIONAL_BUTTON.findall(file.read_text())]
+    assert len(buttons) > 15
+    assert [(file.name, tag) for file, tag in buttons if "key=" not in tag] == []
+
+
 def imports(file: Path) -> set[Path]:
     """Own modules that a module imports."""
     found = {"".join(names) for names in IMPORT.findall(file.read_text())}

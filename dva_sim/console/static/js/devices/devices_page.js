@@ -23,7 +23,7 @@ export function DevicesPage() {
     <h1 class="hidden">Devices</h1>
     <section class="panel" aria-label="Devices known to the DVA">
       <div class="head"><h2>Devices <span class="count">${list.length}</span></h2>
-        ${maySteer.value && html`<button type="button" aria-expanded=${isAdding}
+        ${maySteer.value && html`<button type="button" key="add" aria-expanded=${isAdding}
           onClick=${() => setAdding(!isAdding)}><${Icon} name="plus" /> Add fake device</button>`}</div>
       ${isAdding && html`<${FakeForm} onDone=${() => setAdding(false)} />`}
       <div class="scrolls" tabindex="0" role="group" aria-label="Table, scrolls sideways">
@@ -62,9 +62,9 @@ function Row({ device }) {
     <td>${holderOf(device)}</td>
     <td>${device.level ?? (device.holder ? UNKNOWN : '–')}</td>
     <td>${endText(device, later)}</td>
-    <td><div class="acts">${!isPast.value && device.holder && device.revocable !== false && html`<button type="button" disabled=${!maySteer.value || !maySupervise.value}
+    <td><div class="acts">${!isPast.value && device.holder && device.revocable !== false && html`<button type="button" key="take-back" disabled=${!maySteer.value || !maySupervise.value}
         aria-label=${`Revoke the permission for ${device.label}`} onClick=${() => act('revoke', { device: device.id })}>Revoke</button>`}
-      ${device.fake && html`<button type="button" disabled=${!maySteer.value} aria-label=${`Remove ${device.label}`}
+      ${device.fake && html`<button type="button" key="remove" disabled=${!maySteer.value} aria-label=${`Remove ${device.label}`}
         onClick=${() => act('fake_remove', { device: device.id })}>Remove</button>`}</div></td>
   </tr>`;
 }

@@ -20,7 +20,7 @@ export function OrderInHand() {
     <p class="reported">${capital(plain(order.kind))} reported ${placeOf(order)}. Drive ${robot} there, look, and say
       whether it is true.${mine ? '' : ' It waits for whoever takes control.'}</p>
     <div class="buttons">
-      ${!here && html`<button type="button" class="go" disabled=${holds}
+      ${!here && html`<button type="button" key="call" class="go" disabled=${holds}
         onClick=${() => chooseRobots([robot])}>Choose ${robot}</button>`}
       <button type="button" disabled=${off} onClick=${() => act('confirm')}>Confirm</button>
       <button type="button" disabled=${off} onClick=${() => act('refute')}>Refute</button>

@@ -14,7 +14,7 @@ export function RobotHead({ robot, place }) {
     <${RobotSelect} robot=${robot} place=${place} />
     <${PatternSelect} robot=${robot} />
     ${place === 0 && driven.value.length < 2 && html`<${BesideButton} robot=${robot} />`}
-    ${place > 0 && html`<button type="button" class="plain" aria-label=${`Remove ${robot.label} from this page`}
+    ${place > 0 && html`<button type="button" key="remove" class="plain" aria-label=${`Remove ${robot.label} from this page`}
       title=${`Remove ${robot.label} from this page`} disabled=${isHeld()}
       onClick=${() => chooseRobots([driven.peek()[0].label])}>×</button>`}
     <${Watchdog} robot=${robot} /><${StopReason} robot=${robot} />

@@ -73,7 +73,7 @@ function SystemAlarm({ alarm }) {
       onClick=${() => select(alarm.event ?? 0)}>${alarm.text}</button>
     <b>${ageText(ageOf(alarm.since_ms))}</b>
     <span class="soft">${alarm.state}${alarm.seen_by ? ` by ${alarm.seen_by}` : ''}</span>
-    ${mayDispatch.value && html`<span class="do">${!seen && html`<button type="button" disabled=${busy}
+    ${mayDispatch.value && html`<span class="do">${!seen && html`<button type="button" key="seen" disabled=${busy}
         aria-label=${`Acknowledge: ${alarm.text}`} onClick=${acknowledge}>Acknowledge</button>`}
       <${Shelve} alarm=${alarm} /></span>`}
   </li>`;

@@ -89,9 +89,9 @@ function Decisions({ event }) {
     <div class="buttons" role="group" aria-label="Other decisions">
       ${open && sentTo(event).map((who) => html`<button type="button" disabled=${off} key=${who}
         onClick=${() => ask('event_take_off', { ...about, device: who, reason: words })}>Take off ${who}</button>
-        ${maySupervise.value && isRobot(who) && html`<button type="button" disabled=${off} title="You drive it yourself"
+        ${maySupervise.value && isRobot(who) && html`<button type="button" key="take-over" disabled=${off} title="You drive it yourself"
           data-deed="take" onClick=${async () => tell(await drive(who, words))}>Take over ${who}</button>`}`)}
-      ${open && html`<button type="button" disabled=${off}
+      ${open && html`<button type="button" key="false-alarm" disabled=${off}
         onClick=${withWords(() => ask('event_false_alarm', { ...about, reason: words }))}>False alarm</button>
       <button type="button" disabled=${off}
         onClick=${() => ask('event_escalate', { ...about, reason: words })}>Escalate</button>`}
@@ -132,10 +132,10 @@ function NextStep({ event, tell }) {
     ${ways.length > 1 && !isSent && html`<fieldset><legend class="hidden">How</legend>${ways.map((one) => html`<label key=${one}>
       <input type="radio" name="way" checked=${one === way} onInput=${() => (wayWanted.value = one)} />${WAYS[one]}</label>`)}</fieldset>`}
     <div class="buttons">
-      ${whom && !isSent && html`<button type="button" class=${looks ? '' : 'primary'} data-deed="send" disabled=${off || !settled} onClick=${send}>
+      ${whom && !isSent && html`<button type="button" key="send" class=${looks ? '' : 'primary'} data-deed="send" disabled=${off || !settled} onClick=${send}>
         ${way === 'drive' ? `Drive ${whom} there` : `Send ${estimateOf(whom)}`}</button>`}
       ${!whom && !sentTo(event).length && html`<p class="none">Nobody can go.</p>`}
-      ${!event.acknowledged && html`<button type="button" class=${looks || (whom && !isSent) ? '' : 'primary'} disabled=${off}
+      ${!event.acknowledged && html`<button type="button" key="acknowledge" class=${looks || (whom && !isSent) ? '' : 'primary'} disabled=${off}
         onClick=${acknowledge}>Acknowledge</button>`}
     </div></div>`;
 }

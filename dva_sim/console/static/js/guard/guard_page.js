@@ -81,7 +81,7 @@ function Field({ me }) {
         <div class="buttons">
           <button type="button" aria-pressed=${placing} disabled=${!maySteer.value}
             onClick=${() => place(!placing)}>${placing ? 'Tap the map where you are' : 'I am here …'}</button>
-          ${canLocate() && html`<button type="button" aria-pressed=${locating.value}
+          ${canLocate() && html`<button type="button" key="locate" aria-pressed=${locating.value}
             onClick=${() => (locating.value = !locating.value)}>By satellite</button>`}
         </div></section>
       <${Report} me=${me} /></div>

@@ -53,7 +53,7 @@ function thingCard(key) {
       <dt>Place</dt><dd>${where}</dd>
     </dl>
     ${robot && isAttached.value && html`<${Watched} i=${key} />`}
-    ${robot && html`<button type="button" class="wide" onClick=${() => chooseRobots([thing.label])}>
+    ${robot && html`<button type="button" key="drive" class="wide" onClick=${() => chooseRobots([thing.label])}>
       <${Icon} name="gamepad-2" />Look through its camera</button>`}`;
 }
 

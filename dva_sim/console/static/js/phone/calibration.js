@@ -81,7 +81,7 @@ function Sensor() {
   const bad = !['live', 'looking', 'tap'].includes(now);
   return html`<div role=${bad ? 'alert' : 'status'} aria-label="Sensor" class=${bad ? 'warning' : 'sensor'}>
     <span>${bad ? `no sensor: ${WORDS[now]}` : WORDS[now]}</span>
-    ${['tap', 'denied'].includes(now) && html`<button type="button" onClick=${ask}>Turn on the sensor</button>`}
+    ${['tap', 'denied'].includes(now) && html`<button type="button" key="sensor" onClick=${ask}>Turn on the sensor</button>`}
   </div>`;
 }
 

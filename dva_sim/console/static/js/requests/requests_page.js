@@ -50,7 +50,7 @@ export function RequestsPage() {
       ${without
         ? html`<p class="soft empty">${without}</p>`
         : html`<${RequestTable} rows=${shown} chosen=${chosen} onChoose=${choose}
-            older=${shown.length >= SHOWN && !paused && html`<button type="button" class="wide" onClick=${more}>Show older</button>`} />`}
+            older=${shown.length >= SHOWN && !paused && html`<button type="button" key="older" class="wide" onClick=${more}>Show older</button>`} />`}
       <${Counts} shown=${shown} paused=${paused} rows=${rows} filter=${filter} />
     </section>
     <${MessageDetail} log=${LOG} row=${[...older, ...rows].find((row) => row.n === chosen) ?? shown.find((row) => row.n === chosen)} />

@@ -49,7 +49,7 @@ function Head({ robot }) {
     ${!isPast.value && html`<span class="soft reported">${left === null ? 'watchdog off' : `watchdog ${left.toFixed(1)} s`}</span>`}
     <span class="gap"></span>
     <a href="#/robots">All robots</a>
-    ${!isPast.value && html`<button type="button" class="stop-one"
+    ${!isPast.value && html`<button type="button" key="stop" class="stop-one"
       onClick=${() => stopRobots([robot.i])}><${Icon} name="octagon-x" />Stop ${robot.label}</button>
     <${Reasons} robot=${robot} />`}
   </header>`;

@@ -18,7 +18,7 @@ import { openHelp } from '../help/help.js';
 export function Bar() {
   return html`<header class="bar">
     <${Time} /><${Link} /><${Age} /><${Alarms} /><span class="gap"></span><${Who} />
-    ${you.value?.user && html`<button type="button" class="plain" title=${you.value.user} onClick=${logOut}>Log out</button>`}
+    ${you.value?.user && html`<button type="button" key="log-out" class="plain" title=${you.value.user} onClick=${logOut}>Log out</button>`}
     ${!isPast.value && html`<${SoundButton} />`}
     <button type="button" class="plain" onClick=${openHelp} aria-label="Help" title="Help (?)">
       <${Icon} name="circle-question-mark" /></button>
@@ -26,7 +26,7 @@ export function Bar() {
       aria-label=${dark.value ? 'Light colours' : 'Dark colours'}
       title=${dark.value ? 'Light colours' : 'Dark colours'}>
       <${Icon} name=${dark.value ? 'sun' : 'moon'} /></button>
-    ${!isPast.value && html`<button type="button" class="emergency" onClick=${emergencyStop}
+    ${!isPast.value && html`<button type="button" key="stop-all" class="emergency" onClick=${emergencyStop}
       title="Stops all robots at once (Shift+Esc)"><${Icon} name="octagon-x" />Emergency stop</button>`}
   </header>`;
 }
@@ -37,7 +37,7 @@ function Time() {
   return html`<span class="item time" title="Simulation time and speed">
     <span class="figure reported">${clockText(shownTime())}</span>
     <span class="soft">${paused ? 'paused' : `×${Number(factor.toFixed(1))}`}</span>
-    ${!isPast.value && !isAttached.value && html`<button type="button" class="plain" disabled=${!maySteer.value || !isModelled.value}
+    ${!isPast.value && !isAttached.value && html`<button type="button" key="pace" class="plain" disabled=${!maySteer.value || !isModelled.value}
       aria-label=${name} title=${isModelled.value ? name : 'With real sockets the simulation runs in real time'}
       onClick=${() => act('pace', { paused: !paused })}>
       <${Icon} name=${paused ? 'play' : 'pause'} /></button>`}

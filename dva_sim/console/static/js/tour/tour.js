@@ -60,8 +60,8 @@ function Leg({ leg }) {
     </ol>
     <div><p class="big">${(time / 1000).toFixed(1)} s</p><p class="soft">${hint(leg)}</p></div>
     ${took === null
-      ? html`<button type="button" class="wide" onClick=${takeTour}>Begin again</button>`
-      : html`<button type="button" class="go wide" onClick=${() => go(leg + 2)}>
+      ? html`<button type="button" key="again" class="wide" onClick=${takeTour}>Begin again</button>`
+      : html`<button type="button" key="go" class="go wide" onClick=${() => go(leg + 2)}>
           ${leg ? 'Show my numbers' : 'Next: the same with the other pattern'}</button>`}</div>`;
 }
 

@@ -32,7 +32,7 @@ function Stop({ text, stopped }) {
   const byDriver = stopped.every((robot) => rowOf(robot.i)?.emergency?.released_by === 'drive');
   return html`<p class="warning emergency-bar"><${Icon} name="octagon-x" /><span>${text} · ${labels}
       ${byDriver && html` <span class="soft">A new start by the driver releases it.</span>`}</span>
-    ${mayRelease.value && html`<button type="button" aria-label=${`Release ${labels}`}
+    ${mayRelease.value && html`<button type="button" key="release" aria-label=${`Release ${labels}`}
       onClick=${() => release(stopped)}>Release</button>`}</p>`;
 }
 
