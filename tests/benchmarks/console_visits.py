@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, Page
 
 PROGRAM = ("-m", "dva_sim.cli", "console", "--no-open", "--port", "0")
 ADDRESS = r"^Console: +(\S+)\n()"
-ADDRESSES = r"^Console: +(\S+)\n.*^Phone: \S+token=(\S+)$.*trust this machine"
+ADDRESSES = r"^Console: +(\S+)\n.*^Phone: \S+token=(\S+)$"
 TICK_S = 1 / os.sysconf("SC_CLK_TCK")
 
 # What a page does is noted: keys, what it sends and is told, and which input a robot obeys when.
