@@ -78,6 +78,8 @@ class ConsoleActions:
     def _release(self, client: str, line: Asked, on_result: OnResult) -> None:
         if is_gone_for_good(line):
             self.forget(client)
+            if not self._driving.sits(client):
+                return  # it gives nothing back, and the audit log says nothing
         self._driving.release(client, on_result)
 
     def forget(self, client: str) -> None:

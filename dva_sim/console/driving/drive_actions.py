@@ -154,9 +154,13 @@ class Driving:
         none = " No robot was taken." if len(robots) > 1 else ""
         return f"{'; '.join(named)}: release it there, or take it over on the page Events.{none}"
 
+    def sits(self, client: str) -> bool:
+        """Return True if a page has a seat."""
+        return client in self._seats.taken
+
     def release(self, client: str, on_result: OnResult) -> None:
         """Give back all that a page holds."""
-        if client not in self._seats.taken:
+        if not self.sits(client):
             self.hold()
             on_result(True, "released")
             return
@@ -403,7 +407,7 @@ class Driving:
     @does("decline")
     def decline(self, client: str, _: Asked, on_result: OnResult) -> None:
         """Decline the order of one's own seat, or of a seat in which nobody sits."""
-        if client in self._seats.taken:
+        if self.sits(client):
             self.person(client).decline(on_result)
             return
         persons = self._seating.persons.values()

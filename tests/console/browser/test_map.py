@@ -48,6 +48,24 @@ def test_what_moves_is_drawn_every_second_frame(console, visit):
     assert 16 <= page.evaluate("window.drawn") <= 40  # some more for what is told meanwhile
 
 
+def test_all_words_on_the_map_have_the_scale_of_a_zoomed_screen(console, visits):
+    visit = visits(960, 600, device_scale_factor=1.5)
+    visit.context.add_init_script(
+        """window.words = {}; const write = CanvasRenderingContext2D.prototype.fillText;
+        CanvasRenderingContext2D.prototype.fillText = function (text, ...at) {
+          (window.words[text] ??= new Set()).add(this.getTransform().a);
+          return write.call(this, text, ...at); };"""
+    )
+    page = visit.open(console().drive)
+
+    def scales() -> dict[str, list[float]]:
+        lines = "Object.entries(window.words).map(([text, scales]) => [text, [...scales]])"
+        return dict(page.evaluate(lines))
+
+    assert becomes(lambda: {"robot-1", "Lobby"} <= scales().keys())
+    assert {text: found for text, found in scales().items() if found != [1.5]} == {}
+
+
 def test_list_and_map_share_one_selection(console, shared):
     page = shared(console().drive)
     row = page.get_by_role("region", name="Robots").get_by_role("button", name="robot-2")

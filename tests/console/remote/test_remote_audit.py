@@ -106,6 +106,7 @@ def test_without_a_name_one_is_called_by_ones_page(page):
     rows = page.written()
     (note,) = [row for row in rows if row.action == "note"]
     assert (note.author, note.text.split(": ")[0]) == ("program", "smoke")
+    assert "release" not in {row.action for row in rows}  # the page that left held nothing
 
 
 def test_pages_are_told_how_the_log_stands(page):

@@ -56,7 +56,8 @@ export function Instructions({ event, details }) {
 
 /** Steps in the order of their times. @param {{details: Details | null, numbered?: boolean}} props */
 export function History({ details, numbered = false }) {
-  const steps = details?.history ?? [];
+  if (!details) return null;
+  const steps = details.history;
   if (!steps.length) return html`<p class="none">Nothing has happened.</p>`;
   return html`<ol class="history">${steps.map((step) => html`<li key=${`${step.event} ${step.at_ms} ${step.what} ${step.device}`}>
     <span class="figure">${ageText(ageOf(step.at_ms))} ago</span>

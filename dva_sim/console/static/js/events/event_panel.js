@@ -37,10 +37,9 @@ export function EventPanel() {
 /** Instructions, handing over and history of the event. @param {{event: SiteEvent}} props */
 function Details({ event }) {
   const details = useDetails(event.number, [event.state, event.decisions, event.severity, event.note].join());
-  const steps = details?.history.length ?? 0;
   return html`<${Instructions} event=${event.number} details=${details} />
     ${isOpen(event) && ownRoom.value && html`<details><summary>Hand over</summary><${HandOver} event=${event.number} /></details>`}
-    <details open><summary>History (${steps})</summary><${History} details=${details} /></details>`;
+    <details open><summary>History${details && ` (${details.history.length})`}</summary><${History} details=${details} /></details>`;
 }
 
 /** @param {{event: SiteEvent}} props */

@@ -86,6 +86,7 @@ export class Plan {
    * @param {import('./lettering.js').Place[]} written
    */
   drawNames({ ctx, affine, colours }, written) {
+    affine.toPixels(ctx);
     const letters = lettersOn(ctx);
     ctx.font = `${letters}px system-ui, sans-serif`;
     ctx.textAlign = 'center';
